@@ -1,0 +1,54 @@
+"""What every thermal chamber can do. Temperatures in deg C."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+
+@dataclass(frozen=True)
+class ChamberLimits:
+    """The narrower of the controller's own set-point limits and the bench file's."""
+
+    min_c: float
+    max_c: float
+    resolution_c: float  #: a set point is rounded to a multiple of this
+    ramp_c_per_min: float  #: how fast the air can follow, for planning
+
+
+@dataclass(frozen=True)
+class ChamberState:
+    """One poll of the controller."""
+
+    t_s: float
+    temperature_c: float
+    setpoint_c: float
+    alarms: tuple[str, ...] = ()
+
+
+class Chamber(Protocol):
+    """A thermal chamber. Every failure is an InstrumentError."""
+
+    name: str
+    limits: ChamberLimits
+    safe_c: float  #: the set point that every exit path leaves behind
+
+    def identify(self) -> str:
+        """Get what the controller says it is; raises WrongInstrument when it is something else or not in deg C."""
+        ...
+
+    def set_temperature_c(self, temperature_c: float) -> float:
+        """Control the set point: rounded, limited, written only on change, read back. Returns what was read back."""
+        ...
+
+    def read(self) -> ChamberState:
+        """Get air temperature, set point and alarms."""
+        ...
+
+    def make_safe(self) -> float:
+        """Control the chamber to its safe set point; returns what was read back."""
+        ...
+
+    def close(self) -> None:
+        """Control the link: close it. The controller keeps its set point."""
+        ...

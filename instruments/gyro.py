@@ -1,0 +1,88 @@
+"""What every gyro can do: stream readings exactly as the device sent them, with its own validity flags."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One quantity of a device: value in `unit` = offset + scale * raw integer."""
+
+    name: str  #: the recording's column: gyro_x, temperature_x_c, supply_v, accel_x_g ...
+    unit: str
+    scale: float
+    offset: float = 0.0
+
+    def value(self, raw: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the values, (n,) in `unit`, of raw integers (n,)."""
+        return self.offset + self.scale * raw.astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Readings:
+    """A stretch of readings, n rows. `raw` holds whole numbers only: what the device sent, never scaled floats."""
+
+    t_s: NDArray[np.float64]  #: (n,) clock time of each reading
+    raw: Mapping[str, NDArray[np.int64]]  #: channel name -> (n,)
+    valid: NDArray[np.bool_]  #: (n,) False where the instrument marked the reading as bad
+    lost: int = 0  #: readings that the device's counter or the clock shows to be missing
+    damaged: int = 0  #: frames or lines that arrived but were not the protocol's (CRC, framing)
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+
+@dataclass(frozen=True)
+class GyroLimits:
+    """What the unit under calibration may be exposed to, from its bench file or data sheet."""
+
+    max_rate_dps: float
+    min_c: float
+    max_c: float
+
+
+@dataclass(frozen=True)
+class GyroIdentity:
+    """What is known of the unit: from the device where it tells, else from the bench file."""
+
+    serial: str
+    model: str
+    technology: str = ""  #: "fog", "mems", "piezo" or "" for unknown
+    datasheet: Mapping[str, float] = field(default_factory=dict)
+    output: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)  #: axis -> unit, offset, scale
+
+
+class Gyro(Protocol):
+    """One unit under calibration. Every failure is an InstrumentError."""
+
+    name: str
+    axes: tuple[str, ...]
+    channels: tuple[Channel, ...]
+    sample_rate_hz: float
+    limits: GyroLimits
+
+    def identify(self) -> GyroIdentity:
+        """Get who the unit is; raises WrongInstrument when the device tells another serial number."""
+        ...
+
+    def start(self) -> None:
+        """Control the stream: open it and drop what is stale or partial."""
+        ...
+
+    def read(self, duration_s: float) -> Readings:
+        """Get every reading of the next `duration_s` clock seconds; blocks that long. May hold fewer, even none."""
+        ...
+
+    def glance(self) -> Readings:
+        """Get one fresh reading (n = 1) and drop everything older; raises NoReply when none comes in time."""
+        ...
+
+    def stop(self) -> None:
+        """Control the stream: stop and close it. Safe to call at any time, also twice."""
+        ...

@@ -1,0 +1,1 @@
+"""labctl calibrates gyroscopes: the rooms people enter."""

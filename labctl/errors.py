@@ -1,0 +1,80 @@
+"""The error tree of labctl. One clear line each: what, where, the value, its unit, the limit, and what to do.
+
+LabctlError              exit 2, HTTP 400
+├── BadInput             a file, an option or a request is wrong; nothing was changed
+│   ├── BadRecording     in a recording: names file, column, row and what was expected
+│   ├── BadRecipe        in a recipe or a plan
+│   ├── BadBench         in a bench file
+│   └── BadCalibrationFile   edited, truncated or of an unknown format
+├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
+├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
+├── Conflict             somebody else holds it, or it is already so               HTTP 409
+└── StoreError           the database cannot be used: newer, damaged, locked, full     HTTP 503
+"""
+
+from __future__ import annotations
+
+
+class LabctlError(Exception):
+    """Anything that a person can be told in one line."""
+
+    status = 400  #: HTTP
+    slug = "error"  #: last part of the problem document's `type`
+
+
+class BadInput(LabctlError):
+    """A file, an option or a request is wrong; nothing was changed."""
+
+    slug = "bad-input"
+
+
+class BadRecording(BadInput):
+    """A recording is wrong; the text names file, column, row and what was expected."""
+
+    slug = "bad-recording"
+
+
+class BadRecipe(BadInput):
+    """A recipe is wrong, or asks for what the bench or the unit cannot do."""
+
+    slug = "bad-recipe"
+
+
+class BadBench(BadInput):
+    """A bench file is wrong."""
+
+    slug = "bad-bench"
+
+
+class BadCalibrationFile(BadInput):
+    """A calibration file was edited, truncated, or is of an unknown format."""
+
+    slug = "bad-calibration-file"
+
+
+class NotFound(LabctlError):
+    """No such unit, recording, calibration or campaign."""
+
+    status = 404
+    slug = "not-found"
+
+
+class NotEnoughData(LabctlError):
+    """The model asks for more than the recording holds; the text says how much more."""
+
+    status = 422
+    slug = "not-enough-data"
+
+
+class Conflict(LabctlError):
+    """Somebody else holds it, or it is already so."""
+
+    status = 409
+    slug = "conflict"
+
+
+class StoreError(LabctlError):
+    """The database cannot be used: newer than the code, damaged, locked, or the disk is full."""
+
+    status = 503
+    slug = "store"

@@ -1,0 +1,37 @@
+"""A recording in memory: named columns with units, in the order in which they were measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.recording.info import RecordingInfo
+
+Columns = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Everything measured on one unit in one campaign.
+
+    `columns` holds the columns of the interchange format under their own names, n rows each: one row per reading
+    (kind "samples"), per data set ("points") or per temperature ("coefficients"). Gyro columns stay in the output's
+    own unit; `gyro_dps` converts them. A column that is absent is unknown, never zero.
+    """
+
+    info: RecordingInfo
+    columns: Columns
+    environment: Columns | None = None
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), ()))
+
+    def gyro_dps(self, axis: str) -> NDArray[np.float64]:
+        """Return the output of one axis as a rate, (n,) deg/s, by its nominal scale factor and offset."""
+        raw = np.asarray(self.columns[f"gyro_{axis}"], dtype=np.float64)
+        output = self.info.output.get(axis)  # type: ignore[call-overload]
+        return raw if output is None else (raw - output.offset) / output.scale
