@@ -7,6 +7,7 @@ LabctlError              exit 2, HTTP 400
 │   ├── BadBench         in a bench file
 │   └── BadCalibrationFile   edited, truncated or of an unknown format
 ├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
+│   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
 ├── Conflict             somebody else holds it, or it is already so               HTTP 409
 └── StoreError           the database cannot be used: newer, damaged, locked, full     HTTP 503
@@ -19,6 +20,7 @@ class LabctlError(Exception):
     """Anything that a person can be told in one line."""
 
     status = 400  #: HTTP
+    exit_status = 2  #: command line; 1 where the answer to a fair question is no
     slug = "error"  #: last part of the problem document's `type`
 
 
@@ -57,6 +59,13 @@ class NotFound(LabctlError):
 
     status = 404
     slug = "not-found"
+
+
+class NotCertified(NotFound):
+    """The unit has no calibration in force."""
+
+    exit_status = 1
+    slug = "not-certified"
 
 
 class NotEnoughData(LabctlError):

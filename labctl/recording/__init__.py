@@ -1,6 +1,17 @@
 """A recording in memory, and the interchange format it is read from and written to."""
 
+from labctl.recording.files import read_recording, write_recording
 from labctl.recording.info import OutputUnit, RecordingInfo
-from labctl.recording.recording import Recording
+from labctl.recording.points import dataset_starts, to_points
+from labctl.recording.recording import Columns, Recording
 
-__all__ = ["OutputUnit", "Recording", "RecordingInfo"]
+__all__ = [
+    "Columns",
+    "OutputUnit",
+    "Recording",
+    "RecordingInfo",
+    "dataset_starts",
+    "read_recording",
+    "to_points",
+    "write_recording",
+]

@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from typing import Literal
+import math
+from typing import Any, Literal
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 
 Axis = Literal["x", "y", "z"]
 
+#: Units that are rates already: what one deg/s is in them.
+RATE_UNITS = {"deg/s": 1.0, "rad/s": math.pi / 180.0, "deg/h": 3600.0}
+
 
 class OutputUnit(BaseModel):
-    """How a gyro column becomes a rate: rate_dps = (column - offset) / scale."""
+    """How a gyro column becomes a rate: rate_dps = (column - offset) / scale.
+
+    For deg/s, rad/s and deg/h both have defaults; for V, mV, count and arb the nominal scale must be given.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     unit: Literal["deg/s", "rad/s", "deg/h", "V", "mV", "count", "arb"] = "deg/s"
     offset: float = 0.0
     scale: float = 1.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_scale(cls, given: Any) -> Any:
+        if isinstance(given, dict) and "scale" not in given:
+            unit = given.get("unit", "deg/s")
+            if unit in RATE_UNITS:
+                return {**given, "scale": RATE_UNITS[unit]}
+            raise ValueError(f"unit {unit!r} needs a scale: the output's change, in that unit, per deg/s")
+        return given
+
+    @model_validator(mode="after")
+    def _usable(self) -> OutputUnit:
+        if self.scale == 0 or not math.isfinite(self.scale) or not math.isfinite(self.offset):
+            raise ValueError(f"scale must be a finite number other than 0 (is {self.scale}) and offset finite")
+        return self
 
 
 class RecordingInfo(BaseModel):
@@ -30,16 +52,22 @@ class RecordingInfo(BaseModel):
     model: str = ""
     axes: tuple[Axis, ...] = Field(min_length=1, max_length=3)
     kind: Literal["samples", "points", "coefficients"]
-    started_at: AwareDatetime | datetime
+    started_at: AwareDatetime
     power_on_s: float | None = None
     latitude_deg: float | None = Field(default=None, ge=-90, le=90)
     table_axis: Literal["up"] = "up"
     tilt_deg: float | None = None
     tilt_azimuth_deg: float | None = None
-    sample_rate_hz: float | None = None
-    max_rate_dps: float | None = None
+    sample_rate_hz: float | None = Field(default=None, gt=0)
+    max_rate_dps: float | None = Field(default=None, gt=0)
     active_calibration: str = ""
     notes: str = ""
     technology: Literal["fog", "mems", "piezo"] | None = None
     datasheet: dict[str, float] = Field(default_factory=dict)
     output: dict[Axis, OutputUnit] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _axes_once(self) -> RecordingInfo:
+        if len(set(self.axes)) != len(self.axes):
+            raise ValueError(f"an axis stands twice in axes = {list(self.axes)}")
+        return self

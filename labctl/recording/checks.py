@@ -1,0 +1,104 @@
+"""What a recording must keep to, and the defaults of what it leaves out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadRecording
+from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, needed
+from labctl.recording.info import RecordingInfo
+
+POSITIONS = frozenset(sign + axis for sign in ("", "-") for axis in "xyz")
+
+
+def checked(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the columns with the format's defaults filled in; raises BadRecording on the first thing that is wrong."""
+    for name in needed(info):
+        if name not in columns:
+            raise BadRecording(
+                f"{path}: column {name!r} is missing (needed for kind = {info.kind!r}: {BY_NAME[name].meaning})"
+            )
+        _finite(path, name, columns[name], columns.get("valid"))
+    if info.kind == "coefficients":
+        return columns
+    if "t_s" in columns:
+        _time(path, columns["t_s"], strict=info.kind == "samples")
+    _datasets(path, columns["dataset"], points=info.kind == "points")
+    return _defaults(path, info, columns)
+
+
+def checked_environment(path: Path, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the environment's columns; raises BadRecording when time or temperature is missing or not in order."""
+    for name in ENVIRONMENT_NEEDED:
+        if name not in columns:
+            raise BadRecording(f"{path}: column {name!r} is missing")
+        _finite(path, name, columns[name], None)
+    _time(path, columns["t_s"], strict=False)
+    columns.setdefault("run", np.ones(len(columns["t_s"]), dtype=np.int64))
+    return columns
+
+
+def _finite(path: Path, name: str, values: NDArray[Any], valid: NDArray[Any] | None) -> None:
+    if values.dtype.kind != "f":
+        return
+    bad = ~np.isfinite(values)
+    if valid is not None and name.startswith("gyro_"):
+        bad &= valid != 0  # an instrument may send no number with a reading that it marks as bad
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise BadRecording(
+            f"{path}: column {name!r}, row {row + 1}: {values[row]} where a number is needed "
+            f"({BY_NAME[name].meaning}); leave the row out, or mark it with valid = 0"
+        )
+
+
+def _time(path: Path, t_s: NDArray[np.float64], *, strict: bool) -> None:
+    steps = np.diff(t_s)
+    back = steps <= 0 if strict else steps < 0
+    if back.any():
+        row = int(np.argmax(back)) + 1
+        raise BadRecording(
+            f"{path}: column 't_s', row {row + 1}: {t_s[row]:.9g} s does not follow {t_s[row - 1]:.9g} s "
+            "of the row before; rows stand in the order of measurement"
+        )
+
+
+def _datasets(path: Path, dataset: NDArray[np.int64], *, points: bool) -> None:
+    starts = np.flatnonzero(np.concatenate([[True], dataset[1:] != dataset[:-1]]))
+    numbers = dataset[starts] if not points else dataset
+    rows = starts if not points else np.arange(len(dataset))
+    _, first = np.unique(numbers, return_index=True)
+    if len(first) != len(numbers):
+        again = int(np.setdiff1d(np.arange(len(numbers)), first)[0])
+        raise BadRecording(
+            f"{path}: column 'dataset', row {rows[again] + 1}: number {numbers[again]} returns; "
+            "each data set stands once, in one stretch of rows"
+        )
+
+
+def _defaults(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    n = len(columns["dataset"])
+    if "position" not in columns:
+        columns["position"] = np.full(n, info.axes[0])
+    _positions(path, columns["position"])
+    columns.setdefault("run", np.ones(n, dtype=np.int64))
+    if "mounting" not in columns:
+        changed = (columns["run"][1:] != columns["run"][:-1]) | (columns["position"][1:] != columns["position"][:-1])
+        columns["mounting"] = np.concatenate([[1], 1 + np.cumsum(changed)]).astype(np.int64)
+    if "power_s" not in columns and info.power_on_s is not None and "t_s" in columns and (columns["run"] == 1).all():
+        columns["power_s"] = columns["t_s"] - info.power_on_s
+    return columns
+
+
+def _positions(path: Path, position: NDArray[Any]) -> None:
+    for word in np.unique(position):
+        if word not in POSITIONS:
+            row = int(np.argmax(position == word))
+            raise BadRecording(
+                f"{path}: column 'position', row {row + 1}: {str(word)!r} is no body axis "
+                "(expected x, -x, y, -y, z or -z)"
+            )

@@ -1,0 +1,73 @@
+"""The columns of the interchange format, as a table: name, type, unit and meaning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from labctl.recording.info import RecordingInfo
+
+Kind = Literal["integer", "number", "text"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of the format. `needed_for` names the kinds of recording that cannot do without it."""
+
+    name: str
+    kind: Kind
+    unit: str
+    meaning: str
+    needed_for: frozenset[str] = frozenset()
+
+
+_BOTH = frozenset({"samples", "points"})
+
+COLUMNS = (
+    Column("dataset", "integer", "", "number of the data set", _BOTH),
+    Column("t_s", "number", "s", "time since started_at", frozenset({"samples"})),
+    Column("position", "text", "", "body axis along the table axis, with its sign"),
+    Column("run", "integer", "", "powered session"),
+    Column("mounting", "integer", "", "counts the re-mountings of the unit"),
+    Column("power_s", "number", "s", "time since the unit was last switched on"),
+    Column("table_rate_dps", "number", "deg/s", "rate of the table that was really run", _BOTH),
+    Column("table_angle_deg", "number", "deg", "table angle, unwrapped within a data set"),
+    Column(
+        "temperature_c",
+        "number",
+        "deg C",
+        "the gyro's own thermometer",
+        frozenset({"samples", "points", "coefficients"}),
+    ),
+    *(Column(f"temperature_{a}_c", "number", "deg C", f"thermometer of axis {a}") for a in "xyz"),
+    Column("chamber_c", "number", "deg C", "chamber air"),
+    Column("chamber_setpoint_c", "number", "deg C", "set point of the chamber"),
+    Column("supply_v", "number", "V", "supply voltage of the gyro"),
+    *(Column(f"accel_{a}_g", "number", "g", f"specific force along body axis {a}") for a in "xyz"),
+    *(Column(f"field_{a}_ut", "number", "microtesla", f"magnetic field along body axis {a}") for a in "xyz"),
+    Column("valid", "integer", "", "0: the instrument marked this reading as bad"),
+    *(Column(f"gyro_{a}", "number", "as [output]", f"output of axis {a}") for a in "xyz"),
+    *(
+        Column(f"gyro_{a}_std", "number", "as [output]", f"standard deviation of the readings behind gyro_{a}")
+        for a in "xyz"
+    ),
+    Column("n", "integer", "", "number of readings behind a mean"),
+    Column("scale_factor", "number", "output unit per deg/s", "scale factor", frozenset({"coefficients"})),
+    Column("offset", "number", "output unit", "output at rest", frozenset({"coefficients"})),
+    Column("axis", "text", "", "axis of a row of coefficients"),
+)
+
+BY_NAME = {column.name: column for column in COLUMNS}
+
+
+def needed(info: RecordingInfo) -> list[str]:
+    """Return the names of the columns that a recording of this kind and these axes must have."""
+    names = [column.name for column in COLUMNS if info.kind in column.needed_for]
+    if info.kind == "coefficients":
+        return names
+    if len(info.axes) > 1:
+        names.append("position")
+    return names + [f"gyro_{axis}" for axis in info.axes]
+
+
+ENVIRONMENT_NEEDED = ("t_s", "temperature_c")

@@ -1,0 +1,112 @@
+"""The interchange format on disk: a folder with recording.toml, a data file and, perhaps, the environment."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any, Literal
+
+import pyarrow as pa
+import pyarrow.csv as pacsv
+import pyarrow.parquet as pq
+import tomli_w
+from pydantic import ValidationError
+
+from labctl.errors import BadRecording
+from labctl.recording.checks import checked, checked_environment
+from labctl.recording.info import RecordingInfo
+from labctl.recording.recording import Columns, Recording
+from labctl.recording.tables import read_table
+
+HEAD = "recording.toml"
+ENVIRONMENT = "environment"
+FORMATS = ("parquet", "csv")
+FileFormat = Literal["parquet", "csv"]
+
+
+def read_recording(folder: Path) -> Recording:
+    """Read a recording from its folder.
+
+    Raises BadRecording, which names the file, the column, the row (1 is the first row below the header) and what was
+    expected.
+    """
+    info = _read_head(folder / HEAD)
+    path = _data_file(folder, info.kind)
+    columns = checked(path, info, read_table(path))
+    environment = None
+    for suffix in FORMATS:
+        file = folder / f"{ENVIRONMENT}.{suffix}"
+        if file.exists():
+            environment = checked_environment(file, read_table(file))
+            break
+    return Recording(info, columns, environment)
+
+
+def _read_head(path: Path) -> RecordingInfo:
+    if not path.is_file():
+        raise BadRecording(f"{path}: not found; a recording is a folder with {HEAD} and a data file")
+    try:
+        return RecordingInfo.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadRecording(f"{path}: not TOML: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        given = "" if first["type"] == "missing" else f" (is {first['input']!r})"
+        raise BadRecording(f"{path}: {place}: {first['msg']}{given}") from error
+
+
+def _data_file(folder: Path, kind: str) -> Path:
+    found = [folder / f"{kind}.{suffix}" for suffix in FORMATS if (folder / f"{kind}.{suffix}").exists()]
+    if not found:
+        raise BadRecording(f"{folder}: kind = {kind!r} needs a file {kind}.parquet or {kind}.csv; there is none")
+    if len(found) > 1:
+        raise BadRecording(f"{folder}: both {found[0].name} and {found[1].name} are there; keep the one that is meant")
+    return found[0]
+
+
+def write_recording(recording: Recording, folder: Path, file_format: FileFormat = "parquet") -> list[str]:
+    """Write a recording into a new folder and return the names of its files.
+
+    The folder appears whole or not at all. Raises BadRecording when it exists already.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise BadRecording(f"{folder}: exists already and is not empty; name a new folder")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
+        whole = Path(made) / "recording"
+        whole.mkdir()
+        head = recording.info.model_dump(mode="json", exclude_none=True, exclude_defaults=False)
+        (whole / HEAD).write_bytes(tomli_w.dumps(head).encode())
+        _write_table(recording.columns, whole / f"{recording.info.kind}.{file_format}")
+        if recording.environment is not None:
+            _write_table(recording.environment, whole / f"{ENVIRONMENT}.{file_format}")
+        files = sorted(whole.iterdir())
+        for file in (*files, whole):
+            _sync(file)
+        if folder.exists():
+            folder.rmdir()
+        shutil.move(whole, folder)
+        _sync(folder.parent)
+    return [file.name for file in files]
+
+
+def _write_table(columns: Columns, path: Path) -> None:
+    table: Any = pa.table({name: pa.array(values) for name, values in columns.items()})
+    if path.suffix == ".parquet":
+        floats = [name for name in table.column_names if pa.types.is_floating(table.schema.field(name).type)]
+        others = [name for name in table.column_names if name not in floats]
+        pq.write_table(table, path, compression="zstd", use_dictionary=others, use_byte_stream_split=floats)
+    else:
+        pacsv.write_csv(table, path)
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
