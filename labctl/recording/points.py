@@ -1,4 +1,4 @@
-"""From readings to data sets: the mean, standard deviation and number of the valid readings of each (Ojeda eqs. 5, 6)."""
+"""From readings to data sets: mean, standard deviation and number of the valid readings of each (Ojeda eqs. 5, 6)."""
 
 from __future__ import annotations
 

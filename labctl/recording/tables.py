@@ -23,7 +23,7 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
     table = _parquet(path) if path.suffix == ".parquet" else _csv(path)
     doubled = {name for name in table.column_names if table.column_names.count(name) > 1}
     if doubled:
-        raise BadRecording(f"{path}: column {sorted(doubled)[0]!r} stands more than once in the header")
+        raise BadRecording(f"{path}: column {min(doubled)!r} stands more than once in the header")
     if table.num_rows == 0:
         raise BadRecording(f"{path}: no rows below the header; expected at least one")
     return {name: _column(path, name, table.column(name)) for name in table.column_names}
@@ -57,7 +57,8 @@ def _csv(path: Path) -> pa.Table:
     except pa.ArrowInvalid as error:
         first = str(error).splitlines()[0]
         raise BadRecording(
-            f"{path}: {first}; expected {len(names)} columns in each row, '.' as decimal point, ',' only between columns"
+            f"{path}: {first}; expected {len(names)} columns in each row, "
+            "'.' as decimal point, ',' only between columns"
         ) from error
 
 

@@ -1,0 +1,41 @@
+"""Alignment: a gyro feels turning about axes that are not its own."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from labctl.fitting.channels import BODY_AXES, Channels
+from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Term
+
+
+class Misalignment(Effect):
+    """Input axis misalignment."""
+
+    id = "misalignment"
+    term = "Input axis misalignment"
+    sentence = "The gyro's input axis is tilted, so it feels a part of the turning about the other axes."
+    origin: ClassVar[Origin] = "package"
+    rows: ClassVar[Rows] = "cross"
+    ranges: ClassVar = {"fog": (0.0017, 0.017), "mems": (0.0017, 0.02), "piezo": (0.0017, 0.017)}
+    aliases = ("non_orthogonality",)
+    experiment = "remove and refit the unit at least three times: what changes is the fixture's"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+        return [
+            Column(f"misalignment_{other}", "1", channels.rates[other])
+            for other in BODY_AXES
+            if other != axis and other in channels.rates
+        ]
+
+
+class NonOrthogonality(Misalignment):
+    """Non-orthogonality of the input axes."""
+
+    id = "non_orthogonality"
+    term = "Non-orthogonality of the input axes"
+    sentence = "The input axes are not square to each other; nine numbers cannot tell this from misalignment."
+    aliases = ("misalignment",)
+    experiment = "an external alignment cube"
+
+
+EFFECTS: tuple[type[Effect], ...] = (Misalignment, NonOrthogonality)

@@ -1,0 +1,49 @@
+"""Bias: what the gyro says at rest."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from labctl.fitting.channels import Channels
+from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Term, powers
+
+
+class Bias(Effect):
+    """Zero-rate output."""
+
+    id = "bias"
+    term = "Bias (zero-rate output)"
+    sentence = "The gyro reports a constant rate while it stands still."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 3.0), "piezo": (0.0, 5.0)}
+    experiment = "input axis up, then down, table clamped: half the sum is bias, half the difference is not"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+        return [Column("bias", "deg/s", np.ones(len(channels)))]
+
+
+class BiasTemperature(Effect):
+    """Bias temperature sensitivity."""
+
+    id = "bias_temperature"
+    term = "Bias temperature sensitivity"
+    sentence = "The output at rest changes with the gyro's temperature."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    default_order = 2
+    max_order = 5
+    ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.005, 0.08), "piezo": (0.05, 0.63)}
+    experiment = "take the temperatures in the opposite order and repeat one at the end"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        centred = channels.temperature_c(axis) - reference.temperature_c
+        return [
+            Column(f"bias_t{k}", f"deg/s/K^{k}" if k > 1 else "deg/s/K", column)
+            for k, column in powers(centred, range(1, self.order(term) + 1)).items()
+        ]
+
+
+EFFECTS: tuple[type[Effect], ...] = (Bias, BiasTemperature)

@@ -1,0 +1,149 @@
+"""Scale factor: how the output follows the rate."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from labctl.fitting.channels import Channels
+from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Term, powers
+
+
+class ScaleFactor(Effect):
+    """Scale factor error."""
+
+    id = "scale_factor"
+    term = "Scale factor error"
+    sentence = "The output grows a little more or less than the rate does."
+    origin: ClassVar[Origin] = "sensor"
+    ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.01), "piezo": (0.0, 0.0035)}
+    aliases = ("table_rate_ratio",)
+    experiment = "count whole turns against an index pulse: the integral of the output is 360 deg each"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+        return [Column("scale_factor", "1", channels.rate_dps(axis))]
+
+
+class ScaleFactorTemperature(Effect):
+    """Scale factor temperature sensitivity."""
+
+    id = "scale_factor_temperature"
+    term = "Scale factor temperature sensitivity"
+    sentence = "The scale factor changes with the gyro's temperature."
+    origin: ClassVar[Origin] = "sensor"
+    default_order = 2
+    max_order = 5
+    ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (1e-4, 5e-4), "piezo": (0.0, 2e-4)}
+    experiment = "the same rates on the way up and on the way down in temperature"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        rate = channels.rate_dps(axis)
+        centred = channels.temperature_c(axis) - reference.temperature_c
+        return [
+            Column(f"scale_factor_t{k}", f"1/K^{k}" if k > 1 else "1/K", rate * column)
+            for k, column in powers(centred, range(1, self.order(term) + 1)).items()
+        ]
+
+
+class ScaleFactorAsymmetry(Effect):
+    """Scale factor asymmetry."""
+
+    id = "scale_factor_asymmetry"
+    term = "Scale factor asymmetry"
+    sentence = "The scale factor differs between the two directions of turning."
+    origin: ClassVar[Origin] = "sensor"
+    ranges: ClassVar = {"fog": (1e-5, 5e-4), "mems": (5e-5, 1e-3), "piezo": (0.0, 1e-3)}
+    experiment = "at least six rates of each sign, in random order"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+        return [Column("asymmetry", "1", np.abs(channels.rate_dps(axis)))]
+
+
+class _Power(Effect):
+    """Powers of the own rate, of one parity."""
+
+    first: ClassVar[int]
+    origin: ClassVar[Origin] = "sensor"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+        found = powers(channels.rate_dps(axis), range(self.first, self.order(term) + 1))
+        return [
+            Column(f"scale_factor_r{k}", f"(deg/s)^-{k - 1}", column)
+            for k, column in found.items()
+            if k % 2 == self.first % 2
+        ]
+
+
+class ScaleFactorEven(_Power):
+    """Scale factor nonlinearity of even order."""
+
+    id = "scale_factor_even"
+    term = "Scale factor nonlinearity, even order"
+    sentence = "The error curves the same way for both directions of turning, like the square of the rate."
+    first = 2
+    min_order = 2
+    default_order = 2
+    max_order = 4
+    ranges: ClassVar = {"fog": (0.0, 1e-6), "mems": (1e-7, 2e-6), "piezo": (0.0, 1e-5)}
+    aliases = ("centripetal_acceleration",)
+    experiment = "repeat at another radius, or with the unit turned by 180 deg on the table"
+
+
+class ScaleFactorOdd(_Power):
+    """Scale factor nonlinearity of odd order."""
+
+    id = "scale_factor_odd"
+    term = "Scale factor nonlinearity, odd order"
+    sentence = "The error bends away from a line at high rates, with opposite signs for the two directions."
+    first = 3
+    min_order = 3
+    default_order = 3
+    max_order = 5
+    ranges: ClassVar = {"fog": (0.0, 5e-7), "mems": (0.0, 1e-8), "piezo": (0.0, 1e-7)}
+    experiment = "more rates in the top third of the range"
+
+
+class SineResponse(Effect):
+    """Sine response of an open-loop interferometer."""
+
+    id = "sine_response"
+    term = "Sine response (open-loop interferometer)"
+    sentence = "The output follows the sine of the optical phase, so it falls behind at high rates."
+    origin: ClassVar[Origin] = "sensor"
+    parameters = (Parameter("k", "s/rad", 0.05, 1.0, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 1.5), "mems": (0.0, 0.0), "piezo": (0.0, 0.0)}
+    experiment = "more rates in the top third of the range"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+        k = term.parameters.get("k", 0.3)
+        rate_rad_s = np.deg2rad(channels.rate_dps(axis))
+        return [Column("sine_response", "1", np.rad2deg(np.sin(k * rate_rad_s) / k - rate_rad_s))]
+
+
+class Saturation(Effect):
+    """Saturation near the input rate limit."""
+
+    id = "saturation"
+    term = "Saturation (input rate limit)"
+    sentence = "Beyond a certain rate the output no longer follows."
+    origin: ClassVar[Origin] = "sensor"
+    parameters = (Parameter("knee_dps", "deg/s", 20.0, 400.0),)
+    ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
+    experiment = "rates every 2 to 5 % above 70 % of full scale"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+        rate = channels.rate_dps(axis)
+        knee = term.parameters.get("knee_dps", 0.8 * float(np.max(np.abs(rate), initial=1.0)))
+        return [Column("saturation", "1", np.sign(rate) * np.maximum(np.abs(rate) - knee, 0.0))]
+
+
+EFFECTS: tuple[type[Effect], ...] = (
+    ScaleFactor,
+    ScaleFactorTemperature,
+    ScaleFactorAsymmetry,
+    ScaleFactorEven,
+    ScaleFactorOdd,
+    SineResponse,
+    Saturation,
+)

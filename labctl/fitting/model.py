@@ -1,0 +1,200 @@
+"""An error model: an ordered set of effects, and how temperature enters. Fitted, it predicts and compensates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import LabctlError
+from labctl.fitting.channels import Array, Channels
+from labctl.fitting.effects import Column, Reference, Term, effect
+from labctl.fitting.temperature import Constant, TemperatureBasis, basis_from_dict
+
+Argument = Literal["rate", "output"]
+#: Effects of these origins belong to the unit and leave the house with its calibration.
+EXPORTED_ORIGINS = frozenset({"sensor", "package"})
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """A set of effects. `argument` says whether rate regressors see the true rate or the gyro's output."""
+
+    name: str
+    terms: tuple[Term, ...]
+    argument: Argument = "rate"
+    temperature: TemperatureBasis = field(default_factory=Constant)
+    reference: Reference = field(default_factory=Reference)
+
+    @property
+    def effect_ids(self) -> list[str]:
+        """The ids of the effects, in order."""
+        return [term.effect for term in self.terms]
+
+    def columns(self, channels: Channels, axis: str) -> list[Column]:
+        """Return every effect's regressors of one output axis, before temperature multiplies them."""
+        return [
+            column
+            for term in self.terms
+            for column in effect(term.effect).columns(channels, axis, term, self.reference)
+        ]
+
+    def with_terms(self, terms: tuple[Term, ...], name: str | None = None) -> ErrorModel:
+        """Return the same model with other effects."""
+        return replace(self, terms=terms, name=name or self.name)
+
+    def forward(self) -> ErrorModel:
+        """Return the same effects as a law of the true rate: the form that is physics, and that criticism judges."""
+        return replace(self, argument="rate")
+
+
+def expand(columns: Array, basis: Array) -> Array:
+    """Return each column (n, k) times each temperature function (n, m), (n, k*m), the functions running fastest."""
+    return (columns[:, :, None] * basis[:, None, :]).reshape(len(columns), -1)
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """The coefficients of one output axis: k names by m temperature functions."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: NDArray[np.float64]  #: (k, m)
+    covariance: NDArray[np.float64]  #: (k*m, k*m), the temperature functions running fastest
+
+    @property
+    def u(self) -> NDArray[np.float64]:
+        """Standard uncertainties, (k, m)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(self.values.shape)
+
+
+class NotConverged(LabctlError):
+    """The model's error changes faster than the rate itself; it cannot be inverted."""
+
+    slug = "not-converged"
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """An error model with its coefficients."""
+
+    model: ErrorModel
+    axes: Mapping[str, AxisFit]
+
+    def error_dps(self, channels: Channels, axis: str) -> Array:
+        """Return the modelled error of an output axis, (n,) deg/s: gyro minus true rate."""
+        fit = self.axes[axis]
+        basis = self.model.temperature.basis(channels.temperature_c(axis))
+        at_temperature = fit.values @ basis.T  # (k, n)
+        error = np.zeros(len(channels))
+        by_name = {name: row for name, row in zip(fit.names, at_temperature, strict=True)}
+        for column in self.model.columns(channels, axis):
+            if column.name in by_name:
+                error += column.values * by_name[column.name]
+        return error
+
+    def compensate(self, outputs: Mapping[str, Array], channels: Channels) -> dict[str, Array]:
+        """Return the true rate along each recorded axis, axis -> (n,) deg/s, from outputs axis -> (n,) deg/s.
+
+        A direct law is subtracted (Ojeda eq. 13). A forward law is solved for the rate by fixed-point iteration, which
+        converges because a gyro's error changes far less than its rate. Raises NotConverged where it does not.
+        """
+        if self.model.argument == "output":
+            seen = channels.with_rates(outputs)
+            return {axis: outputs[axis] - self.error_dps(seen, axis) for axis in outputs}
+        rates = dict(outputs)
+        for _ in range(60):
+            seen = channels.with_rates(rates)
+            nearer = {axis: outputs[axis] - self.error_dps(seen, axis) for axis in outputs}
+            change = max(float(np.max(np.abs(nearer[axis] - rates[axis]), initial=0.0)) for axis in outputs)
+            rates = nearer
+            if change < 1e-12:
+                return rates
+        raise NotConverged(
+            f"model {self.model.name!r} could not be inverted: the last step still changed the rate by {change:.3g} deg/s; "
+            "its coefficients are not those of a gyro (check the fit's validity range and the output's scale)"
+        )
+
+    def exported(self) -> tuple[FittedModel, list[dict[str, str]]]:
+        """Return the part that belongs to the unit, and what was left out with its origin."""
+        kept = tuple(t for t in self.model.terms if effect(t.effect).origin in EXPORTED_ORIGINS)
+        left_out = [
+            {"effect": t.effect, "origin": effect(t.effect).origin, "term": effect(t.effect).term}
+            for t in self.model.terms
+            if effect(t.effect).origin not in EXPORTED_ORIGINS
+        ]
+        if not left_out:
+            return self, []
+        model = self.model.with_terms(kept)
+        return FittedModel(model, {axis: _only(fit, _names(model, axis)) for axis, fit in self.axes.items()}), left_out
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything needed to rebuild this model, as JSON."""
+        return {
+            "name": self.model.name,
+            "argument": self.model.argument,
+            "terms": [
+                {"effect": t.effect, "order": t.order, "parameters": dict(t.parameters)} for t in self.model.terms
+            ],
+            "temperature": self.model.temperature.to_dict(),
+            "reference": {"temperature_c": self.model.reference.temperature_c},
+            "axes": {
+                axis: {
+                    "names": list(fit.names),
+                    "units": list(fit.units),
+                    "values": fit.values.tolist(),
+                    "covariance": fit.covariance.tolist(),
+                }
+                for axis, fit in self.axes.items()
+            },
+        }
+
+    @staticmethod
+    def from_dict(record: Mapping[str, Any]) -> FittedModel:
+        """Return the model that `to_dict` described."""
+        model = ErrorModel(
+            record["name"],
+            tuple(Term(t["effect"], t["order"], dict(t["parameters"])) for t in record["terms"]),
+            record["argument"],
+            basis_from_dict(record["temperature"]),
+            Reference(record["reference"]["temperature_c"]),
+        )
+        axes = {
+            axis: AxisFit(
+                tuple(fit["names"]), tuple(fit["units"]), np.asarray(fit["values"]), np.asarray(fit["covariance"])
+            )
+            for axis, fit in record["axes"].items()
+        }
+        return FittedModel(model, axes)
+
+
+def _names(model: ErrorModel, axis: str) -> set[str]:
+    """Return the coefficient names that a model can have on an axis."""
+    one = np.zeros(1)
+    probe = Channels({}, {name: one for name in "xyz"})
+
+    class Everything(Channels):
+        """Every channel, as one zero."""
+
+        def __getitem__(self, name: str) -> NDArray[Any]:
+            return one
+
+        def temperature_c(self, axis: str) -> Array:
+            return one
+
+    return {column.name for column in model.columns(Everything(probe.columns, probe.rates), axis)}
+
+
+def _only(fit: AxisFit, names: set[str]) -> AxisFit:
+    kept = [index for index, name in enumerate(fit.names) if name in names]
+    m = fit.values.shape[1]
+    flat = np.concatenate([np.arange(index * m, (index + 1) * m) for index in kept]) if kept else np.zeros(0, dtype=int)
+    return AxisFit(
+        tuple(fit.names[i] for i in kept),
+        tuple(fit.units[i] for i in kept),
+        fit.values[kept],
+        fit.covariance[np.ix_(flat, flat)],
+    )
