@@ -1,1 +1,29 @@
-"""."""
+"""Numbers only: a recording in, a model out. No database, no HTTP, no clock."""
+
+from labctl.fitting.channels import Channels
+from labctl.fitting.context import Context, context_of
+from labctl.fitting.effects import CATALOGUE, describe_effects
+from labctl.fitting.figures import ErrorFigures, Spread, by_turning_axis, rms
+from labctl.fitting.fit import FitResult, coefficients_json, fit, residuals
+from labctl.fitting.model import ErrorModel, FittedModel
+from labctl.fitting.presets import PRESETS, describe_presets
+
+__all__ = [
+    "CATALOGUE",
+    "PRESETS",
+    "Channels",
+    "Context",
+    "ErrorFigures",
+    "ErrorModel",
+    "FitResult",
+    "FittedModel",
+    "Spread",
+    "by_turning_axis",
+    "coefficients_json",
+    "context_of",
+    "describe_effects",
+    "describe_presets",
+    "fit",
+    "residuals",
+    "rms",
+]

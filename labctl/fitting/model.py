@@ -34,10 +34,10 @@ class ErrorModel:
         """The ids of the effects, in order."""
         return [term.effect for term in self.terms]
 
-    def columns(self, channels: Channels, axis: str) -> list[Column]:
-        """Return every effect's regressors of one output axis, before temperature multiplies them."""
+    def columns(self, channels: Channels, axis: str) -> list[tuple[str, Column]]:
+        """Return (effect id, regressor) of one output axis, before temperature multiplies the regressors."""
         return [
-            column
+            (term.effect, column)
             for term in self.terms
             for column in effect(term.effect).columns(channels, axis, term, self.reference)
         ]
@@ -60,6 +60,7 @@ def expand(columns: Array, basis: Array) -> Array:
 class AxisFit:
     """The coefficients of one output axis: k names by m temperature functions."""
 
+    effects: tuple[str, ...]  #: the effect that each name belongs to
     names: tuple[str, ...]
     units: tuple[str, ...]
     values: NDArray[np.float64]  #: (k, m)
@@ -90,8 +91,8 @@ class FittedModel:
         basis = self.model.temperature.basis(channels.temperature_c(axis))
         at_temperature = fit.values @ basis.T  # (k, n)
         error = np.zeros(len(channels))
-        by_name = {name: row for name, row in zip(fit.names, at_temperature, strict=True)}
-        for column in self.model.columns(channels, axis):
+        by_name = dict(zip(fit.names, at_temperature, strict=True))
+        for _, column in self.model.columns(channels, axis):
             if column.name in by_name:
                 error += column.values * by_name[column.name]
         return error
@@ -114,8 +115,8 @@ class FittedModel:
             if change < 1e-12:
                 return rates
         raise NotConverged(
-            f"model {self.model.name!r} could not be inverted: the last step still changed the rate by {change:.3g} deg/s; "
-            "its coefficients are not those of a gyro (check the fit's validity range and the output's scale)"
+            f"model {self.model.name!r} could not be inverted: the last step still changed the rate by {change:.3g} "
+            "deg/s; its coefficients are not those of a gyro (check the fit's validity range and the output's scale)"
         )
 
     def exported(self) -> tuple[FittedModel, list[dict[str, str]]]:
@@ -129,7 +130,9 @@ class FittedModel:
         if not left_out:
             return self, []
         model = self.model.with_terms(kept)
-        return FittedModel(model, {axis: _only(fit, _names(model, axis)) for axis, fit in self.axes.items()}), left_out
+        return FittedModel(
+            model, {axis: _only(fit, set(model.effect_ids)) for axis, fit in self.axes.items()}
+        ), left_out
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything needed to rebuild this model, as JSON."""
@@ -143,6 +146,7 @@ class FittedModel:
             "reference": {"temperature_c": self.model.reference.temperature_c},
             "axes": {
                 axis: {
+                    "effects": list(fit.effects),
                     "names": list(fit.names),
                     "units": list(fit.units),
                     "values": fit.values.tolist(),
@@ -164,35 +168,23 @@ class FittedModel:
         )
         axes = {
             axis: AxisFit(
-                tuple(fit["names"]), tuple(fit["units"]), np.asarray(fit["values"]), np.asarray(fit["covariance"])
+                tuple(fit["effects"]),
+                tuple(fit["names"]),
+                tuple(fit["units"]),
+                np.asarray(fit["values"], dtype=np.float64),
+                np.asarray(fit["covariance"], dtype=np.float64),
             )
             for axis, fit in record["axes"].items()
         }
         return FittedModel(model, axes)
 
 
-def _names(model: ErrorModel, axis: str) -> set[str]:
-    """Return the coefficient names that a model can have on an axis."""
-    one = np.zeros(1)
-    probe = Channels({}, {name: one for name in "xyz"})
-
-    class Everything(Channels):
-        """Every channel, as one zero."""
-
-        def __getitem__(self, name: str) -> NDArray[Any]:
-            return one
-
-        def temperature_c(self, axis: str) -> Array:
-            return one
-
-    return {column.name for column in model.columns(Everything(probe.columns, probe.rates), axis)}
-
-
-def _only(fit: AxisFit, names: set[str]) -> AxisFit:
-    kept = [index for index, name in enumerate(fit.names) if name in names]
+def _only(fit: AxisFit, effects: set[str]) -> AxisFit:
+    kept = [index for index, owner in enumerate(fit.effects) if owner in effects]
     m = fit.values.shape[1]
     flat = np.concatenate([np.arange(index * m, (index + 1) * m) for index in kept]) if kept else np.zeros(0, dtype=int)
     return AxisFit(
+        tuple(fit.effects[i] for i in kept),
         tuple(fit.names[i] for i in kept),
         tuple(fit.units[i] for i in kept),
         fit.values[kept],

@@ -85,6 +85,10 @@ class Effect(ABC):
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the regressors of this effect for one output axis; none where it does not touch the axis."""
 
+    def least(self, term: Term) -> tuple[int, int]:  # noqa: ARG002  most effects need no more than a rate and a temperature
+        """Return how many different (rates, temperatures) tell this effect's coefficients apart."""
+        return 2, 1
+
     def order(self, term: Term) -> int:
         """Return the polynomial order that a term asks for, or this effect's own."""
         return term.order if term.order is not None else (self.default_order or 1)

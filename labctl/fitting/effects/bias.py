@@ -24,6 +24,9 @@ class Bias(Effect):
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
         return [Column("bias", "deg/s", np.ones(len(channels)))]
 
+    def least(self, term: Term) -> tuple[int, int]:  # noqa: ARG002
+        return 1, 1
+
 
 class BiasTemperature(Effect):
     """Bias temperature sensitivity."""
@@ -44,6 +47,9 @@ class BiasTemperature(Effect):
             Column(f"bias_t{k}", f"deg/s/K^{k}" if k > 1 else "deg/s/K", column)
             for k, column in powers(centred, range(1, self.order(term) + 1)).items()
         ]
+
+    def least(self, term: Term) -> tuple[int, int]:
+        return 1, self.order(term) + 1
 
 
 EFFECTS: tuple[type[Effect], ...] = (Bias, BiasTemperature)

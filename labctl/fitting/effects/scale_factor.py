@@ -45,6 +45,9 @@ class ScaleFactorTemperature(Effect):
             for k, column in powers(centred, range(1, self.order(term) + 1)).items()
         ]
 
+    def least(self, term: Term) -> tuple[int, int]:
+        return 2, self.order(term) + 1
+
 
 class ScaleFactorAsymmetry(Effect):
     """Scale factor asymmetry."""
@@ -73,6 +76,9 @@ class _Power(Effect):
             for k, column in found.items()
             if k % 2 == self.first % 2
         ]
+
+    def least(self, term: Term) -> tuple[int, int]:
+        return self.order(term) + 1, 1
 
 
 class ScaleFactorEven(_Power):

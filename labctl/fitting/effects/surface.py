@@ -40,5 +40,8 @@ class RateTemperatureSurface(Effect):
             for j in of_temperature
         ]
 
+    def least(self, term: Term) -> tuple[int, int]:
+        return self.order(term) + 1, TEMPERATURE_ORDER + 1
+
 
 EFFECTS: tuple[type[Effect], ...] = (RateTemperatureSurface,)

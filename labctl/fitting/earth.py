@@ -1,0 +1,45 @@
+"""The Earth turns the table too: a constant part along the table axis, and a part that goes round with the table."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from labctl.fitting.channels import Array, Channels
+from labctl.recording import RecordingInfo
+
+EARTH_RATE_DPS = 15.041067 / 3600.0  #: sidereal
+
+
+def up_rate_dps(info: RecordingInfo) -> float:
+    """Return the Earth's rate along the table axis, deg/s; 0 where the latitude is not known."""
+    if info.latitude_deg is None:
+        return 0.0
+    latitude = math.radians(info.latitude_deg)
+    tilt, azimuth = math.radians(info.tilt_deg or 0.0), math.radians(info.tilt_azimuth_deg or 0.0)
+    up = math.sin(latitude) * math.cos(tilt) + math.cos(latitude) * math.sin(tilt) * math.cos(azimuth)
+    return EARTH_RATE_DPS * up
+
+
+def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array:
+    """Return the once-per-turn Earth rate's regressors of an output axis, (n, k): a cosine and a sine per position.
+
+    Its size is known (the Earth's rate times the cosine of the latitude) but not where north lies from the table's
+    zero, so both are fitted and belong to the environment. An axis along the table axis has none. Needs the table angle
+    and the length of the data sets; k is 0 without them.
+    """
+    if info.latitude_deg is None or "table_angle_deg" not in channels or "duration_s" not in channels:
+        return np.zeros((len(channels), 0))
+    start = np.deg2rad(np.asarray(channels["table_angle_deg"], dtype=np.float64))
+    turned = np.deg2rad(np.asarray(channels["table_rate_dps"]) * np.asarray(channels["duration_s"]))
+    middle, half = start + turned / 2, turned / 2
+    shrink = np.sinc(half / np.pi)  # the mean of a cosine over what was turned
+    cosine, sine = np.cos(middle) * shrink, np.sin(middle) * shrink
+    position = np.asarray(channels["position"]).astype(np.str_)
+    found = []
+    for there in np.unique(position):
+        if there.lstrip("-") != axis:
+            here = position == there
+            found += [np.where(here, cosine, 0.0), np.where(here, sine, 0.0)]
+    return np.column_stack(found) if found else np.zeros((len(channels), 0))

@@ -1,0 +1,96 @@
+"""What data sets scatter by: white noise of a mean, drift between means, and a part that grows with rate.
+
+The drift is an Ornstein-Uhlenbeck process inside each powered run, independent between runs. It is not plugged in as
+one estimate: a grid of drifts is weighed by the restricted likelihood of the data, and the fit is averaged over it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+
+from labctl.fitting.channels import Array
+
+#: Drift time constants tried, in units of the median spacing of data sets; the first is white from set to set.
+TAU_SPACINGS = (0.25, 3.0, 12.0, 50.0, 200.0)
+#: Drift sizes tried, in units of the scatter that white noise does not explain.
+DRIFT_SIZES = (0.0, 0.35, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2)
+#: Prior width of the drift about half the data sheet's bias stability: a factor.
+PRIOR_FACTOR = 2.5
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """What is known of the noise of m data-set means before a drift is chosen.
+
+    `white_var` (m,) is the variance of each mean from white noise within the set; None when the readings behind the
+    means are unknown, and then only ratios are, and the overall size comes from the residuals.
+    """
+
+    t_s: Array
+    run: NDArray[np.int64]
+    rate_dps: Array
+    white_var: Array | None
+    datasheet_drift_dps: float | None = None
+
+
+@dataclass(frozen=True)
+class Drift:
+    """One point of the grid: size, time constant, and the part that grows with rate."""
+
+    drift_dps: float
+    tau_s: float
+    per_rate: float = 0.0  #: standard deviation per deg/s of table rate
+
+
+def whitener(scatter: Scatter, drift: Drift, white_var: Array) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+    """Return, for each run, its rows and the lower Cholesky factor of their covariance."""
+    blocks = []
+    variance = white_var + (drift.per_rate * scatter.rate_dps) ** 2
+    for run in np.unique(scatter.run):
+        rows = np.flatnonzero(scatter.run == run)
+        covariance = np.diag(variance[rows])
+        if drift.drift_dps > 0:
+            lag = np.abs(scatter.t_s[rows, None] - scatter.t_s[None, rows])
+            covariance = covariance + drift.drift_dps**2 * np.exp(-lag / drift.tau_s)
+        blocks.append((rows, cholesky(covariance, lower=True, check_finite=False)))
+    return blocks
+
+
+def whiten(blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: Array) -> Array:
+    """Return values (m,) or (m, k) with the blocks' correlation taken out."""
+    out = np.empty_like(values)
+    for rows, factor in blocks:
+        out[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
+    return out
+
+
+def log_determinant(blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]]) -> float:
+    """Return the log determinant of the covariance whose factors these are."""
+    return float(2 * sum(np.log(np.diag(factor)).sum() for _, factor in blocks))
+
+
+def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:
+    """Return the drifts to weigh, around the scatter that white noise leaves unexplained."""
+    spacing = float(np.median(np.diff(np.sort(scatter.t_s)))) if len(scatter.t_s) > 1 else 1.0
+    spacing = max(spacing, 1e-3)
+    points = [Drift(0.0, spacing, per_rate)]
+    points += [
+        Drift(size * unexplained_dps, ratio * spacing, per_rate)
+        for ratio in TAU_SPACINGS
+        for size in DRIFT_SIZES
+        if size > 0 and unexplained_dps > 0
+    ]
+    return points
+
+
+def log_prior(scatter: Scatter, drift: Drift) -> float:
+    """Return the log prior of a drift: log-normal about half the data sheet's figure where there is one, else flat."""
+    if scatter.datasheet_drift_dps is None:
+        return 0.0
+    expected = scatter.datasheet_drift_dps / 2
+    size = max(drift.drift_dps, 0.05 * expected)
+    return float(-0.5 * (np.log(size / expected) / np.log(PRIOR_FACTOR)) ** 2)
