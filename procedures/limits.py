@@ -9,6 +9,7 @@ from instruments.chamber import ChamberLimits
 from instruments.errors import InstrumentError
 from instruments.gyro import GyroLimits
 from instruments.table import TableLimits
+from procedures.bench import Bench
 from procedures.errors import PlanRefused
 from procedures.recipe import Recipe
 
@@ -23,6 +24,12 @@ class BenchLimits:
     chamber: ChamberLimits
     gyros: Mapping[str, GyroLimits]
     achievable_dps: Callable[[float], float] | None = None  #: the rate a table would really run (step quantisation)
+
+    @classmethod
+    def of(cls, bench: Bench) -> BenchLimits:
+        """Return the limits of an opened bench."""
+        units = {name: gyro.limits for name, gyro in bench.gyros.items()}
+        return cls(bench.table.limits, bench.chamber.limits, units, bench.table.achievable_dps)
 
     def rate_complaint(self, rate_dps: float, max_error_fraction: float) -> str | None:
         """Return why the table or a unit cannot do a rate, or None."""

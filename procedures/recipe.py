@@ -171,7 +171,7 @@ def parse_recipe(text: str, *, where: str = "recipe") -> Recipe:
 
 def _complaints(error: ValidationError) -> str:
     """Return everything that is wrong in one line; a list that is empty only because of its items is not said twice."""
-    found = [dict(each) for each in error.errors()]
+    found: list[dict[str, Any]] = [dict(each) for each in error.errors()]
     blamed = [each["loc"][:-1] for each in found]
     return "; ".join(_complaint(each) for each in found if not (each["type"] == "too_short" and each["loc"] in blamed))
 
@@ -182,7 +182,7 @@ def _complaint(error: dict[str, Any]) -> str:
     key = ".".join(location)
     if error["type"] == "extra_forbidden":
         near = difflib.get_close_matches(location[-1], _keys(location[:-1]), n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
         return f"unknown key {key!r}{hint}"
     if error["type"] == "missing":
         return f"{key!r} is missing"

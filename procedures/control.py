@@ -1,0 +1,51 @@
+"""How another thread asks a running campaign to pause, go on or end. The engine looks at it at least once a second."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a person wants of the campaign at present."""
+
+    pause: bool = False
+    abort: bool = False
+    reason: str = ""
+
+
+class Control:
+    """A wish that may be read and changed from any thread. Abort is final."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._wish = Wish()
+
+    @property
+    def wish(self) -> Wish:
+        """The present wish."""
+        return self._wish
+
+    def pause(self, reason: str = "asked by a person") -> None:
+        """Ask to hold after the data set that is being taken; the environment is still recorded."""
+        self._change(pause=True, reason=reason)
+
+    def resume(self, reason: str = "asked by a person") -> None:
+        """Ask to go on."""
+        self._change(pause=False, reason=reason)
+
+    def abort(self, reason: str = "asked by a person") -> None:
+        """Ask for the end, now and in the safe state."""
+        self._change(abort=True, reason=reason)
+
+    def _change(self, *, reason: str, pause: bool | None = None, abort: bool | None = None) -> None:
+        with self._lock:
+            if self._wish.abort:
+                return
+            wish = replace(self._wish, reason=reason)
+            if pause is not None:
+                wish = replace(wish, pause=pause)
+            if abort is not None:
+                wish = replace(wish, abort=abort)
+            self._wish = wish

@@ -1,0 +1,187 @@
+"""Runs a plan step by step, marks each in the journal, pauses, suspends, aborts, and always ends in the safe state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from instruments.clock import Clock
+from instruments.errors import InstrumentError
+from procedures.bench import Bench
+from procedures.control import Control
+from procedures.errors import Aborted, GuardTripped, ProcedureError, StepFailed
+from procedures.guard import Guards
+from procedures.handlers import HANDLERS, Figures, open_streams
+from procedures.journal import CampaignState, Event, Journal
+from procedures.limits import BenchLimits
+from procedures.logbook import Logbook, warning
+from procedures.operator import Operator
+from procedures.plan import Plan
+from procedures.progress import Board, Observer, Progress
+from procedures.safe import make_safe
+from procedures.stage import LOOK_S, Stage
+from procedures.steps import SafeState, Step, StepResult
+from procedures.watch import Watch
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a campaign ended, and why."""
+
+    state: CampaignState
+    reason: str
+    safe: bool  #: whether every part of the safe state was confirmed
+
+
+class Engine:
+    """One run of a plan on a bench.
+
+    `run` blocks until the campaign is over; `control` and `progress` are for other threads. Journal times are clock
+    seconds since `start_s` (default: the clock's time when `run` is called). Without `guards` the recipe's own rules
+    are held against the limits of the bench.
+    """
+
+    def __init__(  # noqa: PLR0917  the parts of a campaign, in the order in which they are thought of
+        self,
+        plan: Plan,
+        bench: Bench,
+        journal: Journal,
+        clock: Clock,
+        operator: Operator,
+        guards: Guards | None = None,
+        control: Control | None = None,
+        *,
+        observer: Observer | None = None,
+        start_s: float | None = None,
+    ) -> None:
+        self.plan = plan
+        self.control = control or Control()
+        self._board = Board(plan, clock, observer)
+        self._log = Logbook(journal, clock, self._board, clock.now_s() if start_s is None else start_s)
+        self._start_is_now = start_s is None
+        guards = guards or Guards(plan.recipe.guards, BenchLimits.of(bench), bench.chamber.name, bench.table.name)
+        watch = Watch(bench, guards, self._log)
+        self._stage = Stage(plan.recipe, bench, clock, operator, self.control, self._log, watch)
+        self._safe = False
+
+    @property
+    def progress(self) -> Progress:
+        """Where the campaign is; readable from any thread."""
+        return self._board.progress
+
+    def run(self, start_at: int = 0) -> Outcome:
+        """Run the plan from step `start_at` (from 0) to its end.
+
+        What the bench, a guard or a person ends is an Outcome. Anything else (a failing journal, Ctrl-C, a mistake in
+        the program) is raised again once the bench is safe.
+        """
+        if self._start_is_now:
+            self._log.start_s = self._stage.clock.now_s()
+        state, reason = CampaignState.FAILED, "ended by an error of the program"
+        try:
+            self._begin(start_at)
+            for index in range(start_at, len(self.plan.steps)):
+                self._run_step(index)
+            state, reason = CampaignState.DONE, "all steps done"
+        except Aborted as error:
+            state, reason = CampaignState.ABORTED, f"aborted: {error}"
+        except (InstrumentError, ProcedureError) as error:
+            reason = str(error)
+        except KeyboardInterrupt:
+            state, reason = CampaignState.ABORTED, "interrupted (Ctrl-C or a signal)"
+            raise
+        except BaseException as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise
+        finally:
+            outcome = self._end(state, reason)
+        return outcome
+
+    def _begin(self, start_at: int) -> None:
+        """Say that the campaign runs; in the middle of a plan, first make the bench what that step relies on."""
+        self._log.change_state(
+            CampaignState.RUNNING, "started" if start_at == 0 else f"taken up at step {start_at + 1}"
+        )
+        self._stage.watch.begin()
+        self._stage.look(glance=False)
+        if start_at == 0:
+            return
+        if run := self.plan.run_at(start_at):
+            open_streams(self._stage, run)
+        for step in self.plan.lead_in(start_at):
+            self._log.event(Event("lead_in", f"done again before step {start_at + 1}: {step.kind}"))
+            self._carry_out(step)
+
+    def _run_step(self, index: int) -> None:
+        """Run one step to its end, again after a suspension, and mark how it went."""
+        self._between_steps()
+        while True:
+            self._log.step_started(index)
+            try:
+                figures = self._carry_out(self.plan.steps[index])
+            except BaseException as error:
+                self._mark_unfinished(index, error)
+                if isinstance(error, GuardTripped) and error.action == "suspend":
+                    self._suspend(error)
+                    continue
+                raise
+            self._log.step_ended(index, StepResult(outcome="done", figures=figures))
+            return
+
+    def _carry_out(self, step: Step) -> Figures:
+        self._safe = False
+        figures = HANDLERS[step.kind](self._stage, step)
+        self._safe = isinstance(step, SafeState)
+        return figures
+
+    def _mark_unfinished(self, index: int, error: BaseException) -> None:
+        figures = error.figures if isinstance(error, StepFailed) else {}
+        stopped = isinstance(error, Aborted | KeyboardInterrupt | SystemExit) or (
+            isinstance(error, GuardTripped) and error.action == "suspend"
+        )
+        reason = str(error) or type(error).__name__
+        outcome = "interrupted" if stopped else "failed"
+        result = StepResult(outcome=outcome, reason=reason, figures=figures)
+        self._log.step_ended(index, result)
+
+    def _between_steps(self) -> None:
+        """Obey a wish to pause or abort; what a pause has cooled down is soaked again."""
+        self._stage.checkpoint()
+        soaked = self._stage.soaked
+        self._stage.hold()
+        if soaked is not None and self._stage.soaked is None:
+            self._log.event(warning("soak_again", f"the air left {soaked.temperature_c:g} deg C during the pause"))
+            self._carry_out(soaked)
+
+    def _suspend(self, trip: GuardTripped) -> None:
+        """Wait at rest until every limit has held for a while, then soak again.
+
+        Raises StepFailed when that takes too long.
+        """
+        stage, rules = self._stage, self.plan.recipe.guards
+        soaked = stage.soaked
+        stage.bench.table.stop()
+        self._log.change_state(CampaignState.PAUSED, f"suspended: {trip}")
+        began_s = clear_since_s = stage.clock.now_s()
+        while stage.clock.now_s() - clear_since_s < rules.release_s:
+            stage.pass_time(LOOK_S, pausing=False)
+            trips = stage.watch.look(LOOK_S)
+            if any(each.action == "fail" for each in trips):
+                raise StepFailed(f"while suspended: {trips[0].message}")
+            if any(each.action == "suspend" for each in trips):
+                clear_since_s = stage.clock.now_s()
+            if stage.clock.now_s() - began_s >= rules.suspend_timeout_s:
+                raise StepFailed(f"suspended for {rules.suspend_timeout_s:g} s without relief: {trip}")
+        self._log.change_state(CampaignState.RUNNING, "the limits hold again")
+        if soaked is not None:
+            self._carry_out(soaked)
+
+    def _end(self, state: CampaignState, reason: str) -> Outcome:
+        """Make the bench safe whatever happened, and say how the campaign ended."""
+        complaints = () if self._safe else make_safe(self._stage.bench, self._stage.clock)
+        if complaints:
+            text = "NOT confirmed safe: " + "; ".join(complaints)
+            reason = f"{reason}. {text}"
+            state = CampaignState.FAILED if state is CampaignState.DONE else state
+            self._log.event(Event("safe_state", text, level="error"))
+        self._log.change_state(state, reason)
+        return Outcome(state, reason, safe=not complaints)

@@ -1,0 +1,144 @@
+"""What a step works with: the bench, the watch and time that passes under control."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from instruments.clock import Clock
+from procedures.bench import Bench
+from procedures.control import Control
+from procedures.errors import Aborted, StepFailed
+from procedures.guard import Trip
+from procedures.journal import CampaignState, Event
+from procedures.logbook import Logbook
+from procedures.operator import Answer, Operator, Prompt
+from procedures.recipe import Recipe
+from procedures.steps import Soak
+from procedures.watch import Watch
+
+CHECK_S = 1.0  #: how long the clock runs at most between two looks at what a person wants
+#: From look to look. With a second of reading and a unit's reply in between, rows of the environment are never more
+#: than 10 s apart, which is what effects with a memory need.
+LOOK_S = 8.5
+
+
+@dataclass
+class Stage:
+    """Everything a step handler may touch."""
+
+    recipe: Recipe
+    bench: Bench
+    clock: Clock
+    operator: Operator
+    control: Control
+    log: Logbook
+    watch: Watch
+    paused_s: float = 0.0  #: how long the campaign was paused so far
+    soaked: Soak | None = None  #: the soak that still holds: its temperature has not been left since
+    _questions: int = field(default=0, repr=False)
+
+    def checkpoint(self) -> None:
+        """Obey a wish to abort. Raises Aborted."""
+        wish = self.control.wish
+        if wish.abort:
+            raise Aborted(wish.reason)
+
+    def pass_time(self, duration_s: float, *, pausing: bool = True) -> None:
+        """Let the clock run, looking at least once a second at what a person wants. Raises Aborted."""
+        until_s = self.clock.now_s() + duration_s
+        self.checkpoint()
+        while (left_s := until_s - self.clock.now_s()) > 0:
+            self.clock.sleep(min(CHECK_S, left_s))
+            self.checkpoint()
+            if pausing and self.control.wish.pause:
+                self.hold()
+
+    def looks(self, *, pausing: bool = True) -> Iterator[None]:
+        """Look at the bench now and then every few seconds until the caller has seen enough.
+
+        Raises Aborted, GuardTripped, InstrumentError.
+        """
+        while True:
+            self.look()
+            yield
+            self.pass_time(LOOK_S, pausing=pausing)
+
+    def watch_for(self, duration_s: float) -> None:
+        """Let time pass with the environment recorded."""
+        until_s = self.clock.now_s() + duration_s
+        self.look()
+        while (left_s := until_s - self.clock.now_s()) > 0:
+            self.pass_time(min(LOOK_S, left_s))
+            self.look()
+
+    def look(self, *, glance: bool = True) -> None:
+        """Look at the bench once. Raises GuardTripped for a limit that does more than warn, and InstrumentError."""
+        heed(self.watch.look(LOOK_S, glance=glance))
+
+    def hold(self) -> None:
+        """Stay as things are while a person wants a pause; the environment is recorded and guards stay armed."""
+        if not self.control.wish.pause:
+            return
+        before, began_s = self.log.state, self.clock.now_s()
+        self.log.change_state(CampaignState.PAUSED, self.control.wish.reason)
+        next_look_s = began_s
+        with self.watch.telling(self._notice_leaving):
+            while self.control.wish.pause:
+                if self.clock.now_s() >= next_look_s:
+                    self.look()
+                    next_look_s = self.clock.now_s() + LOOK_S
+                self.clock.sleep(CHECK_S)
+                self.checkpoint()
+        self.paused_s += self.clock.now_s() - began_s
+        self.log.change_state(before, self.control.wish.reason)
+
+    def _notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
+        """Forget that a temperature was taken once the air has left its band."""
+        if self.soaked and abs(chamber_c - self.soaked.temperature_c) > self.soaked.band_c:
+            self.soaked = None
+
+    def ask(self, kind: str, prompt: Prompt) -> Answer:
+        """Ask a person and wait for the answer, with the environment recorded.
+
+        Raises StepFailed when the answer is no or does not come in time, and what `looks` raises.
+        """
+        self.operator.ask(prompt)
+        answer = self.operator.answer(prompt.id)
+        if answer is None:
+            answer = self._wait_for(prompt)
+        if not answer.confirmed:
+            raise StepFailed(f"{answer.by} declined: {prompt.text}: {answer.reason}")
+        self.log.event(Event(f"operator.{kind}", f"{prompt.text}: confirmed by {answer.by}"))
+        return answer
+
+    def _wait_for(self, prompt: Prompt) -> Answer:
+        timeout_s = self.recipe.on_failure.operator_timeout_s
+        began_s = next_look_s = self.clock.now_s()
+        self.log.board.update(prompt=prompt)
+        self.log.change_state(CampaignState.WAITING, prompt.text)
+        try:
+            while (answer := self.operator.answer(prompt.id)) is None:
+                if timeout_s is not None and self.clock.now_s() - began_s >= timeout_s:
+                    raise StepFailed(f"nobody answered within {timeout_s:g} s: {prompt.text}")
+                if self.clock.now_s() >= next_look_s:
+                    self.look()
+                    next_look_s = self.clock.now_s() + LOOK_S
+                self.pass_time(CHECK_S, pausing=False)
+        finally:
+            self.operator.withdraw(prompt.id)
+            self.log.board.update(prompt=None)
+        self.log.change_state(CampaignState.RUNNING, f"answered by {answer.by}")
+        return answer
+
+    def new_prompt_id(self) -> str:
+        """Return an id for a question that no other question of this or an earlier process has had."""
+        self._questions += 1
+        return f"{self.clock.utc():%Y%m%dT%H%M%S.%f}-{self._questions}"
+
+
+def heed(trips: list[Trip]) -> None:
+    """Raise GuardTripped for the first limit that does more than warn; one that fails goes before one that suspends."""
+    serious = [trip for trip in trips if trip.action != "warn"]
+    if serious:
+        raise min(serious, key=lambda trip: trip.action != "fail").error()
