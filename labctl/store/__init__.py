@@ -1,1 +1,88 @@
-"""."""
+"""The only room that knows SQL: open a Store, and ask its shelves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from labctl.store.audit import first_broken
+from labctl.store.calibrations import Calibrations, NewCalibration
+from labctl.store.campaigns import Campaigns, NewCampaign
+from labctl.store.database import Database, Holder, holder_of
+from labctl.store.journal import StoreJournal
+from labctl.store.recordings import Recordings
+from labctl.store.records import (
+    CalibrationRecord,
+    CampaignRow,
+    CertificationRow,
+    EventRow,
+    NewUnit,
+    RecordingRow,
+    StepRow,
+    Unit,
+)
+from labctl.store.units import Units
+
+__all__ = [
+    "CalibrationRecord",
+    "Calibrations",
+    "CampaignRow",
+    "Campaigns",
+    "CertificationRow",
+    "EventRow",
+    "Holder",
+    "NewCalibration",
+    "NewCampaign",
+    "NewUnit",
+    "RecordingRow",
+    "Recordings",
+    "StepRow",
+    "Store",
+    "StoreJournal",
+    "Unit",
+    "Units",
+    "holder_of",
+    "open_store",
+]
+
+
+class Store:
+    """A database and its shelves."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self.units = Units(database)
+        self.recordings = Recordings(database)
+        self.campaigns = Campaigns(database)
+        self.calibrations = Calibrations(database)
+
+    @property
+    def location(self) -> str:
+        """Where the database is."""
+        return self._database.location
+
+    def announce(self, url: str) -> None:
+        """Say at which address the holder of this database can be asked to write."""
+        self._database.announce(url)
+
+    def first_broken_audit_row(self) -> int | None:
+        """Return the first audit row that was changed or follows a missing one; None when the trail is whole."""
+        with self._database.reading() as connection:
+            return first_broken(connection)
+
+    def close(self) -> None:
+        """Close the database."""
+        self._database.close()
+
+
+@contextmanager
+def open_store(location: str, *, write: bool, url: str | None = None) -> Iterator[Store]:
+    """Open a database by path or URL, made and migrated on first use; `write` holds it for this process.
+
+    Raises Conflict when another process holds it, StoreError when it is newer than the code or damaged.
+    """
+    store = Store(Database(location, write=write, url=url))
+    try:
+        yield store
+    finally:
+        store.close()

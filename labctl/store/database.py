@@ -1,0 +1,182 @@
+"""One database, one writer. SQLite in a file by default; the same statements run on PostgreSQL.
+
+SQLite before 3.51.3 can damage a write-ahead log when two connections write at once, so exactly one connection of one
+process writes: a lock beside the file holds everybody to it, and a note beside the lock says who it is.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+from filelock import FileLock, Timeout
+from sqlalchemy.exc import DatabaseError
+from sqlalchemy.pool import StaticPool
+
+from labctl.errors import Conflict, StoreError
+from labctl.store import migrations
+
+BUSY_MS = 5000
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Who writes to a database now."""
+
+    pid: int
+    url: str | None  #: of the service, where the holder is one
+
+
+def is_url(location: str) -> bool:
+    """Return whether a database is named by URL; otherwise it is the path of an SQLite file."""
+    return "://" in location
+
+
+def holder_of(location: str) -> Holder | None:
+    """Return who holds a database file for writing; None when nobody does."""
+    if is_url(location):
+        return None
+    lock = FileLock(_lock_path(location))
+    try:
+        with lock.acquire(timeout=0):
+            return None
+    except Timeout:
+        return _read_note(location)
+
+
+def _lock_path(location: str) -> str:
+    return f"{location}.lock"
+
+
+def _note_path(location: str) -> Path:
+    return Path(f"{location}.holder")
+
+
+def _read_note(location: str) -> Holder:
+    try:
+        note = json.loads(_note_path(location).read_text(encoding="utf-8"))
+        return Holder(int(note["pid"]), note["url"])
+    except (OSError, ValueError, KeyError):
+        return Holder(0, None)
+
+
+class Database:
+    """A migrated database. `write` holds it for this process; without, only `reading` may be used."""
+
+    def __init__(self, location: str, *, write: bool, url: str | None = None) -> None:
+        self.location = location
+        self._guard = threading.RLock()
+        self._lock: FileLock | None = None
+        self._sqlite = not is_url(location)
+        if self._sqlite:
+            Path(location).parent.mkdir(parents=True, exist_ok=True)
+        if write:
+            self._hold(url)
+        elif self._sqlite and not Path(location).exists():
+            Database(location, write=True).close()
+        try:
+            self._engine = self._make_engine(write=write)
+            self._migrate(write=write)
+        except BaseException:
+            self._release()
+            raise
+
+    def _hold(self, url: str | None) -> None:
+        if not self._sqlite:
+            return
+        self._lock = FileLock(_lock_path(self.location))
+        try:
+            self._lock.acquire(timeout=0)
+        except Timeout:
+            self._lock = None
+            holder = _read_note(self.location)
+            where = f"the service at {holder.url}" if holder.url else f"another labctl (process {holder.pid})"
+            raise Conflict(f"{self.location}: {where} writes to this database now; wait for it, or ask it") from None
+        self.announce(url)
+
+    def announce(self, url: str | None) -> None:
+        """Say at which address this process can be asked to write."""
+        if self._lock is not None:
+            _note_path(self.location).write_text(json.dumps({"pid": os.getpid(), "url": url}), encoding="utf-8")
+
+    def _make_engine(self, *, write: bool) -> sa.Engine:
+        if not self._sqlite:
+            return sa.create_engine(self.location)
+        options: dict[str, Any] = {"poolclass": StaticPool} if write else {}
+        engine = sa.create_engine(
+            f"sqlite:///{self.location}",
+            connect_args={"check_same_thread": False, "timeout": BUSY_MS / 1000},
+            **options,
+        )
+
+        @sa.event.listens_for(engine, "connect")
+        def prepare(connection: Any, _: Any) -> None:
+            connection.isolation_level = None  # transactions are begun below, never by the driver's guess
+            for pragma in (
+                f"busy_timeout={BUSY_MS}",
+                "foreign_keys=ON",
+                *(("journal_mode=WAL", "synchronous=FULL") if write else ("query_only=ON",)),
+            ):
+                connection.execute(f"PRAGMA {pragma}")
+
+        @sa.event.listens_for(engine, "begin")
+        def begin(connection: sa.Connection) -> None:
+            connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN")
+
+        return engine
+
+    def _migrate(self, *, write: bool) -> None:
+        try:
+            with self._engine.connect() as connection:
+                found = migrations.revision_of(connection)
+            if found == migrations.HEAD:
+                return
+            migrations.refuse_unknown(found, self.location)
+            if not write:
+                Database(self.location, write=True).close()
+                return
+            with self._engine.begin() as connection:
+                migrations.upgrade(connection)
+        except DatabaseError as error:
+            raise StoreError(
+                f"{self.location}: not a labctl database, or damaged ({error.orig}); "
+                "restore a backup, or name another file with --database"
+            ) from error
+
+    @contextmanager
+    def writing(self) -> Iterator[sa.Connection]:
+        """Give the one writing connection inside a transaction: all of it is kept, or nothing."""
+        with self._guard:
+            try:
+                with self._engine.begin() as connection:
+                    yield connection
+            except sa.exc.OperationalError as error:
+                raise StoreError(f"{self.location}: {error.orig}; nothing of this act was kept") from error
+
+    @contextmanager
+    def reading(self) -> Iterator[sa.Connection]:
+        """Give a connection to read with."""
+        with self._guard:
+            try:
+                with self._engine.connect() as connection:
+                    yield connection
+            except sa.exc.DatabaseError as error:
+                raise StoreError(f"{self.location}: {error.orig}") from error
+
+    def close(self) -> None:
+        """Close the database and let the next writer in."""
+        self._engine.dispose()
+        self._release()
+
+    def _release(self) -> None:
+        if self._lock is not None:
+            _note_path(self.location).unlink(missing_ok=True)
+            self._lock.release()
+            self._lock = None

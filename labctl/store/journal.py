@@ -1,0 +1,209 @@
+"""The engine's journal in the database: every call is durable before it returns."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+import sqlalchemy as sa
+from numpy.typing import NDArray
+
+from instruments.gyro import Readings
+from labctl.store import blocks, tables
+from labctl.store.database import Database
+from labctl.store.means import means_rows
+from labctl.store.recordings import block_row, scaled
+from procedures.journal import CampaignState, DataSetHeader, DataSetState, EnvironmentSample, Event
+from procedures.steps import StepResult
+
+ENDED = frozenset({CampaignState.DONE, CampaignState.ABORTED, CampaignState.FAILED})
+
+
+class StoreJournal:
+    """Writes one campaign down. Sample blocks hold whole numbers, as the device sent them."""
+
+    def __init__(self, database: Database, campaign: int) -> None:
+        self._database = database
+        self._campaign = campaign
+        r = tables.recordings.c
+        with database.reading() as connection:
+            rows = connection.execute(sa.select(r.gyro, r.id, r.channels).where(r.campaign_id == campaign)).all()
+            kinds = connection.execute(
+                sa.select(tables.steps.c.number, tables.steps.c.kind).where(tables.steps.c.campaign_id == campaign)
+            ).all()
+        self._recordings = {gyro: recording for gyro, recording, _ in rows}
+        self._channels = {gyro: channels for gyro, _, channels in rows}
+        self._kinds: dict[int, str] = {row[0]: row[1] for row in kinds}
+        self._power_on_s: float | None = None
+        self._seq: dict[tuple[int, str], int] = {}
+        self._open: dict[int, DataSetHeader] = {}
+
+    def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:
+        """Record a change of state and why, as the campaign's state and as an event."""
+        values: dict[str, Any] = {"state": state.value, "reason": reason}
+        if state is CampaignState.RUNNING:
+            values["started_at"] = sa.func.coalesce(
+                tables.campaigns.c.started_at, sa.bindparam("at", at, tables.Instant)
+            )
+        if state in ENDED:
+            values["ended_at"] = at
+        level = "error" if state is CampaignState.FAILED else "info"
+        message = f"campaign {state.value}" + (f": {reason}" if reason else "")
+        with self._database.writing() as connection:
+            connection.execute(
+                sa.update(tables.campaigns).where(tables.campaigns.c.id == self._campaign).values(**values)
+            )
+            self._add_event(connection, Event("state", message, level), t_s, at)
+
+    def step_started(self, index: int, t_s: float, at: datetime) -> None:
+        """Record that a step begins."""
+        if self._kinds.get(index) == "power_on":
+            self._power_on_s = t_s
+        self._mark(index, state="running", started_s=t_s, started_at=at)
+
+    def step_ended(self, index: int, result: StepResult, t_s: float, at: datetime) -> None:
+        """Record how a step ended."""
+        self._mark(index, state=result.outcome, ended_s=t_s, ended_at=at, result=result.model_dump(mode="json"))
+
+    def _mark(self, index: int, **values: Any) -> None:
+        s = tables.steps
+        with self._database.writing() as connection:
+            connection.execute(
+                sa.update(s).where(s.c.campaign_id == self._campaign, s.c.number == index).values(**values)
+            )
+
+    def dataset_opened(self, header: DataSetHeader) -> int:
+        """Record a data set of every unit before its first reading; returns its number."""
+        s, d = header.step, tables.data_sets
+        with self._database.writing() as connection:
+            last = connection.scalar(
+                sa.select(sa.func.max(d.c.number)).where(d.c.recording_id.in_(self._recordings.values()))
+            )
+            number = int(last or 0) + 1
+            connection.execute(
+                sa.insert(d),
+                [
+                    {
+                        "recording_id": recording,
+                        "number": number,
+                        "state": DataSetState.OPEN.value,
+                        "reason": "",
+                        "position": s.position,
+                        "run": s.run,
+                        "mounting": s.mounting,
+                        "table_rate_dps": header.rate_dps,
+                        "asked_dps": header.asked_dps,
+                        "table_angle_deg": header.angle_from_deg,
+                        "chamber_setpoint_c": header.setpoint_c,
+                        "gate_from_s": header.gate_from_s,
+                        "gate_until_s": header.gate_until_s,
+                        "power_on_s": self._power_on_s,
+                        "n": 0,
+                    }
+                    for recording in self._recordings.values()
+                ],
+            )
+        self._open[number] = header
+        return number
+
+    def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
+        """Record one block of one unit; times are campaign time."""
+        if not len(readings) and not readings.lost and not readings.damaged:
+            return
+        recording = self._recordings[gyro]
+        seq = self._seq.get((dataset, gyro), 0)
+        d = tables.data_sets
+        with self._database.writing() as connection:
+            if len(readings):
+                block = blocks.pack(_columns(readings, chamber_c))
+                connection.execute(sa.insert(tables.sample_blocks).values(**block_row(recording, dataset, seq, block)))
+                self._seq[dataset, gyro] = seq + 1
+            if readings.lost or readings.damaged:
+                connection.execute(
+                    sa.update(d)
+                    .where(d.c.recording_id == recording, d.c.number == dataset)
+                    .values(lost=d.c.lost + readings.lost, damaged=d.c.damaged + readings.damaged)
+                )
+
+    def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
+        """Record that no more readings follow: figures are derived and blocks packed into one, in one transaction."""
+        with self._database.writing() as connection:
+            for gyro, recording in self._recordings.items():
+                self._close_one(connection, gyro, recording, dataset, state, reason)
+        self._open.pop(dataset, None)
+
+    def _close_one(
+        self, connection: sa.Connection, gyro: str, recording: int, dataset: int, state: DataSetState, reason: str
+    ) -> None:
+        d, b = tables.data_sets, tables.sample_blocks
+        mine = (b.c.recording_id == recording, b.c.number == dataset)
+        rows = connection.execute(sa.select(b.c.n, b.c.codec, b.c.crc32, b.c.data).where(*mine).order_by(b.c.seq)).all()
+        parts = [blocks.unpack(blocks.Block(*row)) for row in rows]
+        n = 0
+        if parts:
+            raw = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+            valid = raw["valid"] != 0
+            n = int(valid.sum())
+            head = connection.execute(
+                sa.select(d).where(d.c.recording_id == recording, d.c.number == dataset)
+            ).mappings().one()  # fmt: skip
+            means = means_rows(recording, dataset, scaled(raw, self._channels[gyro], dict(head)), valid)
+            connection.execute(sa.insert(tables.data_set_means), means)
+            connection.execute(sa.delete(b).where(*mine))
+            packed = block_row(recording, dataset, 0, blocks.pack(raw, blocks.FINAL))
+            connection.execute(sa.insert(b).values(**packed))
+        connection.execute(
+            sa.update(d)
+            .where(d.c.recording_id == recording, d.c.number == dataset)
+            .values(state=state.value, reason=reason, n=n)
+        )
+
+    def environment(self, sample: EnvironmentSample) -> None:
+        """Record the environment, once for each unit."""
+        with self._database.writing() as connection:
+            connection.execute(
+                sa.insert(tables.environment),
+                [
+                    {
+                        "recording_id": recording,
+                        "t_s": sample.t_s,
+                        "run": sample.run,
+                        "temperature_c": sample.gyro_c[gyro],
+                        "chamber_c": sample.chamber_c,
+                        "chamber_setpoint_c": sample.chamber_setpoint_c,
+                    }
+                    for gyro, recording in self._recordings.items()
+                    if gyro in sample.gyro_c
+                ],
+            )
+
+    def event(self, event: Event, t_s: float, at: datetime) -> None:
+        """Record something worth telling a person."""
+        with self._database.writing() as connection:
+            self._add_event(connection, event, t_s, at)
+
+    def _add_event(self, connection: sa.Connection, event: Event, t_s: float, at: datetime) -> None:
+        connection.execute(
+            sa.insert(tables.events).values(
+                campaign_id=self._campaign,
+                at=at,
+                t_s=t_s,
+                kind=event.kind,
+                level=event.level,
+                message=event.message,
+                device=event.device,
+                value=event.value,
+                limit_value=event.limit,
+                unit=event.unit,
+            )
+        )
+
+
+def _columns(readings: Readings, chamber_c: float) -> dict[str, NDArray[Any]]:
+    return {
+        "t_ns": np.rint(readings.t_s * 1e9).astype(np.int64),
+        **readings.raw,
+        "valid": readings.valid.astype(np.int64),
+        "chamber_mc": np.full(len(readings), round(chamber_c * 1e3), dtype=np.int64),
+    }

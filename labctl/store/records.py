@@ -1,0 +1,120 @@
+"""What the store hands out: plain frozen records, no SQL inside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A gyro, by serial number."""
+
+    serial: str
+    model: str
+    technology: str | None
+    first_seen_at: datetime
+
+
+@dataclass(frozen=True)
+class NewUnit:
+    """A unit that a campaign is about to measure: how it is called on the bench, and what its recording will say."""
+
+    gyro: str
+    info: Mapping[str, Any]  #: RecordingInfo as JSON
+    channels: tuple[Mapping[str, Any], ...]  #: name, unit, scale, offset of each raw channel
+
+
+@dataclass(frozen=True)
+class RecordingRow:
+    """One recording, without its readings."""
+
+    id: int
+    serial: str
+    campaign: int | None
+    gyro: str | None
+    kind: str
+    info: Mapping[str, Any]
+    created_at: datetime
+    datasets: int
+    readings: int
+
+
+@dataclass(frozen=True)
+class CampaignRow:
+    """One campaign: what was planned and where it is."""
+
+    id: int
+    recipe_name: str
+    recipe: Mapping[str, Any]
+    bench_name: str
+    bench: Mapping[str, Any]
+    schedule_hash: str
+    expected_s: float
+    state: str
+    reason: str
+    created_at: datetime
+    started_at: datetime | None
+    ended_at: datetime | None
+    recordings: Mapping[str, int] = field(default_factory=dict)  #: serial -> recording
+
+
+@dataclass(frozen=True)
+class StepRow:
+    """One step of a campaign's plan."""
+
+    number: int
+    kind: str
+    body: Mapping[str, Any]
+    expected_s: float
+    state: str
+    started_s: float | None
+    ended_s: float | None
+    result: Mapping[str, Any] | None
+
+
+@dataclass(frozen=True)
+class EventRow:
+    """Something that happened in a campaign."""
+
+    id: int
+    campaign: int
+    at: datetime
+    t_s: float
+    kind: str
+    level: str
+    message: str
+    device: str | None
+    value: float | None
+    limit: float | None
+    unit: str | None
+
+
+@dataclass(frozen=True)
+class CalibrationRecord:
+    """One calibration version with the bytes that are served."""
+
+    serial: str
+    version: int
+    parent: int | None
+    recording: int | None
+    model: str
+    created_at: datetime
+    hash: str
+    document: bytes
+    answer: Mapping[str, Any]  #: what `labctl fit --json` said
+
+
+@dataclass(frozen=True)
+class CertificationRow:
+    """One act of certifying or revoking."""
+
+    serial: str
+    version: int
+    act: str
+    by: str
+    reason: str
+    at: datetime
+    due_at: datetime | None

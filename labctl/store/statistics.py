@@ -1,0 +1,46 @@
+"""What a data set's readings come to: mean, standard deviation, white level, number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: The median of an exponential distribution, over its mean: a periodogram's lines do not move its median.
+_MEDIAN_TO_MEAN = float(np.log(2.0))
+#: Too few readings for a spectrum.
+LEAST_FOR_SPECTRUM = 32
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Figures of one channel in one data set, in the channel's unit."""
+
+    mean: float | None
+    std: float | None
+    white_std: float | None
+    n: int
+
+
+def statistics(values: NDArray[np.float64]) -> Statistics:
+    """Return the figures of valid readings (n,)."""
+    n = len(values)
+    if n == 0:
+        return Statistics(None, None, None, 0)
+    return Statistics(
+        float(values.mean()),
+        float(values.std(ddof=1)) if n > 1 else None,
+        white_std(values) if n >= LEAST_FOR_SPECTRUM else None,
+        n,
+    )
+
+
+def white_std(values: NDArray[np.float64]) -> float:
+    """Return the standard deviation of the white part of readings (n,), n >= 32, from their periodogram's median.
+
+    Lines from the table's steps make a reading scatter, but average out over a data set; they fill few frequencies, so
+    the median does not see them. Neither does it see drift, which fills only the lowest.
+    """
+    spectrum = np.abs(np.fft.rfft(values - values.mean())[1:-1]) ** 2 / len(values)
+    return float(np.sqrt(np.median(spectrum) / _MEDIAN_TO_MEAN))
