@@ -40,7 +40,7 @@ class Engine:
     are held against the limits of the bench.
     """
 
-    def __init__(  # noqa: PLR0917  the parts of a campaign, in the order in which they are thought of
+    def __init__(
         self,
         plan: Plan,
         bench: Bench,

@@ -16,6 +16,8 @@ from procedures.situation import Situation, Tally, gyro_temperature_c
 
 Listener = Callable[[float, float, Mapping[str, float]], None]  #: campaign time, air and unit temperatures
 
+WHILE_READING = {"chamber_deviation", "damaged_readings", "invalid_readings", "rate"}  #: armed only during a data set
+
 
 class Watch:
     """The eyes of a campaign.
@@ -85,6 +87,7 @@ class Watch:
             yield
         finally:
             self._taking_readings, self._spin, self._tallies = False, None, {}
+            self._tripped = {each for each in self._tripped if each[0] not in WHILE_READING}  # disarmed, not released
             self._log.board.update(rate_dps=0.0)
 
     def heard(self, gyro: str, temperature_c: float | None) -> None:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from procedures.journal import CampaignState
+from procedures.limits import BenchLimits
 from procedures.operator import PersonOperator
+from procedures.plan import make_plan
 
 
 def test_a_campaign_runs_through_and_every_step_is_marked_once(rig: Any) -> None:
@@ -64,17 +66,14 @@ def test_the_gate_lies_on_step_edges_and_the_recorded_rate_is_the_one_really_run
     steps = gate_s * header.rate_dps / 0.225
     assert steps == pytest.approx(round(steps), abs=1e-6)
     assert gate_s >= 10
-    assert (header.angle_from_deg - 7.0) / 0.225 == pytest.approx(round((header.angle_from_deg - 7.0) / 0.225), abs=1e-6)
+    assert (header.angle_from_deg - 7.0) / 0.225 == pytest.approx(
+        round((header.angle_from_deg - 7.0) / 0.225), abs=1e-6
+    )
 
 
 def test_whole_turns_are_whole_at_the_rate_that_is_really_run(rig: Any) -> None:
     acquire = {"duration_s": 10.0, "settle_s": 2.0, "whole_turns_above_dps": 15.0}
-    rig.limits = None
-    recipe = rig.recipe(acquire=acquire)
-    from procedures.limits import BenchLimits
-    from procedures.plan import make_plan
-
-    plan = make_plan(recipe, BenchLimits.of(rig))
+    plan = make_plan(rig.recipe(acquire=acquire), BenchLimits.of(rig))
     step = next(step for step in plan.steps if step.kind == "acquire" and step.rate_dps == 20)
     assert step.duration_s * 20 * (1 + 1e-5) == pytest.approx(360, rel=1e-12)
 
@@ -132,7 +131,7 @@ def test_a_pause_holds_between_data_sets_and_keeps_the_environment(rig: Any) -> 
     states = [state for state, _ in rig.journal.states]
     assert states == ["running", "paused", "running", "done"]
     assert rig.journal.closed[0][1] == "complete"  # the data set that was being taken was finished first
-    start_s = rig.engine.plan and began[0] - 1000.25
+    start_s = began[0] - 1000.25
     during = [sample for sample in rig.journal.samples if start_s <= sample.t_s <= start_s + 300]
     assert len(during) >= 30
     assert "soak_again" not in rig.journal.kinds()
@@ -141,7 +140,7 @@ def test_a_pause_holds_between_data_sets_and_keeps_the_environment(rig: Any) -> 
 def test_what_a_pause_lets_cool_down_is_soaked_again(rig: Any) -> None:
     paused: list[float] = []
     rig.chamber.disturbance_c = lambda t_s: -1.0 if paused and paused[0] + 60 < t_s < paused[0] + 120 else 0.0
-    rig.when_step("acquire", lambda: rig.control.pause())
+    rig.when_step("acquire", rig.control.pause)
 
     def hook(what: str, detail: Any) -> None:
         if what == "state" and detail == CampaignState.PAUSED:
@@ -157,7 +156,7 @@ def test_what_a_pause_lets_cool_down_is_soaked_again(rig: Any) -> None:
 
 
 def test_a_pause_during_a_soak_does_not_eat_its_time_out(rig: Any) -> None:
-    rig.when_step("soak", lambda: rig.control.pause())
+    rig.when_step("soak", rig.control.pause)
     until_s = [0.0]
 
     def hook(what: str, detail: Any) -> None:
@@ -178,7 +177,7 @@ def test_a_question_waits_for_its_answer_and_is_seen_from_outside(rig: Any) -> N
         prompt = rig.operator.pending
         if prompt and progress.prompt == prompt and prompt.id not in seen and progress.state == "waiting":
             seen.append(prompt.id)
-        if prompt and seen and rig.clock.now_s() % 60 > 50:
+        if prompt and prompt.id in seen and rig.clock.now_s() % 60 > 50:
             rig.operator.confirm(prompt.id, by="Ada")
 
     outcome = rig.run(observer=answer_after_a_minute)

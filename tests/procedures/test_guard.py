@@ -1,0 +1,155 @@
+"""Guards: what trips them, what they say, and what a trip does to a campaign."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from procedures.guard import CHECKS, Guards
+from procedures.journal import CampaignState
+from procedures.limits import BenchLimits
+from procedures.recipe import GuardRules
+from procedures.situation import Situation, Tally
+
+WELL = Situation(
+    t_s=100.0,
+    chamber_c=20.0,
+    setpoint_c=20.0,
+    gyro_c={"imu": 22.0},
+    silent_s={"imu": 1.0, "chamber": 9.0},
+    taking_readings=True,
+    asked_dps=100.0,
+    rate_dps=100.001,
+    tallies={"imu": Tally(expected=1000, valid=990, invalid=5, damaged=5)},
+)
+
+TRIPS = [
+    ("chamber_limits", {"chamber_c": 152.5, "setpoint_c": 152.5}, "chamber", 152.5, 152.0, "deg C"),
+    ("unit_air", {"chamber_c": -42.5, "setpoint_c": -42.5}, "chamber", -42.5, -42.0, "deg C"),
+    ("unit_temperature", {"gyro_c": {"imu": 100.5}}, "imu", 100.5, 100.0, "deg C"),
+    ("chamber_deviation", {"chamber_c": 17.5}, "chamber", 2.5, 2.0, "deg C"),
+    ("chamber_alarm", {"alarms": ("over-temperature",)}, "chamber", 1.0, 0.0, ""),
+    ("stale", {"silent_s": {"imu": 31.0}}, "imu", 31.0, 30.0, "s"),
+    ("damaged_readings", {"tallies": {"imu": Tally(1000, damaged=30)}}, "imu", 3.0, 2.0, "%"),
+    ("invalid_readings", {"tallies": {"imu": Tally(1000, invalid=600)}}, "imu", 60.0, 50.0, "%"),
+    ("rate", {"rate_dps": 98.5}, "table", 1.5, 1.0, "deg/s"),
+]
+
+
+@pytest.fixture
+def guards(limits: BenchLimits) -> Guards:
+    return Guards(GuardRules(), limits)
+
+
+def test_every_guard_has_a_case_here() -> None:
+    assert {case[0] for case in TRIPS} == set(CHECKS)
+
+
+def test_nothing_trips_when_all_is_well(guards: Guards) -> None:
+    assert guards.check(WELL) == []
+
+
+@pytest.mark.parametrize(("kind", "change", "device", "value", "limit", "unit"), TRIPS)
+def test_a_trip_names_device_value_limit_and_unit(
+    guards: Guards, kind: str, change: dict[str, Any], device: str, value: float, limit: float, unit: str
+) -> None:
+    trips = [trip for trip in guards.check(replace(WELL, **change)) if trip.kind == kind]
+    assert len(trips) == 1
+    event = trips[0].event()
+    assert (event.device, event.value, event.limit, event.unit) == (
+        device,
+        pytest.approx(value),
+        pytest.approx(limit),
+        unit,
+    )
+    assert event.level == ("warning" if kind == "invalid_readings" else "error")
+    assert device in event.message
+
+
+def test_a_single_bad_reading_is_no_trend(guards: Guards) -> None:
+    tally = Tally(expected=10, valid=9, damaged=1)
+    assert guards.check(replace(WELL, tallies={"imu": tally})) == []
+
+
+def test_the_air_may_be_anywhere_while_nothing_is_measured(guards: Guards) -> None:
+    assert guards.check(replace(WELL, chamber_c=-10.0, taking_readings=False)) == []
+
+
+def test_at_rest_any_motion_is_a_wrong_rate(guards: Guards) -> None:
+    assert [trip.kind for trip in guards.check(replace(WELL, asked_dps=0.0, rate_dps=0.01))] == ["rate"]
+
+
+def test_a_guard_that_is_already_beyond_its_limit_trips_when_armed(rig: Any) -> None:
+    rig.chamber.alarms = ("door open",)
+    outcome = rig.run()
+    assert outcome.state == CampaignState.FAILED
+    assert "door open" in outcome.reason
+    assert rig.journal.steps == []  # before the first step
+    rig.assert_safe()
+
+
+def test_damage_during_a_data_set_trips_before_its_end(rig: Any) -> None:
+    rig.when_step("acquire", lambda: setattr(rig.imu, "lost", 2))
+    outcome = rig.run()
+    assert outcome.state == CampaignState.FAILED
+    assert "imu: readings lost or damaged" in outcome.reason
+    assert [state for _, state, _ in rig.journal.closed] == ["partial", "partial"]  # and once more
+    assert len(rig.journal.blocks) < 8
+    event = next(event for event in rig.journal.events if event.kind == "guard.damaged_readings")
+    assert (event.device, event.unit, event.limit) == ("imu", "%", 2.0)
+
+
+def test_readings_that_the_instrument_marks_bad_are_kept_and_told_once(rig: Any) -> None:
+    rig.imu.invalid = True
+    assert rig.run().state == CampaignState.DONE
+    assert rig.journal.kinds().count("guard.invalid_readings") == 4  # once per data set
+    assert all(not readings.valid.any() for _, _, readings, _ in rig.journal.blocks)
+
+
+def test_a_wrong_rate_is_caught_before_the_first_reading(rig: Any) -> None:
+    rig.when_step("acquire", lambda: setattr(rig.table, "rate_error", 0.05))
+    outcome = rig.run()
+    assert outcome.state == CampaignState.FAILED
+    assert "runs 21 deg/s instead of 20 deg/s" in outcome.reason
+    assert [header.asked_dps for header in rig.journal.headers] == [0.0]
+
+
+def test_air_that_leaves_its_set_point_suspends_then_soaks_again_and_redoes(rig: Any) -> None:
+    began: list[float] = []
+
+    def hook(what: str, _detail: Any) -> None:
+        if what == "readings" and not began:
+            began.append(rig.clock.now_s())
+
+    rig.journal.hooks.append(hook)
+    rig.chamber.disturbance_c = lambda t_s: 3.0 if began and began[0] < t_s < began[0] + 200 else 0.0
+    recipe = rig.recipe(guards={"actions": {"chamber_deviation": "suspend"}}, acquire={"duration_s": 20.0})
+    assert rig.run(recipe).state == CampaignState.DONE
+    assert [state for state, _ in rig.journal.states] == ["running", "paused", "running", "done"]
+    assert [state for _, state, _ in rig.journal.closed] == ["partial", *["complete"] * 4]
+    assert [result.outcome for result in rig.journal.results()].count("interrupted") == 1
+    again = rig.journal.headers[1]
+    assert again.step.dataset == 1
+    assert again.gate_from_s > began[0] - 1000.25 + 120  # soaked again first
+
+
+def test_a_suspension_without_relief_fails_in_time(rig: Any) -> None:
+    rig.when_step("soak", lambda: setattr(rig.chamber, "alarms", ("compressor",)))
+    rules = {"actions": {"chamber_alarm": "suspend"}, "suspend_timeout_s": 600.0}
+    outcome = rig.run(rig.recipe(guards=rules))
+    assert outcome.state == CampaignState.FAILED
+    assert "suspended for 600 s without relief: chamber: alarms (compressor)" in outcome.reason
+    rig.assert_safe()
+
+
+def test_a_worse_trip_ends_a_suspension(rig: Any) -> None:
+    def act() -> None:
+        rig.chamber.alarms = ("compressor",)
+        rig.imu.lag_c = 80.0
+
+    rig.when_step("soak", act)
+    outcome = rig.run(rig.recipe(guards={"actions": {"chamber_alarm": "suspend"}}))
+    assert outcome.state == CampaignState.FAILED
+    assert "imu: its own thermometer" in outcome.reason

@@ -1,0 +1,73 @@
+"""Questions to a person, and wishes from another thread."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from procedures.control import Control
+from procedures.errors import StalePrompt
+from procedures.operator import HandOperator, PersonOperator, Prompt
+
+FIRST = Prompt("1", "mount", "turn x up", "x")
+SECOND = Prompt("2", "mount", "turn y up", "y")
+
+
+def test_a_person_answers_the_open_question() -> None:
+    person = PersonOperator()
+    assert person.pending is None
+    person.ask(FIRST)
+    assert person.pending == FIRST
+    assert person.answer("1") is None
+    person.confirm("1", by="Ada")
+    assert person.pending is None
+    answer = person.answer("1")
+    assert answer is not None
+    assert (answer.confirmed, answer.by) == (True, "Ada")
+
+
+def test_an_answer_to_an_old_question_is_refused() -> None:
+    person = PersonOperator()
+    with pytest.raises(StalePrompt, match="no question is open"):
+        person.confirm("1", by="Ada")
+    person.ask(FIRST)
+    person.ask(SECOND)
+    with pytest.raises(StalePrompt, match="'1' is no longer asked; '2' is open now"):
+        person.confirm("1", by="Ada")
+    person.confirm("2", by="Ada")
+    with pytest.raises(StalePrompt):
+        person.decline("2", by="Bob", reason="too late")
+    assert person.answer("1") is None
+
+
+def test_a_question_can_be_taken_back() -> None:
+    person = PersonOperator()
+    person.ask(FIRST)
+    person.withdraw("2")
+    assert person.pending == FIRST
+    person.withdraw("1")
+    with pytest.raises(StalePrompt):
+        person.confirm("1", by="Ada")
+
+
+def test_a_hand_does_at_once_what_is_asked(rig: Any) -> None:
+    hand = HandOperator(rig.hand)
+    for kind in ("mount", "power_on", "power_off"):
+        prompt = Prompt("1", kind, "", "-x")  # type: ignore[arg-type]  a loop over the three literals
+        hand.ask(prompt)
+        answer = hand.answer("1")
+        assert answer is not None
+        assert answer.confirmed
+    assert rig.trace == ["hand.mount -x", "hand.power True", "hand.power False"]
+
+
+def test_wishes() -> None:
+    control = Control()
+    control.pause("lunch")
+    assert (control.wish.pause, control.wish.reason) == (True, "lunch")
+    control.resume("back")
+    assert (control.wish.pause, control.wish.abort) == (False, False)
+    control.abort("smoke")
+    control.resume("no, wait")
+    assert (control.wish.abort, control.wish.reason) == (True, "smoke")
