@@ -84,7 +84,8 @@ class Calibrations:
         if act is None or act.act != "certify":
             raise NotCertified(
                 f"unit {serial!r} has no certified calibration; "
-                f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts one in force, `--version N` names one that is not"
+                f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts one in force, "
+                "`--version N` names one that is not"
             )
         return act.version
 
@@ -139,3 +140,11 @@ class Calibrations:
         query = sa.select(x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at).where(x.serial == serial)
         with self._database.reading() as connection:
             return [CertificationRow(*row) for row in connection.execute(query.order_by(x.id.desc()))]
+
+    def versions(self, serial: str) -> list[int]:
+        """Return a unit's version numbers, rising."""
+        c = tables.calibrations.c
+        with self._database.reading() as connection:
+            return [
+                int(v) for v in connection.scalars(sa.select(c.version).where(c.serial == serial).order_by(c.version))
+            ]

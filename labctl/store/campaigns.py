@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -110,12 +110,12 @@ class Campaigns:
             c.created_at, c.started_at, c.ended_at,
         )  # fmt: skip
         with self._database.reading() as connection:
-            rows = connection.execute(query.where(condition).order_by(c.id.desc())).all()
+            rows = [dict(row) for row in connection.execute(query.where(condition).order_by(c.id.desc())).mappings()]
             made = connection.execute(sa.select(r.campaign_id, r.serial, r.id).where(r.campaign_id.is_not(None))).all()
         recordings: dict[int, dict[str, int]] = {}
         for campaign, serial, recording in made:
             recordings.setdefault(campaign, {})[serial] = recording
-        return [replace(CampaignRow(*row), recordings=recordings.get(row[0], {})) for row in rows]
+        return [CampaignRow(**row, recordings=recordings.get(row["id"], {})) for row in rows]
 
     def steps(self, campaign: int) -> list[StepRow]:
         """Return the whole plan with what became of each step."""

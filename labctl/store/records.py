@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -58,7 +58,7 @@ class CampaignRow:
     created_at: datetime
     started_at: datetime | None
     ended_at: datetime | None
-    recordings: Mapping[str, int] = field(default_factory=dict)  #: serial -> recording
+    recordings: Mapping[str, int]  #: serial -> recording
 
 
 @dataclass(frozen=True)

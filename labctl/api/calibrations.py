@@ -1,0 +1,57 @@
+"""Calibrations: fit, list, certify, fetch."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Query, Response
+
+from labctl.api.rooms import HouseOf
+from labctl.services import calibrations as services
+from labctl.services.acts import CertifyRequest, FitRequest
+from labctl.services.answers import CalibrationRow, Certified, FitAnswer
+
+router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
+
+
+@router.get("/calibration", summary="The calibration to use", response_class=Response)
+async def calibration(
+    serial: str,
+    house: HouseOf,
+    version: Annotated[int | None, Query(description="A version; default: the certified one (404 without).")] = None,
+    format: Annotated[str, Query(description="json, c ...")] = "json",  # noqa: A002  the contract's name
+    if_none_match: Annotated[str | None, Header()] = None,
+) -> Response:
+    """The calibration as a file: the bytes never change, the ETag is their hash. 304 when the caller has them already.
+
+    A point read of tens of microseconds: it runs in the event loop, without a hand-over to a thread.
+    """
+    file = services.calibration_file(house.store, serial, version, format)
+    headers = {"ETag": f'"{file.etag}"', "Cache-Control": "no-cache"}
+    if if_none_match and f'"{file.etag}"' in if_none_match:
+        return Response(status_code=304, headers=headers)
+    return Response(file.content, media_type=file.media_type, headers=headers)
+
+
+@router.get("/calibrations", summary="All versions")
+def calibrations(serial: str, house: HouseOf) -> list[CalibrationRow]:
+    """Every version of the unit, newest first, with its error figures."""
+    return services.list_calibrations(house.store, serial)
+
+
+@router.post("/calibrations", summary="Fit a model", status_code=201)
+def fit(serial: str, request: FitRequest, house: HouseOf) -> FitAnswer:
+    """Fit a model to a recording; it becomes the unit's next version."""
+    return house.acts().fit(serial, request)
+
+
+@router.post("/calibrations/{version}/certify", summary="Make a version current")
+def certify(serial: str, version: int, request: CertifyRequest, house: HouseOf) -> Certified:
+    """Make a version the one in force: who, why, and when it is due again. An older version again is a rollback."""
+    return house.acts().certify(serial, version, request)
+
+
+@router.post("/calibrations/{version}/revoke", summary="Take a version out of force")
+def revoke(serial: str, version: int, request: CertifyRequest, house: HouseOf) -> Certified:
+    """Take the version out of force; the unit then has no certified calibration."""
+    return house.acts().revoke(serial, version, request)

@@ -1,0 +1,82 @@
+"""The service process: one database, one bench, one HTTP server."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import uvicorn
+
+from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
+from labctl.api.app import create_app
+from labctl.config import default_database
+from labctl.errors import BadInput
+from labctl.services.bench_runner import BenchRunner
+from labctl.services.house import House
+from labctl.services.planning import load_bench
+from labctl.store import Store
+from labctl.store.database import Database
+
+SIMULATED_BENCH = "triaxial-sim"
+
+
+@dataclass(frozen=True)
+class ServeRequest:
+    """What to serve, and where."""
+
+    bench: str | None = None
+    simulate: bool = False
+    speed: float = 1.0  #: of a simulated bench; 0: as fast as it can
+    host: str = "127.0.0.1"
+    port: int = 8420
+    database: str | None = None
+
+
+def open_house(request: ServeRequest, url: str | None) -> House:
+    """Open the store for this process and put a bench runner beside it, where a bench is named."""
+    store = Store(Database(request.database or default_database(), write=True, url=url))
+    try:
+        name = request.bench or (SIMULATED_BENCH if request.simulate else None)
+        runner = None
+        if name is not None:
+            bench = load_bench(name)
+
+            def make_clock() -> Clock:
+                if not bench.is_simulated:
+                    return SystemClock()
+                return VirtualClock() if request.speed == 0 else ScaledClock(request.speed)
+
+            runner = BenchRunner(store, bench, make_clock)
+        return House(store, SystemClock(), runner)
+    except BaseException:
+        store.close()
+        raise
+
+
+def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> None:
+    """Serve until interrupted. Raises BadInput for an address other than loopback, Conflict, BadBench."""
+    if not _is_loopback(request.host):
+        raise BadInput(
+            f"--host {request.host}: labctl listens on loopback only (127.0.0.1), it has no keys to give out yet; "
+            "put a reverse proxy with authentication in front of it"
+        )
+    with socket.socket() as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((request.host, request.port))
+        except OSError as error:
+            raise BadInput(f"--port {request.port} on {request.host}: {error.strerror}; name another, or 0") from error
+        url = f"http://{request.host}:{listener.getsockname()[1]}"
+        house = open_house(request, url)
+        server = uvicorn.Server(uvicorn.Config(create_app(house), log_level="warning", lifespan="on"))
+        ready(url)
+        server.run(sockets=[listener])
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

@@ -1,0 +1,188 @@
+"""`labctl fit`, `certify`, `revoke`, `calibration`, `compensate` and `effects`: from a recording to a corrected rate."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from labctl.cli.errors import one_clear_line
+from labctl.cli.options import Database, Json, RecordingId, Serial
+from labctl.cli.output import console, figure, print_json, table
+
+if TYPE_CHECKING:
+    from labctl.services.answers import FitAnswer
+
+Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
+By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it.")]
+Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")]
+
+
+def fit(
+    serial: Serial,
+    recording: RecordingId = None,
+    model: Annotated[
+        str | None, typer.Option("--model", metavar="NAME", help="A preset: `labctl effects` lists them.")
+    ] = None,
+    effects: Annotated[
+        str | None, typer.Option("--effects", metavar="A,B,C", help="Effects; `name:2` sets a polynomial order.")
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Fit a model to a recording; it becomes the unit's next calibration version."""
+    from labctl.services.acts import FitRequest
+    from labctl.services.opening import open_acts
+
+    names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
+    with one_clear_line(), open_acts(database) as acts:
+        answer = acts.fit(serial, FitRequest(recording=recording, model=model, effects=names))
+    if as_json:
+        print_json(answer)
+    else:
+        print_fit(answer)
+
+
+def print_fit(answer: FitAnswer) -> None:
+    """Print a fit for a person: the errors first, then the coefficients."""
+    error = answer.error
+    console.print(f"[bold]{answer.serial}[/] version {answer.version}: {answer.model.name}")
+    console.print(f"  before             {figure(error.raw_rms_dps)} deg/s RMS")
+    console.print(f"  after              {figure(error.rms_dps)} deg/s RMS")
+    console.print(f"  held-out           {figure(error.heldout_rms_dps)} deg/s RMS")
+    console.print(f"  noise floor        {figure(error.noise_floor_dps)} deg/s")
+    low, high = answer.validity.temperature_c
+    slow, fast = answer.validity.rate_dps
+    console.print(f"  valid              {low:.1f} to {high:.1f} deg C, {slow:.4g} to {fast:.4g} deg/s")
+    for axis, content in answer.axes.items():
+        coefficients = content["coefficients"]
+        if "temperature_c" in coefficients:
+            console.print(f"\n[bold]axis {axis}[/]: a table over {len(coefficients['temperature_c'])} temperatures")
+            print_table(axis, coefficients)
+            continue
+        rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
+        for name, entry in coefficients.items():
+            rows.add_row(name, entry["unit"], figure(entry["value"], 6), figure(entry["u"], 2))
+        console.print(rows)
+
+
+def print_table(axis: str, coefficients: dict[str, object]) -> None:
+    """Print a coefficient table over temperature, one row per temperature."""
+    names = [name for name in coefficients if name != "temperature_c"]
+    nodes: list[float] = coefficients["temperature_c"]  # type: ignore[assignment]
+    rows = table("", "deg C", *names, numbers=len(names) + 1)
+    for index, node in enumerate(nodes):
+        values = [coefficients[name]["value"][index] for name in names]  # type: ignore[index]
+        rows.add_row(f"{node:.2f}", *(figure(value, 5) for value in values))
+    console.print(rows)
+
+
+def effects(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001
+    """List the catalogue of physical effects and the model presets."""
+    from labctl.services.catalogue import catalogue
+
+    answer = catalogue()
+    if as_json:
+        print_json(answer)
+        return
+    rows = table("effects", "id", "origin", "term", "what it is")
+    for effect in answer["effects"]:
+        rows.add_row(effect["id"], effect["origin"], effect["term"], effect["sentence"])
+    console.print(rows)
+    presets = table("\nmodels", "name", "what it is")
+    for preset in answer["models"]:
+        presets.add_row(preset["name"], preset["sentence"])
+    console.print(presets)
+
+
+def certify(
+    serial: Serial,
+    version: Version,
+    by: By,
+    reason: Reason,
+    due_days: Annotated[int | None, typer.Option("--due-days", metavar="N", help="Days until it is due again.")] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Make a version the unit's current one. An older version again is a rollback."""
+    _act("certify", serial, version, by, reason, due_days, as_json, database)
+
+
+def revoke(
+    serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
+) -> None:
+    """Take a version out of force."""
+    _act("revoke", serial, version, by, reason, None, as_json, database)
+
+
+def _act(
+    act: Literal["certify", "revoke"],
+    serial: str,
+    version: int,
+    by: str,
+    reason: str,
+    due_days: int | None,
+    as_json: bool,
+    database: str | None,
+) -> None:
+    from labctl.services.acts import CertifyRequest
+    from labctl.services.opening import open_acts
+
+    request = CertifyRequest(by=by, reason=reason, due_days=due_days)
+    with one_clear_line(), open_acts(database) as acts:
+        answer = acts.certify(serial, version, request) if act == "certify" else acts.revoke(serial, version, request)
+    if as_json:
+        print_json(answer)
+    else:
+        done = "is now the calibration in force" if act == "certify" else "is no longer in force"
+        console.print(f"{serial} version {version} {done} ({by}: {reason})", markup=False)
+
+
+def calibration(
+    serial: Serial,
+    version: Annotated[int | None, typer.Option("--version", metavar="N", help="Default: the certified one.")] = None,
+    format_: Annotated[str, typer.Option("--format", metavar="NAME", help="json, c ...")] = "json",
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write a file instead of printing.")] = None,
+    as_json: Json = False,  # noqa: ARG001  the calibration file is JSON already
+    database: Database = None,
+) -> None:
+    """Print a calibration as a file to load elsewhere."""
+    from labctl.services.calibrations import calibration_file
+    from labctl.services.opening import open_reading
+
+    with one_clear_line(), open_reading(database) as store:
+        content = calibration_file(store, serial, version, format_).content
+        if out is None:
+            sys.stdout.buffer.write(content)
+        else:
+            out.write_bytes(content)
+
+
+def compensate(
+    calibration_file: Annotated[Path, typer.Argument(metavar="CALIBRATION_FILE")],
+    source: Annotated[
+        Path, typer.Argument(metavar="IN", help="Samples: CSV or Parquet with gyro_x ..., temperature_c.")
+    ],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The same rows with rate_x_dps ... and `outside`.")],
+    outside: Annotated[
+        str, typer.Option("--outside", help="Beyond the calibrated range: clamp (and flag) or refuse.")
+    ] = "clamp",
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  needs none: a calibration file is enough
+) -> None:
+    """Correct a file of readings by a calibration file; needs no database."""
+    from labctl.services.compensation import compensate_file
+
+    with one_clear_line():
+        answer = compensate_file(calibration_file, source, target, outside)
+    if as_json:
+        print_json(answer)
+        return
+    console.print(f"{answer['rows']} readings -> {target}", markup=False)
+    if answer["outside"]:
+        console.print(
+            f"{answer['outside']} of them lie outside the calibrated range and are flagged in column `outside`",
+            style="yellow",
+        )

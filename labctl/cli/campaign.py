@@ -1,0 +1,179 @@
+"""`labctl campaign`: plan, start, list, status, watch, abort."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labctl.cli.errors import one_clear_line
+from labctl.cli.options import BenchName, Database, Json
+from labctl.cli.output import console, figure, print_json, table
+
+if TYPE_CHECKING:
+    from labctl.services.answers import CampaignAnswer, PlanAnswer
+
+app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units.")
+
+Recipe = Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")]
+Clip = Annotated[bool, typer.Option("--clip", help="Leave out points beyond the bench or a unit, and say which.")]
+CampaignId = Annotated[int | None, typer.Argument(metavar="ID", help="Campaign; default: the newest.")]
+
+
+@app.command("plan")
+def plan(
+    recipe: Recipe, bench: BenchName = None, clip: Clip = False, as_json: Json = False, database: Database = None
+) -> None:
+    """Say what a campaign would do and how long it takes. Nothing moves."""
+    from labctl.services.planning import describe_plan
+
+    with one_clear_line():
+        answer = describe_plan(recipe, bench, clip=clip)
+    if as_json:
+        print_json(answer)
+    else:
+        print_plan(answer)
+
+
+def print_plan(answer: PlanAnswer) -> None:
+    """Print a plan's figures for a person."""
+    console.print(f"[bold]{answer.recipe}[/] on {answer.bench}")
+    console.print(f"  {answer.datasets} data sets in {answer.steps} steps, about {hours(answer.expected_s)}")
+    for left_out in answer.clipped:
+        console.print(f"  left out: {left_out}", style="yellow", markup=False)
+
+
+def hours(seconds: float) -> str:
+    """Write a duration as a person says it: 41 h 52 min."""
+    minutes = round(seconds / 60)
+    return f"{minutes // 60} h {minutes % 60:02d} min" if minutes >= 60 else f"{minutes} min"
+
+
+@app.command("start")
+def start(
+    recipe: Recipe,
+    bench: BenchName = None,
+    clip: Clip = False,
+    speed: Annotated[
+        float | None,
+        typer.Option("--speed", metavar="X", help="A simulated bench, X times as fast; default: as fast as it can."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the simulated bench.")] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Run a recipe. A service that holds the database runs it on its bench; else it runs here, until it is over."""
+    from labctl.cli.progress import CampaignProgress
+    from labctl.services.opening import service_url
+    from labctl.services.running import StartRequest, run_here
+
+    request = StartRequest(recipe=recipe, bench=bench, clip=clip, speed=speed, seed=seed)
+    with one_clear_line():
+        if url := service_url(database):
+            from labctl.services.remote import RemoteActs
+
+            answer = RemoteActs(url).start_campaign(request)
+        else:
+            with CampaignProgress(quiet=as_json) as progress:
+                answer = run_here(database, request, progress.update)
+    if as_json:
+        print_json(answer)
+    else:
+        print_campaign(answer)
+    if answer.state in {"failed", "aborted"}:
+        raise typer.Exit(1)
+
+
+def print_campaign(answer: CampaignAnswer) -> None:
+    """Print where a campaign is."""
+    console.print(f"campaign {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]", end="")
+    console.print(f" – {answer.reason}" if answer.reason else "", markup=False)
+    console.print(
+        f"  step {answer.step or '–'} of {answer.steps}  {answer.step_text}  {100 * answer.progress:.1f} %",
+        markup=False,
+    )
+    if answer.expected_end and answer.state in {"running", "paused", "waiting"}:
+        console.print(f"  expected end {answer.expected_end:%Y-%m-%d %H:%M} UTC")
+    if answer.chamber_c is not None:
+        console.print(
+            f"  chamber {figure(answer.chamber_c)} deg C, gyro {figure(answer.gyro_c)} deg C, table {figure(answer.rate_dps)} deg/s"
+        )
+    if answer.last_error:
+        console.print(f"  last fault: {answer.last_error}", style="red", markup=False)
+    for serial, recording in answer.recordings.items():
+        console.print(f"  recording {recording}: {serial}", markup=False)
+
+
+@app.command("list")
+def list_(as_json: Json = False, database: Database = None) -> None:
+    """List all campaigns, newest first."""
+    from labctl.services.campaigns import list_campaigns
+    from labctl.services.opening import open_reading
+
+    with one_clear_line(), open_reading(database) as store:
+        answers = list_campaigns(store)
+    if as_json:
+        print_json(answers)
+        return
+    rows = table("", "id", "recipe", "bench", "state", "started", "progress", numbers=1)
+    for answer in answers:
+        started = f"{answer.started_at:%Y-%m-%d %H:%M}" if answer.started_at else "–"
+        rows.add_row(
+            str(answer.id), answer.recipe, answer.bench, answer.state, started, f"{100 * answer.progress:.0f} %"
+        )
+    console.print(rows)
+
+
+@app.command("status")
+def status(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
+    """Say where a campaign is."""
+    from labctl.services.campaigns import campaign_status
+    from labctl.services.opening import open_reading
+
+    with one_clear_line(), open_reading(database) as store:
+        answer = campaign_status(store, campaign)
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+@app.command("watch")
+def watch(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
+    """Follow a campaign until it ends: from a running service live, else what the database tells."""
+    from instruments.clock import SystemClock
+    from labctl.cli.progress import CampaignProgress
+    from labctl.services.campaigns import campaign_status
+    from labctl.services.opening import open_reading
+
+    clock = SystemClock()
+    with one_clear_line(), CampaignProgress(quiet=as_json) as progress:
+        while True:
+            with open_reading(database) as store:
+                answer = campaign_status(store, campaign)
+            progress.update(answer)
+            if answer.state not in {"planned", "running", "paused", "waiting"}:
+                break
+            clock.sleep(1.0)
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+@app.command("abort")
+def abort(
+    campaign: Annotated[int, typer.Argument(metavar="ID", help="Campaign.")],
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")] = "aborted from the command line",
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """End a running campaign now, in the safe state. What was measured is kept."""
+    from labctl.services.opening import open_acts
+
+    with one_clear_line(), open_acts(database) as acts:
+        answer = acts.abort_campaign(campaign, reason)
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+def remaining(answer: CampaignAnswer) -> timedelta | None:
+    """Return how long a campaign still takes by its own clock."""
+    if answer.expected_end is None or answer.started_at is None:
+        return None
+    total = answer.expected_end - answer.started_at
+    return total * (1 - answer.progress)

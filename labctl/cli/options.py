@@ -1,0 +1,21 @@
+"""The options that every command shares."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, and nothing else.")]
+Database = Annotated[
+    str | None,
+    typer.Option("--database", metavar="URL_OR_PATH", help="The database; default $LABCTL_DATABASE or the user's own."),
+]
+Serial = Annotated[str, typer.Argument(metavar="SERIAL", help="Serial number of the unit.")]
+BenchName = Annotated[
+    str | None,
+    typer.Option("--bench", metavar="FILE", help="Bench file, or the name of a bench that ships with labctl."),
+]
+RecordingId = Annotated[
+    int | None, typer.Option("--recording", metavar="ID", help="Recording; default: the unit's newest.")
+]

@@ -1,0 +1,36 @@
+"""Printing: one JSON document for programs, or readable text for people."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+from pydantic import BaseModel
+from rich.console import Console
+from rich.table import Table
+
+console = Console(highlight=False)
+complaints = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def print_json(answer: Any) -> None:
+    """Print one JSON document on standard output."""
+    if isinstance(answer, BaseModel):
+        answer = answer.model_dump(mode="json", by_alias=True, exclude_none=False)
+    elif isinstance(answer, list):
+        answer = [a.model_dump(mode="json", by_alias=True) if isinstance(a, BaseModel) else a for a in answer]
+    sys.stdout.write(json.dumps(answer, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def table(title: str, *columns: str, numbers: int = 0) -> Table:
+    """Make a table whose last `numbers` columns are numbers, right-aligned."""
+    made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim")
+    for index, column in enumerate(columns):
+        made.add_column(column, justify="right" if index >= len(columns) - numbers else "left")
+    return made
+
+
+def figure(value: float | None, digits: int = 4) -> str:
+    """Write a number with `digits` significant digits, or a dash where there is none."""
+    return "–" if value is None else f"{value:.{digits}g}"

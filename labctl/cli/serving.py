@@ -1,0 +1,76 @@
+"""`labctl serve`, `labctl simulator` and `labctl demo`: what runs for longer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from labctl.cli.errors import one_clear_line
+from labctl.cli.options import BenchName, Database, Json
+from labctl.cli.output import console, print_json
+
+
+def serve(
+    bench: BenchName = None,
+    simulate: Annotated[bool, typer.Option("--simulate", help="A simulated bench; default triaxial-sim.")] = False,
+    speed: Annotated[float, typer.Option("--speed", metavar="X", help="Simulated bench, X times as fast.")] = 1.0,
+    host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option("--port", metavar="N", help="Port; 0 takes a free one.")] = 8420,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Serve calibrations over HTTP and run campaigns on the bench. Stops with Ctrl-C, bench left safe."""
+    from labctl.api.server import ServeRequest, serve_forever
+
+    def ready(url: str) -> None:
+        if as_json:
+            print_json({"url": url})
+        else:
+            console.print(f"labctl listens on {url}  (API text: {url}/docs)", markup=False)
+
+    with one_clear_line():
+        serve_forever(
+            ServeRequest(bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database), ready
+        )
+
+
+def simulator(
+    bench: Annotated[str, typer.Argument(metavar="BENCH", help="Bench file, or the name of a shipped one.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Write a bench file that points at the simulator here.")
+    ] = None,
+    speed: Annotated[float, typer.Option("--speed", metavar="X", help="X times as fast as the wall.")] = 1.0,
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  every command takes it
+) -> None:
+    """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until Ctrl-C."""
+    from labctl.services.benches import serve_simulator
+
+    def ready(addresses: dict[str, str]) -> None:
+        if as_json:
+            print_json({"addresses": addresses, "bench_file": str(out) if out else None})
+            return
+        for device, address in addresses.items():
+            console.print(f"{device:14} {address}", markup=False)
+        if out:
+            console.print(f"bench file: {out}", markup=False)
+
+    with one_clear_line():
+        serve_simulator(bench, out, speed, ready)
+
+
+def demo(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the demo's files go.")] = Path("demo-output"),
+    quick: Annotated[bool, typer.Option("--quick", help="The same story on a smaller tri-axial campaign.")] = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Run the whole job on simulated benches in virtual time, and on a real gyro's recording; prints the story."""
+    from labctl.cli.demo import run_demo
+
+    with one_clear_line():
+        figures = run_demo(out, database, quick=quick, quiet=as_json)
+    if as_json:
+        print_json(figures)

@@ -1,0 +1,75 @@
+"""The acts that change the database. One process at a time may write, so an act is done here or asked of who holds it.
+
+`open_acts` gives the one that fits: the services of this process, or the running service that holds the database.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
+
+
+class Request(BaseModel):
+    """What a person asks for; an unknown key is an error with a name."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class FitRequest(Request):
+    """Which model to fit to which recording."""
+
+    recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
+    model: str | None = Field(default=None, description="ojeda2000, yang2018, single_temperature, weiss1995 ...")
+    effects: list[str] = Field(
+        default_factory=list,
+        description="Effect ids, `name:2` sets an order. Without `model` a complete model, with it added to it.",
+    )
+
+
+class CertifyRequest(Request):
+    """Who makes a version current, and why."""
+
+    by: str = Field(min_length=1)
+    reason: str = Field(min_length=1)
+    due_days: int | None = Field(default=None, gt=0, description="Days until the unit is due again.")
+
+
+class CampaignRequest(Request):
+    """Which recipe to run on the service's bench."""
+
+    recipe: str = Field(description="Name of a shipped recipe, or the recipe itself as TOML text.")
+    clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
+
+
+class ReasonRequest(Request):
+    """Why something is done to a campaign."""
+
+    reason: str = Field(min_length=1)
+
+
+class Acts(Protocol):
+    """Every act that changes the database."""
+
+    def import_recording(self, folder: Path) -> Imported:
+        """Take in a recording from a folder in the interchange format; all of it or nothing."""
+        ...
+
+    def fit(self, serial: str, request: FitRequest) -> FitAnswer:
+        """Fit a model and keep it as the unit's next version."""
+        ...
+
+    def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:
+        """Make a version the unit's current one."""
+        ...
+
+    def revoke(self, serial: str, version: int, request: CertifyRequest) -> Certified:
+        """Take a version out of force."""
+        ...
+
+    def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
+        """End a campaign now, in the safe state."""
+        ...

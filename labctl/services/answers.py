@@ -1,0 +1,150 @@
+"""What the services answer: the same JSON on the command line and over HTTP. Keys named in the contract are fixed."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Answer(BaseModel):
+    """A document that leaves the house; more keys may be added, none renamed."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="null")
+
+
+class Imported(Answer):
+    """A recording that is now in the database."""
+
+    serial: str
+    recording: int
+    datasets: int
+    readings: int
+
+
+class ModelAnswer(Answer):
+    """Which effects a calibration is made of."""
+
+    name: str
+    effects: list[str]
+    argument: Literal["rate", "output"] = Field(
+        description="Whether the regressors see the true rate (forward law) or the gyro's output (direct law)."
+    )
+
+
+class ErrorFigures(Answer):
+    """Input-referred errors in deg/s, one value per data set and axis, root mean square over all."""
+
+    raw_rms_dps: float | None = Field(description="Before any compensation.")
+    rms_dps: float | None = Field(description="After compensation, on the data of the fit.")
+    heldout_rms_dps: float | None = Field(description="Each temperature predicted by a fit that has not seen it.")
+    noise_floor_dps: float | None = Field(description="Root of the mean variance of a data-set mean: white and drift.")
+
+
+class Validity(Answer):
+    """Where the calibration was measured; outside it is extrapolation."""
+
+    temperature_c: tuple[float, float]
+    rate_dps: tuple[float, float]
+
+
+class FitAnswer(Answer):
+    """A calibration version, as `labctl fit --json` and `POST .../calibrations` give it."""
+
+    serial: str
+    version: int
+    model: ModelAnswer
+    axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
+    error: ErrorFigures
+    validity: Validity
+
+
+class CalibrationRow(Answer):
+    """One line of a unit's list of calibrations."""
+
+    serial: str
+    version: int
+    parent: int | None
+    model: str
+    created_at: datetime
+    hash: str
+    certified: bool
+    rms_dps: float | None = None
+    heldout_rms_dps: float | None = None
+
+
+class Certified(Answer):
+    """A certification or its revocation."""
+
+    serial: str
+    version: int
+    act: Literal["certify", "revoke"]
+    by: str
+    reason: str
+    at: datetime
+    due: datetime | None = None
+
+
+class UnitAnswer(Answer):
+    """Who a unit is and what is known of it."""
+
+    serial: str
+    model: str
+    technology: str | None
+    recordings: list[int]
+    calibrations: list[int]
+    certified_version: int | None
+
+
+class PlanAnswer(Answer):
+    """What a campaign would do, before anything moves."""
+
+    recipe: str
+    bench: str
+    steps: int
+    datasets: int
+    expected_s: float
+    clipped: list[str] = Field(description="Points left out because the bench or the unit cannot do them.")
+    schedule_hash: str
+
+
+class CampaignAnswer(Answer):
+    """Where a campaign is."""
+
+    id: int
+    recipe: str
+    bench: str
+    state: str
+    reason: str = ""
+    step: int | None = Field(default=None, description="Number of the step, from 1.")
+    steps: int
+    step_text: str = ""
+    progress: float = Field(ge=0, le=1)
+    expected_end: datetime | None = None
+    chamber_c: float | None = None
+    gyro_c: float | None = None
+    rate_dps: float | None = None
+    last_error: str | None = None
+    started_at: datetime | None = None
+    ended_at: datetime | None = None
+    recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
+
+
+class EventAnswer(Answer):
+    """Something that happened in a campaign."""
+
+    id: int
+    at: datetime
+    t_s: float
+    kind: str
+    level: str
+    message: str
+
+
+class DeviceCheck(Answer):
+    """What one instrument of a bench answered."""
+
+    device: str
+    ok: bool
+    text: str

@@ -1,0 +1,37 @@
+"""Benches: which there are, whether their instruments answer, and simulated ones on real ports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from instruments.open import check
+from instruments.ports import serve_simulation
+
+from instruments.bench import shipped_benches
+from instruments.clock import ScaledClock, SystemClock, VirtualClock
+from labctl.services.answers import DeviceCheck
+from labctl.services.planning import load_bench
+
+
+def check_bench(source: str) -> list[DeviceCheck]:
+    """Talk to every instrument of a bench and say what answered; nothing moves."""
+    bench = load_bench(source)
+    clock = VirtualClock() if bench.is_simulated else SystemClock()
+    return [DeviceCheck(device=device, ok=ok, text=text) for device, ok, text in check(bench, clock)]
+
+
+def shipped() -> list[dict[str, Any]]:
+    """Return the benches that come with labctl: name, and what stands on them."""
+    found = []
+    for name, path in shipped_benches().items():
+        bench = load_bench(str(path))
+        units = ", ".join(f"{gyro.serial} ({gyro.driver})" for gyro in bench.gyros)
+        found.append({"name": name, "text": f"{bench.table.driver}, {bench.chamber.driver}, {units}"})
+    return found
+
+
+def serve_simulator(source: str, out: Path | None, speed: float, ready: Callable[[dict[str, str]], None]) -> None:
+    """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until interrupted."""
+    serve_simulation(load_bench(source), ScaledClock(speed), out, ready)

@@ -1,0 +1,109 @@
+"""Calibrations: fitted, kept, certified, handed out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any, Literal
+
+from labctl.calibration import build_calibration
+from labctl.exports import export_calibration
+from labctl.fitting import fit
+from labctl.services.acts import CertifyRequest, FitRequest
+from labctl.services.answers import CalibrationRow, Certified, FitAnswer
+from labctl.services.recordings import newest_recording
+from labctl.store import NewCalibration, Store
+
+
+@dataclass(frozen=True)
+class CalibrationFile:
+    """A calibration as a consumer gets it: immutable bytes and their tag."""
+
+    content: bytes
+    media_type: str
+    etag: str
+
+
+def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> FitAnswer:
+    """Fit a model to a unit's recording and keep it as the next version.
+
+    Raises NotFound, BadInput for an unknown model or effect, NotEnoughData.
+    """
+    recording = newest_recording(store, serial, request.recording)
+    source = store.recordings.points(recording)
+    result = fit(source, request.model, request.effects)
+    campaign = store.recordings.get(recording).campaign
+    made = {
+        "recording": recording,
+        "campaign": campaign,
+        "recipe": store.campaigns.get(campaign).recipe_name if campaign is not None else None,
+        "bench": store.campaigns.get(campaign).bench_name if campaign is not None else None,
+    }
+
+    def build(version: int) -> NewCalibration:
+        calibration = build_calibration(
+            source.info, result, version=version, parent=None, issued_at=at, provenance=made
+        )
+        answer = {"serial": serial, "version": version, **result.to_json(), **made, "hash": calibration.hash}
+        return NewCalibration(
+            None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
+        )
+
+    kept = store.calibrations.add(serial, at, build)
+    return FitAnswer.model_validate(dict(kept.answer))
+
+
+def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
+    """Return a unit's versions, newest first. Raises NotFound."""
+    in_force = _in_force(store, serial)
+    return [
+        CalibrationRow(
+            serial=row.serial,
+            version=row.version,
+            parent=row.parent,
+            model=row.model,
+            created_at=row.created_at,
+            hash=row.hash,
+            certified=row.version == in_force,
+            rms_dps=_error(row.answer, "rms_dps"),
+            heldout_rms_dps=_error(row.answer, "heldout_rms_dps"),
+        )
+        for row in store.calibrations.of_unit(store.units.get(serial).serial)
+    ]
+
+
+def _error(answer: Any, key: str) -> float | None:
+    value = answer["error"][key]
+    return None if value is None else float(value)
+
+
+def _in_force(store: Store, serial: str) -> int | None:
+    history = store.calibrations.history(serial)
+    return history[0].version if history and history[0].act == "certify" else None
+
+
+def calibration_file(store: Store, serial: str, version: int | None, format_name: str) -> CalibrationFile:
+    """Return a calibration in a consumer's format; without a version the certified one.
+
+    Raises NotFound, NotCertified, BadInput for an unknown format.
+    """
+    document, hash_ = store.calibrations.document(serial, version)
+    if format_name == "json":
+        return CalibrationFile(document, "application/json", hash_)
+    content, media_type = export_calibration(document, format_name)
+    return CalibrationFile(content, media_type, f"{hash_}-{format_name}")
+
+
+def certify(
+    store: Store,
+    serial: str,
+    version: int,
+    act: Literal["certify", "revoke"],
+    request: CertifyRequest,
+    at: datetime,
+) -> Certified:
+    """Put a version in force, or take it out of force. Raises NotFound, Conflict."""
+    store.units.get(serial)
+    due = at + timedelta(days=request.due_days) if request.due_days and act == "certify" else None
+    row = store.calibrations.certify(serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due)
+    return Certified(serial=serial, version=version, act=act, by=row.by, reason=row.reason, at=at, due=due)

@@ -1,0 +1,79 @@
+"""Where campaigns are: from rows, and from a running engine's own picture."""
+
+from __future__ import annotations
+
+from labctl.services.answers import CampaignAnswer, EventAnswer
+from labctl.store import CampaignRow, EventRow, Store
+from procedures.progress import Progress
+
+ENDED = frozenset({"done", "aborted", "failed"})
+
+
+def answer_of(row: CampaignRow, progress: Progress) -> CampaignAnswer:
+    """Return a campaign as its engine sees it."""
+    return CampaignAnswer(
+        id=row.id,
+        recipe=row.recipe_name,
+        bench=row.bench_name,
+        state=progress.state.value,
+        reason=progress.reason,
+        step=progress.step,
+        steps=progress.steps,
+        step_text=progress.step_text,
+        progress=progress.fraction,
+        expected_end=progress.expected_end,
+        chamber_c=progress.chamber_c,
+        gyro_c=next(iter(progress.gyro_c.values()), None),
+        rate_dps=progress.rate_dps,
+        last_error=progress.last_error or None,
+        started_at=row.started_at,
+        ended_at=row.ended_at,
+        recordings=dict(row.recordings),
+    )
+
+
+def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
+    """Return a campaign as the database tells it."""
+    steps = store.campaigns.steps(row.id)
+    begun = [step for step in steps if step.started_s is not None]
+    done_s = sum(step.expected_s for step in steps if step.state == "done")
+    there = store.campaigns.last_environment(row.id) or {}
+    current = begun[-1] if begun else None
+    faults = [event for event in store.campaigns.events(row.id, limit=100_000) if event.level == "error"]
+    return CampaignAnswer(
+        id=row.id,
+        recipe=row.recipe_name,
+        bench=row.bench_name,
+        state=row.state,
+        reason=row.reason,
+        step=None if current is None else current.number + 1,
+        steps=len(steps),
+        step_text="" if current is None else current.kind.replace("_", " "),
+        progress=1.0 if row.state == "done" else min(done_s / max(row.expected_s, 1e-9), 1.0),
+        chamber_c=there.get("chamber_c"),
+        gyro_c=there.get("temperature_c"),
+        rate_dps=None if current is None else current.body.get("rate_dps", 0.0),
+        last_error=faults[-1].message if faults else None,
+        started_at=row.started_at,
+        ended_at=row.ended_at,
+        recordings=dict(row.recordings),
+    )
+
+
+def list_campaigns(store: Store) -> list[CampaignAnswer]:
+    """Return every campaign, newest first."""
+    return [from_rows(store, row) for row in store.campaigns.all()]
+
+
+def campaign_status(store: Store, campaign: int | None) -> CampaignAnswer:
+    """Return where a campaign is; without a number the newest. Raises NotFound."""
+    row = store.campaigns.newest() if campaign is None else store.campaigns.get(campaign)
+    return from_rows(store, row)
+
+
+def event_answer(row: EventRow) -> EventAnswer:
+    """Return an event as it leaves the house."""
+    return EventAnswer(
+        id=row.id, at=row.at, t_s=row.t_s, kind=row.kind, level=row.level, message=row.message, device=row.device,
+        value=row.value, limit=row.limit, unit=row.unit,
+    )  # fmt: skip

@@ -1,0 +1,42 @@
+"""Correcting a file of readings by a calibration file; no database."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+import pyarrow.parquet as pq
+
+from labctl.compensator import Compensator
+from labctl.errors import BadInput
+from labctl.recording.tables import read_table
+
+
+def compensate_file(calibration: Path, source: Path, target: Path, outside: str) -> dict[str, Any]:
+    """Write `source` with a corrected rate per axis and a flag; returns how many rows, and how many lay outside.
+
+    Raises BadCalibrationFile, BadRecording, BadInput.
+    """
+    if outside not in {"clamp", "refuse"}:
+        raise BadInput(f"--outside {outside!r} is not known (expected clamp or refuse)")
+    compensator = Compensator.from_file(calibration, outside=outside)  # type: ignore[arg-type]
+    if not source.is_file():
+        raise BadInput(f"{source}: no such file")
+    columns = read_table(source)
+    for name in (*(f"gyro_{axis}" for axis in compensator.axes), "temperature_c"):
+        if name not in columns:
+            raise BadInput(f"{source}: column {name!r} is missing (the calibration is of axes {compensator.axes})")
+    raw = np.column_stack([columns[f"gyro_{axis}"] for axis in compensator.axes])
+    corrected = compensator.compensate_output(raw, columns["temperature_c"])
+    for index, axis in enumerate(compensator.axes):
+        columns[f"rate_{axis}_dps"] = corrected.rate_dps[:, index]
+    columns["outside"] = corrected.outside.astype(np.int64)
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    if target.suffix == ".parquet":
+        pq.write_table(table, target)
+    else:
+        pacsv.write_csv(table, target)
+    return {"rows": len(raw), "outside": int(corrected.outside.sum()), "file": str(target)}

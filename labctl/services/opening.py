@@ -1,0 +1,74 @@
+"""Which store, and who acts: this process, or the running service that holds the database."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from instruments.clock import Clock, SystemClock
+from labctl.config import default_database
+from labctl.errors import Conflict
+from labctl.services import calibrations, recordings
+from labctl.services.acts import Acts, CertifyRequest, FitRequest
+from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.campaigns import campaign_status
+from labctl.store import Store, holder_of, open_store
+
+
+class LocalActs:
+    """The acts, done by this process."""
+
+    def __init__(self, store: Store, clock: Clock) -> None:
+        self._store = store
+        self._clock = clock
+
+    def import_recording(self, folder: Path) -> Imported:
+        """Take in a recording from a folder."""
+        return recordings.import_folder(self._store, folder, self._clock.utc())
+
+    def fit(self, serial: str, request: FitRequest) -> FitAnswer:
+        """Fit a model and keep it as the unit's next version."""
+        return calibrations.fit_unit(self._store, serial, request, self._clock.utc())
+
+    def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:
+        """Make a version the unit's current one."""
+        return calibrations.certify(self._store, serial, version, "certify", request, self._clock.utc())
+
+    def revoke(self, serial: str, version: int, request: CertifyRequest) -> Certified:
+        """Take a version out of force."""
+        return calibrations.certify(self._store, serial, version, "revoke", request, self._clock.utc())
+
+    def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
+        """Close a campaign that no process runs any more; one that runs here would hold the database."""
+        answer = campaign_status(self._store, campaign)
+        if answer.state in {"done", "aborted", "failed"}:
+            raise Conflict(f"campaign {campaign} is over already: {answer.state}")
+        self._store.campaigns.close_unfinished(campaign, f"left unfinished; {reason}", self._clock.utc())
+        return campaign_status(self._store, campaign)
+
+
+def service_url(database: str | None) -> str | None:
+    """Return the address of the service that holds the database; None when no service does."""
+    holder = holder_of(database or default_database())
+    return holder.url if holder is not None else None
+
+
+@contextmanager
+def open_acts(database: str | None) -> Iterator[Acts]:
+    """Give what acts on the database: this process, or the service that holds it."""
+    location = database or default_database()
+    if url := service_url(location):
+        from labctl.services.remote import RemoteActs  # noqa: PLC0415  an HTTP client only where one is needed
+
+        yield RemoteActs(url)
+        return
+    with open_store(location, write=True) as store:
+        yield LocalActs(store, SystemClock())
+
+
+@contextmanager
+def open_reading(database: str | None) -> Iterator[Store]:
+    """Give the store to read from, also while another process writes."""
+    with open_store(database or default_database(), write=False) as store:
+        yield store

@@ -1,0 +1,101 @@
+"""From a recipe and a bench to a plan; nothing is opened and nothing moves."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from instruments.bench import BenchFile, read_bench, shipped_benches
+from instruments.chamber import ChamberLimits
+from instruments.gyro import GyroLimits
+from instruments.table import TableLimits
+from labctl.errors import BadBench
+from labctl.services.answers import PlanAnswer
+from procedures.errors import PlanRefused
+from procedures.limits import BenchLimits
+from procedures.plan import Plan, make_plan
+from procedures.recipe import Recipe, parse_recipe, read_recipe, shipped_recipes
+
+#: Of a chamber's set point, until its controller has been asked.
+USUAL_RESOLUTION_C = 0.1
+
+
+def load_recipe(source: str) -> Recipe:
+    """Return a recipe by shipped name, by path, or from its own TOML text. Raises RecipeError."""
+    if "\n" in source:
+        return parse_recipe(source)
+    return read_recipe(source)
+
+
+def load_bench(source: str) -> BenchFile:
+    """Return a bench by shipped name or path; raises BadBench naming the file and the key."""
+    try:
+        return read_bench(source)
+    except FileNotFoundError:
+        known = ", ".join(shipped_benches())
+        raise BadBench(f"bench {source!r} is neither a file nor a bench that ships with labctl ({known})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
+        raise BadBench(f"bench file {source}: not TOML: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise BadBench(f"bench file {source}: {place}: {first['msg']} (is {first['input']!r})") from error
+
+
+def limits_of(bench: BenchFile) -> BenchLimits:
+    """Return what a bench's instruments may be asked for, from its file alone."""
+    table, chamber = bench.table, bench.chamber
+    return BenchLimits(
+        TableLimits(table.max_rate_dps, table.acceleration_dps2, 360.0 / table.steps_per_turn),
+        ChamberLimits(chamber.min_c, chamber.max_c, USUAL_RESOLUTION_C, chamber.ramp_c_per_min),
+        {gyro.name: GyroLimits(gyro.max_rate_dps, gyro.min_c, gyro.max_c) for gyro in bench.gyros},
+    )
+
+
+def bench_for(recipe: Recipe) -> str:
+    """Return the shipped simulated bench that fits a recipe best: with its axes, able to do it whole where one can."""
+    axes = {position.lstrip("-") for position in recipe.positions}
+    fitting = []
+    for name, path in shipped_benches().items():
+        bench = load_bench(str(path))
+        recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
+        if not bench.is_simulated or not axes <= recorded:
+            continue
+        try:
+            make_plan(recipe, limits_of(bench))
+            fitting.append((len(recorded), name))
+        except PlanRefused:
+            fitting.append((10 + len(recorded), name))
+    if not fitting:
+        raise BadBench(
+            f"recipe {recipe.name}: no shipped bench records axes {sorted(axes)}; name one with --bench FILE"
+        )
+    return min(fitting)[1]
+
+
+def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tuple[Plan, BenchFile]:
+    """Return the plan of a recipe on a bench. Raises RecipeError, BadBench, PlanRefused."""
+    recipe = load_recipe(recipe_source)
+    bench = load_bench(bench_source or bench_for(recipe))
+    return make_plan(recipe, limits_of(bench), clip=clip), bench
+
+
+def describe_plan(recipe: str, bench: str | None, *, clip: bool) -> PlanAnswer:
+    """Say what a campaign would do and how long it takes."""
+    plan, bench_file = plan_for(recipe, bench, clip=clip)
+    return PlanAnswer(
+        recipe=plan.recipe.name,
+        bench=bench_file.name,
+        steps=len(plan.steps),
+        datasets=plan.datasets,
+        expected_s=plan.expected_s,
+        clipped=list(plan.clipped),
+        schedule_hash=plan.schedule_hash,
+    )
+
+
+def shipped_recipe_names() -> dict[str, Path]:
+    """Return the recipes that come with labctl."""
+    return shipped_recipes()

@@ -1,0 +1,96 @@
+"""Recordings: taken in, given out, looked at."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
+
+import numpy as np
+
+from labctl.errors import BadRecording, NotFound
+from labctl.recording import read_recording, write_recording
+from labctl.services.answers import Imported
+from labctl.store import Store
+
+if TYPE_CHECKING:
+    from labctl.services.acts import Acts
+
+STEMS = ("samples", "points", "coefficients", "environment")
+FILE_NAMES = frozenset({"recording.toml", *(f"{stem}.{suffix}" for stem in STEMS for suffix in ("csv", "parquet"))})
+
+
+def import_folder(store: Store, folder: Path, at: datetime) -> Imported:
+    """Take in a recording from a folder; all of it or nothing. Raises BadRecording."""
+    recording = read_recording(folder)
+    number = store.recordings.add_import(recording, at)
+    row = store.recordings.get(number)
+    readings = row.readings if recording.info.kind == "samples" else len(recording)
+    datasets = 0 if recording.info.kind == "coefficients" else row.datasets
+    return Imported(serial=row.serial, recording=number, datasets=datasets, readings=readings)
+
+
+def import_files(acts: Acts, files: Mapping[str, BinaryIO]) -> Imported:
+    """Take in a recording from uploaded files; their names may only be the format's. Raises BadRecording."""
+    for name in files:
+        if name not in FILE_NAMES:
+            raise BadRecording(f"file {name!r} is not part of a recording (expected {', '.join(sorted(FILE_NAMES))})")
+    with tempfile.TemporaryDirectory(prefix="labctl-import-") as folder:
+        for name, content in files.items():
+            with (Path(folder) / name).open("wb") as target:
+                shutil.copyfileobj(content, target)
+        try:
+            return acts.import_recording(Path(folder))
+        except BadRecording as error:
+            raise BadRecording(str(error).replace(f"{folder}/", "")) from None
+
+
+def export_recording(store: Store, recording: int, folder: Path, file_format: Literal["parquet", "csv"]) -> list[str]:
+    """Write a recording into a new folder; returns the names of its files."""
+    return write_recording(store.recordings.samples(recording), folder, file_format)
+
+
+def newest_recording(store: Store, serial: str, recording: int | None) -> int:
+    """Return the recording asked for, checked to be the unit's, or the unit's newest. Raises NotFound."""
+    store.units.get(serial)
+    if recording is not None:
+        row = store.recordings.get(recording)
+        if row.serial != serial:
+            raise NotFound(f"recording {recording} is of unit {row.serial!r}, not of {serial!r}")
+        return recording
+    rows = store.recordings.of_unit(serial)
+    if not rows:
+        raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign makes one")
+    return rows[0].id
+
+
+def describe_recording(store: Store, recording: int) -> dict[str, Any]:
+    """Return what a recording is, and its data sets with their means."""
+    row = store.recordings.get(recording)
+    points = store.recordings.points(recording)
+    return {
+        "id": row.id,
+        "serial": row.serial,
+        "campaign": row.campaign,
+        "kind": row.kind,
+        "info": dict(row.info),
+        "created_at": row.created_at.isoformat(),
+        "datasets": row.datasets,
+        "readings": row.readings,
+        "points": {name: np.asarray(values).tolist() for name, values in points.columns.items()},
+    }
+
+
+def dataset_samples(store: Store, recording: int, dataset: int, limit: int) -> dict[str, Any]:
+    """Return the readings of one data set, at most `limit`."""
+    columns = store.recordings.dataset(recording, dataset)
+    n = len(next(iter(columns.values()), ()))
+    return {
+        "recording": recording,
+        "dataset": dataset,
+        "readings": n,
+        "columns": {name: np.asarray(values)[:limit].tolist() for name, values in columns.items()},
+    }

@@ -1,0 +1,150 @@
+"""Running a campaign: from a plan to a campaign in the store, and the engine through it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from instruments.hand import NoHand
+from instruments.open import Bench, open_bench
+from pydantic import Field
+
+from instruments.bench import BenchFile, SimulationSettings
+from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
+from instruments.gyro import Gyro
+from labctl.config import default_database
+from labctl.recording import OutputUnit, RecordingInfo
+from labctl.services.acts import Request
+from labctl.services.answers import CampaignAnswer
+from labctl.services.campaigns import answer_of
+from labctl.services.planning import bench_for, load_bench, load_recipe
+from labctl.store import NewCampaign, NewUnit, Store, open_store
+from procedures.control import Control
+from procedures.engine import Engine
+from procedures.limits import BenchLimits
+from procedures.operator import HandOperator, Operator, PersonOperator
+from procedures.plan import Plan, make_plan
+from procedures.progress import Progress
+
+Observe = Callable[[CampaignAnswer], None]
+
+
+class StartRequest(Request):
+    """Which recipe to run on which bench, here and now."""
+
+    recipe: str
+    bench: str | None = None
+    clip: bool = False
+    speed: float | None = Field(default=None, gt=0, description="Of a simulated bench; absent: as fast as it can.")
+    seed: int | None = Field(default=None, description="Of a simulated bench.")
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A campaign that is written down and may begin."""
+
+    id: int
+    plan: Plan
+    bench: Bench
+    clock: Clock
+    operator: Operator
+
+
+def seeded(bench: BenchFile, seed: int | None) -> BenchFile:
+    """Return the bench with another seed of its simulation."""
+    if seed is None:
+        return bench
+    simulation = (bench.simulation or SimulationSettings()).model_copy(update={"seed": seed})
+    return bench.model_copy(update={"simulation": simulation})
+
+
+def clock_for(bench: BenchFile, speed: float | None) -> Clock:
+    """Return the wall's clock for real instruments; for simulated ones a scaled or a virtual clock."""
+    if not bench.is_simulated:
+        return SystemClock()
+    return VirtualClock() if speed is None else ScaledClock(speed)
+
+
+def prepare(store: Store, recipe_source: str, bench_file: BenchFile, clock: Clock, *, clip: bool) -> Prepared:
+    """Open the bench, plan, and write the whole campaign down; nothing has moved when this returns.
+
+    Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe.
+    """
+    recipe = load_recipe(recipe_source)
+    bench = open_bench(bench_file, clock)
+    try:
+        bench.table.identify()
+        bench.chamber.identify()
+        plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
+        units = tuple(_unit(gyro, bench_file, clock) for gyro in bench.gyros.values())
+        new = NewCampaign(
+            recipe_name=recipe.name,
+            recipe=plan.recipe.model_dump(mode="json"),
+            bench_name=bench_file.name,
+            bench=bench_file.model_dump(mode="json"),
+            schedule_hash=plan.schedule_hash,
+            expected_s=plan.expected_s,
+            steps=[step.model_dump(mode="json") for step in plan.steps],
+            units=units,
+        )
+        operator = PersonOperator() if isinstance(bench.hand, NoHand) else HandOperator(bench.hand)
+        return Prepared(store.campaigns.create(new, clock.utc()), plan, bench, clock, operator)
+    except BaseException:
+        bench.close()
+        raise
+
+
+def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
+    identity = gyro.identify()
+    latitude = bench.latitude_deg
+    info = RecordingInfo(
+        serial=identity.serial,
+        model=identity.model,
+        axes=gyro.axes,
+        kind="samples",
+        started_at=clock.utc(),
+        latitude_deg=latitude,
+        sample_rate_hz=gyro.sample_rate_hz,
+        max_rate_dps=gyro.limits.max_rate_dps,
+        technology=identity.technology or None,
+        datasheet=dict(identity.datasheet),
+        output={axis: OutputUnit.model_validate(dict(unit)) for axis, unit in identity.output.items()},
+    )
+    channels = tuple({"name": c.name, "unit": c.unit, "scale": c.scale, "offset": c.offset} for c in gyro.channels)
+    return NewUnit(gyro.name, info.model_dump(mode="json"), channels)
+
+
+def run(
+    store: Store, prepared: Prepared, control: Control | None = None, observe: Callable[[Progress], None] | None = None
+) -> CampaignAnswer:
+    """Run a prepared campaign to its end; the bench is closed, in its safe state, when this returns."""
+    journal = store.campaigns.journal(prepared.id)
+    engine = Engine(
+        prepared.plan,
+        prepared.bench,
+        journal,
+        prepared.clock,
+        prepared.operator,
+        control=control or Control(),
+        observer=observe,
+    )
+    try:
+        engine.run()
+    finally:
+        prepared.bench.close()
+    return answer_of(store.campaigns.get(prepared.id), engine.progress)
+
+
+def run_here(database: str | None, request: StartRequest, observe: Observe | None = None) -> CampaignAnswer:
+    """Run a campaign in this process, until it is over."""
+    bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
+    with open_store(database or default_database(), write=True) as store:
+        clock = clock_for(bench_file, request.speed)
+        prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip)
+        row = store.campaigns.get(prepared.id)
+
+        def seen(progress: Progress) -> None:
+            if observe is not None:
+                observe(answer_of(row, progress))
+
+        return run(store, prepared, observe=seen)
