@@ -19,7 +19,7 @@ from procedures.plan import Plan
 from procedures.progress import Board, Observer, Progress
 from procedures.safe import make_safe
 from procedures.stage import LOOK_S, Stage
-from procedures.steps import SafeState, Step, StepResult
+from procedures.steps import Acquire, SafeState, Soak, Step, StepResult
 from procedures.watch import Watch
 
 
@@ -62,6 +62,7 @@ class Engine:
         watch = Watch(bench, guards, self._log)
         self._stage = Stage(plan.recipe, bench, clock, operator, self.control, self._log, watch)
         self._safe = False
+        self._owed: Soak | None = None  #: to be done again before the next data set
 
     @property
     def progress(self) -> Progress:
@@ -86,7 +87,7 @@ class Engine:
             state, reason = CampaignState.ABORTED, f"aborted: {error}"
         except (InstrumentError, ProcedureError) as error:
             reason = str(error)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemExit):
             state, reason = CampaignState.ABORTED, "interrupted (Ctrl-C or a signal)"
             raise
         except BaseException as error:
@@ -112,20 +113,27 @@ class Engine:
             self._carry_out(step)
 
     def _run_step(self, index: int) -> None:
-        """Run one step to its end, again after a suspension, and mark how it went."""
-        self._between_steps()
+        """Run one step to its end, again after every suspension."""
         while True:
-            self._log.step_started(index)
             try:
-                figures = self._carry_out(self.plan.steps[index])
-            except BaseException as error:
-                self._mark_unfinished(index, error)
-                if isinstance(error, GuardTripped) and error.action == "suspend":
-                    self._suspend(error)
-                    continue
-                raise
-            self._log.step_ended(index, StepResult(outcome="done", figures=figures))
-            return
+                self._attempt(index)
+            except GuardTripped as trip:
+                if trip.action != "suspend":
+                    raise
+                self._suspend(trip)
+            else:
+                return
+
+    def _attempt(self, index: int) -> None:
+        """Run one step once and mark how it went."""
+        self._between_steps(self.plan.steps[index])
+        self._log.step_started(index)
+        try:
+            figures = self._carry_out(self.plan.steps[index])
+        except BaseException as error:
+            self._mark_unfinished(index, error)
+            raise
+        self._log.step_ended(index, StepResult(outcome="done", figures=figures))
 
     def _carry_out(self, step: Step) -> Figures:
         self._safe = False
@@ -143,22 +151,28 @@ class Engine:
         result = StepResult(outcome=outcome, reason=reason, figures=figures)
         self._log.step_ended(index, result)
 
-    def _between_steps(self) -> None:
-        """Obey a wish to pause or abort; what a pause has cooled down is soaked again."""
-        self._stage.checkpoint()
-        soaked = self._stage.soaked
-        self._stage.hold()
-        if soaked is not None and self._stage.soaked is None:
-            self._log.event(warning("soak_again", f"the air left {soaked.temperature_c:g} deg C during the pause"))
-            self._carry_out(soaked)
+    def _between_steps(self, coming: Step) -> None:
+        """Obey a wish to pause or abort; before a data set, soak again at a temperature that was left meanwhile."""
+        stage = self._stage
+        stage.checkpoint()
+        soaked = stage.soaked
+        stage.hold()
+        if soaked is not None and stage.soaked is None:
+            self._owed = soaked
+        if self._owed is not None and isinstance(coming, Acquire):
+            self._log.event(
+                warning("soak_again", f"soaked again: {self._owed.temperature_c:g} deg C was left or in doubt")
+            )
+            self._carry_out(self._owed)
+        self._owed = None
 
     def _suspend(self, trip: GuardTripped) -> None:
-        """Wait at rest until every limit has held for a while, then soak again.
+        """Wait at rest until every limit has held for a while; a soak is owed then.
 
         Raises StepFailed when that takes too long.
         """
         stage, rules = self._stage, self.plan.recipe.guards
-        soaked = stage.soaked
+        self._owed, stage.soaked = stage.soaked or self._owed, None
         stage.bench.table.stop()
         self._log.change_state(CampaignState.PAUSED, f"suspended: {trip}")
         began_s = clear_since_s = stage.clock.now_s()
@@ -172,8 +186,6 @@ class Engine:
             if stage.clock.now_s() - began_s >= rules.suspend_timeout_s:
                 raise StepFailed(f"suspended for {rules.suspend_timeout_s:g} s without relief: {trip}")
         self._log.change_state(CampaignState.RUNNING, "the limits hold again")
-        if soaked is not None:
-            self._carry_out(soaked)
 
     def _end(self, state: CampaignState, reason: str) -> Outcome:
         """Make the bench safe whatever happened, and say how the campaign ended."""

@@ -27,7 +27,7 @@ def home(stage: Stage, _step: Home) -> Figures:
 def power_on(stage: Stage, step: PowerOn) -> Figures:
     """Have the units switched on, make sure they are who the bench file says, open their streams, warm up."""
     stage.soaked = None
-    stage.ask("power_on", Prompt(stage.new_prompt_id(), "power_on", f"switch the units on (session {step.run})"))
+    stage.ask(Prompt(stage.new_prompt_id(), "power_on", f"switch the units on (session {step.run})"))
     open_streams(stage, step.run)
     stage.watch_for(step.wait_s)
     return {"run": float(step.run)}
@@ -47,7 +47,7 @@ def power_off(stage: Stage, step: PowerOff) -> Figures:
     for gyro in stage.bench.gyros.values():
         gyro.stop()
     stage.watch.powered(0)
-    stage.ask("power_off", Prompt(stage.new_prompt_id(), "power_off", f"switch the units off (session {step.run})"))
+    stage.ask(Prompt(stage.new_prompt_id(), "power_off", f"switch the units off (session {step.run})"))
     stage.watch_for(step.off_s)
     return {"run": float(step.run)}
 
@@ -56,7 +56,7 @@ def mount(stage: Stage, step: Mount) -> Figures:
     """Have a person turn the units."""
     stage.soaked = None
     text = f"turn the units so that body axis {step.position} points up along the table axis"
-    stage.ask("mount", Prompt(stage.new_prompt_id(), "mount", text, step.position))
+    stage.ask(Prompt(stage.new_prompt_id(), "mount", text, step.position))
     return {"mounting": float(step.mounting)}
 
 

@@ -98,7 +98,7 @@ class Stage:
         if self.soaked and abs(chamber_c - self.soaked.temperature_c) > self.soaked.band_c:
             self.soaked = None
 
-    def ask(self, kind: str, prompt: Prompt) -> Answer:
+    def ask(self, prompt: Prompt) -> Answer:
         """Ask a person and wait for the answer, with the environment recorded.
 
         Raises StepFailed when the answer is no or does not come in time, and what `looks` raises.
@@ -109,7 +109,7 @@ class Stage:
             answer = self._wait_for(prompt)
         if not answer.confirmed:
             raise StepFailed(f"{answer.by} declined: {prompt.text}: {answer.reason}")
-        self.log.event(Event(f"operator.{kind}", f"{prompt.text}: confirmed by {answer.by}"))
+        self.log.event(Event(f"operator.{prompt.kind}", f"{prompt.text}: confirmed by {answer.by}"))
         return answer
 
     def _wait_for(self, prompt: Prompt) -> Answer:

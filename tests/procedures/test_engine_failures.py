@@ -280,3 +280,11 @@ def test_abort_while_a_question_waits(rig: Any) -> None:
     rig.journal.hooks.append(hook)
     assert rig.run().state == CampaignState.ABORTED
     assert rig.operator.pending is None
+
+
+def test_a_signal_that_ends_the_process_is_an_abort(rig: Any) -> None:
+    rig.when_step("soak", lambda: rig.chamber.fail("read", SystemExit(143), times=1))
+    with pytest.raises(SystemExit):
+        rig.run()
+    rig.assert_safe()
+    assert rig.journal.states[-1][0] == "aborted"

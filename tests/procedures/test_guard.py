@@ -153,3 +153,22 @@ def test_a_worse_trip_ends_a_suspension(rig: Any) -> None:
     outcome = rig.run(rig.recipe(guards={"actions": {"chamber_alarm": "suspend"}}))
     assert outcome.state == CampaignState.FAILED
     assert "imu: its own thermometer" in outcome.reason
+
+
+def test_a_trip_during_a_pause_suspends_too(rig: Any) -> None:
+    paused: list[float] = []
+    rig.when_step("acquire", rig.control.pause)
+
+    def hook(what: str, detail: Any) -> None:
+        if what == "state" and detail == CampaignState.PAUSED and not paused:
+            paused.append(rig.clock.now_s())
+            rig.chamber.alarms = ("compressor",)
+        if what == "state" and "suspended" in rig.journal.states[-1][1]:
+            rig.chamber.alarms = ()
+            rig.control.resume()
+
+    rig.journal.hooks.append(hook)
+    outcome = rig.run(rig.recipe(guards={"actions": {"chamber_alarm": "suspend"}}))
+    assert outcome.state == CampaignState.DONE
+    assert "soak_again" in rig.journal.kinds()
+    assert [header.step.dataset for header in rig.journal.headers] == [1, 2, 3, 4]
