@@ -52,6 +52,7 @@ class ChamberSettings(Strict):
     ramp_c_per_min: float = Field(default=1.67, gt=0)
     word_order: Literal["little", "big"] = "little"  #: of 32-bit floats (watlow-f4t): low word first by default
     write_function: Literal[6, 16] = 6  #: tried first (watlow-f4); the other is the fall-back
+    alarm_inputs: tuple[Literal[1, 2, 3, 4], ...] = ()  #: digital inputs that carry alarms, if wired (watlow-f4)
     enable_event: int | None = Field(default=None, ge=1, le=8)  #: event output that switches the chamber, if wired
 
 
@@ -84,6 +85,7 @@ class SimulationSettings(Strict):
     table: dict[str, Any] = Field(default_factory=dict)
     chamber: dict[str, Any] = Field(default_factory=dict)
     hidden: dict[str, float | str] = Field(default_factory=dict)  #: effect id -> size, hidden in every unit
+    control: str | None = None  #: address of a simulator in another process, for the hand that turns its units
 
 
 class BenchFile(Strict):

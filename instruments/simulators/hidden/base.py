@@ -1,0 +1,57 @@
+"""What a hidden effect sees, and what it does to a unit."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class State:
+    """The world as a unit feels it at n times."""
+
+    t_s: Array
+    on_s: Array
+    table_dps: Array
+    angle_deg: Array
+    body_dps: Array  #: (n, 3)
+    own_dps: Array  #: (n, axes)
+    rows: list[int]  #: body axis of each recorded axis
+    g: Array  #: (n, 3)
+    sensor_c: Array
+    deep_c: Array
+    air_c: Array
+    run: int
+    mounting: int
+    full_scale_dps: float
+    north_deg: float
+
+
+class HiddenEffect:
+    """One hidden cause; it may keep a memory, since times only rise."""
+
+    id: ClassVar[str]
+    unit: ClassVar[str]  #: of its size, as in the catalogue
+    default: ClassVar[float]  #: a size that a person would notice
+
+    def __init__(self, size: float, seed: list[int]) -> None:
+        self.size = size
+        self.rng = np.random.default_rng([*seed, zlib.crc32(self.id.encode())])
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:  # noqa: ARG002
+        """Return what is added to the output, (n, axes) or something that fits it."""
+        return np.zeros((len(state.t_s), 1))
+
+    def thermometer_c(self, state: State) -> Array:
+        """Return what is added to the thermometer, (n,)."""
+        return np.zeros(len(state.t_s))
+
+    def supply_v(self, t_s: Array) -> Array:
+        """Return what is added to the supply voltage, (n,)."""
+        return np.zeros(len(t_s))

@@ -1,0 +1,158 @@
+"""Hidden effects of gravity, the Earth, magnets, the table and the supply."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from instruments.simulators.hidden.base import Array, HiddenEffect, State
+
+EARTH_DPS = 360.0 / 86164.0905
+
+
+class GSensitivity(HiddenEffect):
+    """A bias in proportion to the specific force along the axis, saturating far beyond 1 g."""
+
+    id, unit, default = "g_sensitivity", "deg/s/g", 0.015
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return self.size * 20.0 * np.arctan(state.g[:, state.rows] / 20.0)
+
+
+class CrossGSensitivity(HiddenEffect):
+    """A bias from specific force across the axis."""
+
+    id, unit, default = "cross_g_sensitivity", "deg/s/g", 0.015
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        across = np.stack([state.g[:, (row + 1) % 3] - 0.6 * state.g[:, (row + 2) % 3] for row in state.rows], axis=1)
+        return self.size * across
+
+
+class GSquaredSensitivity(HiddenEffect):
+    """A bias that does not care for gravity's sign."""
+
+    id, unit, default = "g_squared_sensitivity", "deg/s/g^2", 0.01
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        along = state.g[:, state.rows]
+        return self.size * along * along
+
+
+class CentripetalAcceleration(HiddenEffect):
+    """The unit sits off the axis of rotation; size is what it gives at one g of centripetal acceleration, at 6 cm."""
+
+    id, unit, default = "centripetal_acceleration", "deg/s/g", 0.02
+    radius_m = 0.06
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        spin = np.deg2rad(state.table_dps)
+        return (self.size * spin * spin * self.radius_m / 9.80665)[:, None]
+
+
+class EarthRate(HiddenEffect):
+    """A world at another latitude: an additional rate along the table axis."""
+
+    id, unit, default = "earth_rate", "deg/s", 0.0028
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return self.size * state.g[:, state.rows]
+
+
+class OncePerTurn(HiddenEffect):
+    """Something that goes round once per turn."""
+
+    phase_deg = 0.0
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return (self.size * np.cos(np.radians(state.angle_deg - self.phase_deg)))[:, None]
+
+
+class EarthRateTilt(OncePerTurn):
+    """A tilted axis feels the horizontal Earth rate, once per turn, with its phase to the north."""
+
+    id, unit, default = "earth_rate_tilt", "deg/s", 0.003
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return (self.size * np.cos(np.radians(state.angle_deg - state.north_deg)))[:, None]
+
+
+class MagneticSensitivity(OncePerTurn):
+    """The field of the hall, and a little of its square."""
+
+    id, unit, default = "magnetic_sensitivity", "deg/s", 0.003
+    phase_deg = 71.0
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        heading = np.radians(state.angle_deg - self.phase_deg)
+        return (self.size * (np.cos(heading) + 0.05 * np.cos(heading) ** 2))[:, None]
+
+
+class TableTilt(OncePerTurn):
+    """A table out of level: gravity goes round, and the bearing wobbles twice per turn."""
+
+    id, unit, default = "table_tilt", "deg/s", 0.003
+    phase_deg = 140.0
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        heading = np.radians(state.angle_deg - self.phase_deg)
+        return (self.size * (np.cos(heading) + 0.3 * np.sin(2 * heading)))[:, None]
+
+
+class TableRateRatio(HiddenEffect):
+    """A table that turns faster than its steps say."""
+
+    id, unit, default = "table_rate_ratio", "1", 1e-4
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return self.size * state.own_dps
+
+
+class TableRateRipple(HiddenEffect):
+    """A gear that is not round: four times per turn of the table; size relative to the rate."""
+
+    id, unit, default = "table_rate_ripple", "1", 1e-3
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return self.size * state.own_dps * np.cos(4 * np.radians(state.angle_deg) + 0.9)[:, None]
+
+
+class MissedSteps(HiddenEffect):
+    """A motor that loses steps above four fifths of full scale; size is the share lost."""
+
+    id, unit, default = "missed_steps", "1", 1e-3
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        fast = 0.5 * (1.0 + np.tanh((np.abs(state.table_dps) / state.full_scale_dps - 0.7) / 0.01))
+        return -self.size * state.own_dps * fast[:, None]
+
+
+class SupplySensitivity(HiddenEffect):
+    """A bias that follows a supply voltage which wanders over hours."""
+
+    id, unit, default = "supply_sensitivity", "deg/s/V", 0.05
+
+    def _wander(self, t_s: Array) -> Array:
+        hours = t_s / 3600.0
+        return 0.06 * np.sin(2 * np.pi * hours / 5.3) + 0.04 * np.sin(2 * np.pi * hours / 1.7 + 1.0)
+
+    def supply_v(self, t_s: Array) -> Array:
+        return self._wander(t_s)
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return (self.size * self._wander(state.t_s))[:, None]
+
+
+EFFECTS: tuple[type[HiddenEffect], ...] = (
+    GSensitivity,
+    CrossGSensitivity,
+    GSquaredSensitivity,
+    CentripetalAcceleration,
+    EarthRate,
+    EarthRateTilt,
+    MagneticSensitivity,
+    TableTilt,
+    TableRateRatio,
+    TableRateRipple,
+    MissedSteps,
+    SupplySensitivity,
+)

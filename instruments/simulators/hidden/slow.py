@@ -1,0 +1,153 @@
+"""Hidden effects of temperature and time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from instruments.simulators.hidden.base import Array, HiddenEffect, State
+
+
+class BiasTemperature(HiddenEffect):
+    """A bias that follows temperature, bending away from a line."""
+
+    id, unit, default = "bias_temperature", "deg/s/K", 1e-3
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return (self.size * 60.0 * np.sinh((state.sensor_c - 25.0) / 60.0))[:, None]
+
+
+class ScaleFactorTemperature(HiddenEffect):
+    """A gain that follows temperature."""
+
+    id, unit, default = "scale_factor_temperature", "1/K", 3e-5
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return state.own_dps * np.expm1(self.size * (state.sensor_c - 25.0))[:, None]
+
+
+class TemperatureRate(HiddenEffect):
+    """A Shupe-type error: while the coil's inside and outside differ. Size per K/min of the sensor."""
+
+    id, unit, default = "temperature_rate", "deg/s/(K/min)", 0.02
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        # The sensor lags its deeper part by the rate of change times that part's time constant (7 min).
+        return (self.size * (state.sensor_c - state.deep_c) / 7.0)[:, None]
+
+
+class ThermalLag(HiddenEffect):
+    """A bias that follows a part which the thermometer does not touch; size per K of the difference."""
+
+    id, unit, default = "thermal_lag", "deg/s/K", 0.005
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return (self.size * (state.deep_c - state.sensor_c))[:, None]
+
+
+class ThermalHysteresis(HiddenEffect):
+    """A bias that depends on whether the temperature was approached from below, turning over within some kelvins."""
+
+    id, unit, default = "thermal_hysteresis", "deg/s", 0.005
+
+    def __init__(self, size: float, seed: list[int]) -> None:
+        super().__init__(size, seed)
+        self._play_c: float | None = None
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        width = 4.0
+        side = np.empty(len(state.t_s))
+        for i, temperature in enumerate(state.sensor_c):
+            play = temperature if self._play_c is None else self._play_c
+            self._play_c = min(max(play, temperature - width), temperature + width)
+            side[i] = (temperature - self._play_c) / width
+        return (self.size * side)[:, None]
+
+
+class BiasDrift(HiddenEffect):
+    """A bias that creeps with time, slower and slower; size per hour at first."""
+
+    id, unit, default = "bias_drift", "deg/s/h", 1e-3
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        hours = state.t_s / 3600.0
+        return (self.size * 200.0 * np.log1p(hours / 200.0))[:, None]
+
+
+class WarmUp(HiddenEffect):
+    """A turn-on transient of two time constants."""
+
+    id, unit, default = "warm_up", "deg/s", 0.03
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        on = np.maximum(state.on_s, 0.0)
+        return (self.size * (0.7 * np.exp(-on / 2700.0) + 0.3 * np.exp(-on / 700.0)))[:, None]
+
+
+class SelfHeating(HiddenEffect):
+    """The die is warmer than its thermometer says, more and more after power-on; size in kelvins."""
+
+    id, unit, default = "self_heating", "K", 2.0
+
+    def thermometer_c(self, state: State) -> Array:
+        return -self.size * -np.expm1(-np.maximum(state.on_s, 0.0) / 1300.0)
+
+
+class ThermometerError(HiddenEffect):
+    """A thermometer that is off, a little more where it is warm."""
+
+    id, unit, default = "thermometer_error", "K", 0.5
+
+    def thermometer_c(self, state: State) -> Array:
+        return self.size * (1.0 + 0.1 * np.tanh((state.sensor_c - 25.0) / 40.0))
+
+
+class RunShift(HiddenEffect):
+    """Another bias after every switching-on; size is the standard deviation."""
+
+    id, unit, default = "run_shift", "deg/s", 0.01
+
+    def __init__(self, size: float, seed: list[int]) -> None:
+        super().__init__(size, seed)
+        self._shifts = self.rng.normal(0.0, 1.0, 4096)
+
+    def number(self, state: State) -> int:
+        """Return what the shift is counted by."""
+        return state.run
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        shift = self.size * self._shifts[self.number(state) % len(self._shifts)]
+        return np.full((len(state.t_s), 1), shift)
+
+
+class MountingShift(RunShift):
+    """Another bias after every re-mounting."""
+
+    id = "mounting_shift"
+
+    def number(self, state: State) -> int:
+        return state.mounting
+
+
+class OutsideEtalon(HiddenEffect):
+    """No effect of the catalogue: a ripple over temperature, as from a parasitic reflection."""
+
+    id, unit, default = "outside_etalon", "deg/s", 0.01
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return (self.size * np.sin(2 * np.pi * state.sensor_c / 13.0 + 0.4))[:, None]
+
+
+EFFECTS: tuple[type[HiddenEffect], ...] = (
+    BiasTemperature,
+    ScaleFactorTemperature,
+    TemperatureRate,
+    ThermalLag,
+    ThermalHysteresis,
+    BiasDrift,
+    WarmUp,
+    SelfHeating,
+    ThermometerError,
+    RunShift,
+    MountingShift,
+    OutsideEtalon,
+)

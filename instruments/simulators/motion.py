@@ -1,0 +1,156 @@
+"""Table kinematics: finite moves of whole steps with linear ramps, and the small errors of steps and gears."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Half steps of one electrical cycle of the motor: four full steps.
+ELECTRICAL_CYCLE_STEPS = 8
+#: Moves that are remembered, so that readings that are fetched late still see the motion of their own time.
+REMEMBERED = 16
+
+
+@dataclass(frozen=True)
+class Move:
+    """A trapezoid of whole steps: ramp up, cruise, ramp down."""
+
+    start_s: float
+    from_steps: float
+    direction: int
+    steps: float
+    rate_hz: float
+    acceleration_hz_s: float
+
+    @property
+    def ramp_s(self) -> float:
+        """How long each ramp takes."""
+        return self.rate_hz / self.acceleration_hz_s
+
+    @property
+    def end_s(self) -> float:
+        """When the table is at rest again."""
+        ramps = self.rate_hz**2 / self.acceleration_hz_s
+        return self.start_s + 2 * self.ramp_s + (self.steps - ramps) / self.rate_hz
+
+    def position(self, t_s: Array) -> Array:
+        """Return the commanded position, (n,) steps, at times (n,)."""
+        a, f, tr = self.acceleration_hz_s, self.rate_hz, self.ramp_s
+        t = np.clip(t_s - self.start_s, 0.0, self.end_s - self.start_s)
+        left = (self.end_s - self.start_s) - t
+        travelled = np.where(
+            t < tr,
+            0.5 * a * t * t,
+            np.where(left < tr, self.steps - 0.5 * a * left * left, 0.5 * f * tr + f * (t - tr)),
+        )
+        return self.from_steps + self.direction * travelled
+
+    def rate(self, t_s: float) -> float:
+        """Return the commanded step rate at one time, steps per second, without sign."""
+        t, left = t_s - self.start_s, self.end_s - t_s
+        if t <= 0 or left <= 0:
+            return 0.0
+        return min(self.acceleration_hz_s * t, self.rate_hz, self.acceleration_hz_s * left)
+
+
+def trapezoid(start_s: float, from_steps: float, steps: int, rate_hz: float, acceleration_hz_s: float) -> Move:
+    """Return a move of `steps` (signed); a short one never reaches the full rate."""
+    size = abs(steps)
+    reached = min(rate_hz, math.sqrt(acceleration_hz_s * size)) if size else rate_hz
+    return Move(start_s, from_steps, 1 if steps >= 0 else -1, float(size), reached, acceleration_hz_s)
+
+
+class TableMotion:
+    """The table: where it is commanded to be, and where it really is."""
+
+    def __init__(self, steps_per_turn: int, *, step_error_deg: float = 0.0225, gear_error_deg: float = 0.0) -> None:
+        self.step_deg = 360.0 / steps_per_turn
+        self._steps_per_turn = steps_per_turn
+        self._step_error_deg = step_error_deg
+        self._gear_error_deg = gear_error_deg
+        self._moves = [Move(-1.0, 0.0, 1, 0.0, 1.0, 1.0)]
+
+    def start(self, t_s: float, steps: int, step_rate_hz: float, acceleration_dps2: float) -> float:
+        """Begin a move of whole steps (signed); returns when it will be over."""
+        from_steps = float(self._moves[-1].position(np.array([t_s]))[0])
+        move = trapezoid(t_s, from_steps, steps, step_rate_hz, acceleration_dps2 / self.step_deg)
+        self._moves = [*self._moves[1 - REMEMBERED :], move]
+        return move.end_s
+
+    def abort(self, t_s: float) -> float:
+        """Ramp down from the present rate; returns when the table is at rest."""
+        move = self._moves[-1]
+        rate = move.rate(t_s)
+        if rate <= 0:
+            return t_s
+        # The rest of the move is replaced by the down ramp of a move that cruises at the present rate.
+        ramp_steps = rate**2 / (2 * move.acceleration_hz_s)
+        here = float(move.position(np.array([t_s]))[0])
+        begun = t_s - rate / move.acceleration_hz_s
+        tail = Move(
+            begun, here - move.direction * ramp_steps, move.direction, 2 * ramp_steps, rate, move.acceleration_hz_s
+        )
+        self._moves = [*self._moves[1 - REMEMBERED :], _Cut(move, tail, t_s)]
+        return tail.end_s
+
+    def home(self, t_s: float) -> float:
+        """Turn back to the home switch by the shorter way at a tenth of a turn per second; returns when it is there."""
+        here = float(self._moves[-1].position(np.array([t_s]))[0])
+        away = here - self._steps_per_turn * round(here / self._steps_per_turn)
+        back = Move(t_s, here, -1 if away > 0 else 1, abs(away), 0.1 * self._steps_per_turn, 1e6)
+        settled = Move(back.end_s, 0.0, 1, 0.0, 1.0, 1.0)
+        self._moves = [back, settled] if away else [settled]
+        return back.end_s
+
+    def moving(self, t_s: float) -> bool:
+        """Whether the table turns."""
+        return any(move.start_s <= t_s < move.end_s for move in self._moves if move.steps)
+
+    def commanded_deg(self, t_s: Array) -> Array:
+        """Return the commanded angle, (n,) degrees, unwrapped since home."""
+        return self._steps(t_s) * self.step_deg
+
+    def angle_deg(self, t_s: Array) -> Array:
+        """Return the true angle, (n,) degrees: the commanded one and the errors of steps and gear."""
+        steps = self._steps(t_s)
+        angle = steps * self.step_deg
+        if self._step_error_deg:
+            angle = angle + self._step_error_deg * np.sin(2 * np.pi * steps / ELECTRICAL_CYCLE_STEPS)
+        if self._gear_error_deg:
+            angle = angle + self._gear_error_deg * np.sin(2 * np.pi * steps * 4 / self._steps_per_turn + 0.7)
+        return angle
+
+    def _steps(self, t_s: Array) -> Array:
+        last = self._moves[-1]
+        if len(t_s) and t_s[0] >= last.start_s:
+            return last.position(t_s)
+        which = np.searchsorted([move.start_s for move in self._moves[1:]], t_s, side="right")
+        found = np.empty(len(t_s))
+        for index in np.unique(which):
+            rows = which == index
+            found[rows] = self._moves[index].position(t_s[rows])
+        return found
+
+
+class _Cut(Move):
+    """A move that was aborted: the old one up to a time, then a ramp down."""
+
+    def __init__(self, before: Move, tail: Move, cut_s: float) -> None:
+        super().__init__(cut_s, tail.from_steps, tail.direction, tail.steps, tail.rate_hz, tail.acceleration_hz_s)
+        object.__setattr__(self, "_before", before)
+        object.__setattr__(self, "_tail", tail)
+
+    @property
+    def end_s(self) -> float:
+        return float(self._tail.end_s)
+
+    def position(self, t_s: Array) -> Array:
+        return np.where(t_s < self.start_s, self._before.position(t_s), self._tail.position(t_s))
+
+    def rate(self, t_s: float) -> float:
+        return float(self._tail.rate(t_s))

@@ -1,0 +1,119 @@
+"""Heat: chamber air that ramps and settles, and units that follow it and warm themselves.
+
+Everything is integrated on one grid of whole seconds, each step exact for an input that does not change within it, so
+the result does not depend on when anybody looks.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+GRID_S = 1.0
+
+
+@dataclass
+class Body:
+    """A unit's heat: its sensor follows the air, and a deeper part follows the sensor."""
+
+    sensor_tau_s: float
+    self_heating_c: float
+    heating_tau_s: float
+    deep_tau_s: float
+    sensor_c: float
+    deep_c: float
+    heated_c: float = 0.0
+    powered: bool = False
+
+    def step(self, air_c: float) -> None:
+        """Advance by one second."""
+        self.heated_c += ((self.self_heating_c if self.powered else 0.0) - self.heated_c) * _share(self.heating_tau_s)
+        self.sensor_c += (air_c - self.sensor_c) * _share(self.sensor_tau_s)
+        self.deep_c += (self.sensor_c + self.heated_c - self.deep_c) * _share(self.deep_tau_s)
+
+
+def _share(tau_s: float) -> float:
+    return 1.0 - math.exp(-GRID_S / tau_s)
+
+
+class Heat:
+    """The chamber's air and the units in it, with their history."""
+
+    def __init__(
+        self,
+        start_c: float,
+        ramp_c_per_min: float,
+        air_tau_s: float,
+        bodies: dict[str, Body],
+        noise_c: float,
+        seed: int,
+    ) -> None:
+        self._ramp_per_s = ramp_c_per_min / 60.0
+        self._air_share = _share(air_tau_s)
+        self._target_c = self._ramped_c = self._air_c = start_c
+        self._bodies = bodies
+        self._noise_c = noise_c
+        self._wobble = 0.0
+        self._rng = np.random.default_rng([seed, 11])
+        self._draws: list[float] = []
+        self._air = [start_c]
+        self._sensor = {name: [body.sensor_c + body.heated_c] for name, body in bodies.items()}
+        self._deep = {name: [body.deep_c] for name, body in bodies.items()}
+
+    def set(self, t_s: float, temperature_c: float) -> None:
+        """Give the chamber another set point."""
+        self._advance(t_s)
+        self._target_c = temperature_c
+
+    def power(self, t_s: float, *, on: bool) -> None:
+        """Switch every unit."""
+        self._advance(t_s)
+        for body in self._bodies.values():
+            body.powered = on
+
+    def air_c(self, t_s: float) -> float:
+        """Return the chamber air's temperature at one time."""
+        return float(self._at(self._air, np.array([t_s]))[0])
+
+    def airs_c(self, t_s: Array) -> Array:
+        """Return the chamber air's temperature, (n,)."""
+        return self._at(self._air, t_s)
+
+    def sensor_c(self, name: str, t_s: Array) -> Array:
+        """Return a unit's sensor temperature, (n,)."""
+        return self._at(self._sensor[name], t_s)
+
+    def deep_c(self, name: str, t_s: Array) -> Array:
+        """Return the temperature of the part that its thermometer does not touch, (n,)."""
+        return self._at(self._deep[name], t_s)
+
+    def _at(self, series: list[float], t_s: Array) -> Array:
+        if len(t_s) == 0:
+            return np.zeros(0)
+        self._advance(float(t_s[-1]) + GRID_S)
+        first = max(int(t_s[0] / GRID_S), 0)
+        last = int(t_s[-1] / GRID_S) + 2
+        piece = np.asarray(series[first:last])
+        return np.interp(t_s, (first + np.arange(len(piece))) * GRID_S, piece)
+
+    def _advance(self, t_s: float) -> None:
+        for _ in range(len(self._air) - 1, int(t_s / GRID_S)):
+            distance = self._target_c - self._ramped_c
+            self._ramped_c += math.copysign(min(abs(distance), self._ramp_per_s * GRID_S), distance)
+            self._air_c += (self._ramped_c - self._air_c) * self._air_share
+            self._wobble += -self._wobble * 0.05 + self._noise_c * 0.31 * self._draw()
+            air = self._air_c + self._wobble
+            self._air.append(air)
+            for name, body in self._bodies.items():
+                body.step(air)
+                self._sensor[name].append(body.sensor_c + body.heated_c)
+                self._deep[name].append(body.deep_c)
+
+    def _draw(self) -> float:
+        if not self._draws:
+            self._draws = self._rng.standard_normal(4096).tolist()
+        return self._draws.pop()

@@ -1,0 +1,143 @@
+"""What simulated units are like inside: scale, alignment, bias, noise and heat, by profile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+#: (temperature (n,)) -> (n, axes, 3): what each axis makes of the rate along x, y and z.
+Gain = Callable[[Array], Array]
+#: (temperature (n,)) -> (n, axes)
+Offset = Callable[[Array], Array]
+#: (own rates (n, axes), temperature (n,)) -> (n, axes): what bends
+Bend = Callable[[Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class UnitTruth:
+    """One simulated unit. Nothing here is shared with the models that are fitted to it."""
+
+    axes: tuple[str, ...]
+    gain: Gain
+    offset: Offset
+    bend: Bend | None
+    white_dps_rthz: float
+    instability_dps: float
+    instability_taus_s: tuple[float, ...] = (120.0, 700.0, 3600.0)
+    thermometer_noise_c: float = 0.01
+    sensor_tau_s: float = 720.0
+    self_heating_c: float = 3.0
+    heating_tau_s: float = 600.0
+    deep_tau_s: float = 420.0
+    supply_v: float = 5.0
+    warm_up: Callable[[Array], Array] | None = field(default=None)  #: (seconds since power-on (n,)) -> (n,) deg/s
+
+    def k(self, temperature_c: float) -> Array:
+        """Return K at a temperature, (axes, 3): K[output, input]."""
+        return self.gain(np.array([temperature_c]))[0]
+
+    def b(self, temperature_c: float) -> Array:
+        """Return the bias at a temperature, (axes,) deg/s."""
+        return self.offset(np.array([temperature_c]))[0]
+
+
+def mems_triaxial(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
+    """Make a tri-axial MEMS unit like that of Yang et al. 2018 (K at 25 deg C as published, signs reconstructed)."""
+    published = np.array([[0.0005, 0.0188, 0.0012], [-0.0187, 0.0005, 5.2e-4], [0.0011, 7.5e-4, 0.0017]])
+    k25 = np.eye(3) + published * rng.normal(1.0, 0.05, (3, 3))
+    slope = rng.normal(0.0, 6e-5, 3)
+    level = np.array([-0.0303, -0.0435, -0.0261]) * rng.normal(1.0, 0.1, 3)
+    tilt, curve = rng.normal(0.0, 4e-4, 3), rng.normal(0.0, 5e-6, 3)
+    rows = ["xyz".index(axis) for axis in axes]
+
+    def gain(temperature_c: Array) -> Array:
+        warm = temperature_c[:, None] - 25.0
+        k = np.broadcast_to(k25, (len(temperature_c), 3, 3)).copy()
+        k[:, range(3), range(3)] += slope * warm
+        return k[:, rows]
+
+    def offset(temperature_c: Array) -> Array:
+        warm = temperature_c[:, None] - 25.0
+        return (level + tilt * warm + curve * warm * warm)[:, rows]
+
+    return UnitTruth(axes, gain, offset, None, 0.01, 0.0015)
+
+
+def rd2100(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
+    """Make an E-Core RD2100 like that of Ojeda et al. 2000: about 2 deg/s off at 100 deg/s, and warm-sensitive."""
+    lot = rng.normal(1.0, 0.1, 6)
+    inputs = ["xyz".index(axis) for axis in axes]
+
+    def gain(temperature_c: Array) -> Array:
+        u = (temperature_c - 35.0) / 10.0
+        own = 1.0 + 0.013 * lot[0] + u * (0.008 * lot[1] + u * 0.0015 * lot[2])
+        k = np.zeros((len(temperature_c), len(axes), 3))
+        for row, column in enumerate(inputs):
+            k[:, row, column] = own
+        return k
+
+    def offset(temperature_c: Array) -> Array:
+        u = (temperature_c - 35.0) / 10.0
+        return np.repeat((0.03 * lot[3] + u * (0.07 * lot[4] - 0.02 * u))[:, None], len(axes), axis=1)
+
+    def bend(own_dps: Array, temperature_c: Array) -> Array:
+        v = own_dps / 100.0
+        u = ((temperature_c - 35.0) / 10.0)[:, None]
+        return v * v * (0.08 * lot[5] - v * (0.6 + 0.05 * u))
+
+    return UnitTruth(axes, gain, offset, bend, 0.0014, 0.0011, self_heating_c=1.5)
+
+
+def gyrostar(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
+    """Make a Gyrostar ENV-05S like that of the Weiss report: its offset is the problem, and it warms itself."""
+    lot = rng.normal(1.0, 0.05, 3)
+    inputs = ["xyz".index(axis) for axis in axes]
+
+    def gain(temperature_c: Array) -> Array:
+        k = np.zeros((len(temperature_c), len(axes), 3))
+        hump = 1.0 + 0.003 * lot[0] * np.exp(-(((temperature_c - 23.0) / 6.0) ** 2)) - 0.0003
+        for row, column in enumerate(inputs):
+            k[:, row, column] = hump
+        return k
+
+    def offset(temperature_c: Array) -> Array:
+        volts = 2.488 + 0.06 * lot[1] * np.tanh((temperature_c - 20.5) / 5.5)
+        return np.repeat(((volts - 2.5) / 0.022)[:, None], len(axes), axis=1)
+
+    def warm_up(on_s: Array) -> Array:
+        return 1.2 * lot[2] * np.exp(-on_s / 75.0)
+
+    return UnitTruth(
+        axes, gain, offset, None, 0.003, 0.003, (60.0, 600.0), 0.02, 300.0, 3.0, 100.0, 300.0, 10.0, warm_up
+    )  # fmt: skip
+
+
+PROFILES: dict[str, Callable[[tuple[str, ...], np.random.Generator], UnitTruth]] = {
+    "mems-triaxial": mems_triaxial,
+    "rd2100": rd2100,
+    "gyrostar": gyrostar,
+}
+
+#: The profile of a unit that the bench file says nothing of.
+BY_DRIVER = {"stim300": "mems-triaxial", "kvh-rd2100": "rd2100", "kvh-dsp3000": "rd2100", "gyrostar": "gyrostar"}
+
+
+def make_unit(driver: str, axes: tuple[str, ...], settings: dict[str, Any], seed: list[int]) -> UnitTruth:
+    """Make one unit by its profile, with what the bench file changes in it."""
+    given = dict(settings)
+    profile = given.pop("profile", BY_DRIVER[driver])
+    if profile not in PROFILES:
+        raise ValueError(f"simulated unit profile {profile!r} is not known (there are {', '.join(PROFILES)})")
+    made = PROFILES[profile](axes, np.random.default_rng(seed))
+    known = {
+        name for name in UnitTruth.__dataclass_fields__ if name not in {"axes", "gain", "offset", "bend", "warm_up"}
+    }
+    for name in given:
+        if name not in known:
+            raise ValueError(f"simulated unit has no setting {name!r} (there are {', '.join(sorted(known))})")
+    return UnitTruth(**{**made.__dict__, **given})
