@@ -101,8 +101,16 @@ class BenchFile(Strict):
     @property
     def is_simulated(self) -> bool:
         """Whether every instrument is reached by sim://."""
+        return all(link.startswith("sim://") for link in self._links())
+
+    @property
+    def has_simulated(self) -> bool:
+        """Whether any instrument is reached by sim://."""
+        return any(link.startswith("sim://") for link in self._links())
+
+    def _links(self) -> list[str]:
         links = [self.table.port, self.chamber.port, self.chamber.host, *(g.port or g.host for g in self.gyros)]
-        return all(link is None or link.startswith("sim://") for link in links)
+        return [link for link in links if link is not None]
 
 
 def shipped_benches() -> dict[str, Path]:

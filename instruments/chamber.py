@@ -30,8 +30,12 @@ class Chamber(Protocol):
     """A thermal chamber. Every failure is an InstrumentError."""
 
     name: str
-    limits: ChamberLimits
     safe_c: float  #: the set point that every exit path leaves behind
+
+    @property
+    def limits(self) -> ChamberLimits:
+        """Get what may be asked of the chamber."""
+        ...
 
     def identify(self) -> str:
         """Get what the controller says it is; raises WrongInstrument when it is something else or not in deg C."""

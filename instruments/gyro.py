@@ -63,9 +63,13 @@ class Gyro(Protocol):
 
     name: str
     axes: tuple[str, ...]
-    channels: tuple[Channel, ...]
     sample_rate_hz: float
     limits: GyroLimits
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Get what a reading holds."""
+        ...
 
     def identify(self) -> GyroIdentity:
         """Get who the unit is; raises WrongInstrument when the device tells another serial number."""

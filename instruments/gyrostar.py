@@ -54,7 +54,7 @@ class Gyrostar:
         self.name = settings.name
         self.settings = settings
         self.options = Options.model_validate(settings.options)
-        self.axes = tuple(settings.axes)
+        self.axes: tuple[str, ...] = tuple(settings.axes)
         self.sample_rate_hz = settings.sample_rate_hz or 10.0
         self.limits = GyroLimits(settings.max_rate_dps, settings.min_c, settings.max_c)
         self._clock = clock
@@ -97,7 +97,9 @@ class Gyrostar:
                 raise WrongInstrument(
                     self.name, f"input {channel} has range code 0x{found:04X}, the bench file says 0x{wanted:04X}"
                 )
-        output = {self.axes[0]: {"unit": "V", "offset": self.options.rest_v, "scale": self.options.v_per_dps}}
+        output: dict[str, dict[str, float | str]] = {
+            self.axes[0]: {"unit": "V", "offset": self.options.rest_v, "scale": self.options.v_per_dps}
+        }
         settings = self.settings
         return GyroIdentity(
             settings.serial, settings.model or "muRata Gyrostar ENV-05S", settings.technology or "piezo",

@@ -74,7 +74,6 @@ class Watlow(ABC):
             )
         rounded = round(temperature_c / limits.resolution_c) * limits.resolution_c
         if self._written_c is None or abs(rounded - self._read_setpoint()) > limits.resolution_c / 2:
-            self._before_writing()
             self._write_setpoint(rounded)
         found = self._read_setpoint()
         if abs(found - rounded) > limits.resolution_c / 2:
@@ -85,9 +84,6 @@ class Watlow(ABC):
             )
         self._written_c = rounded
         return found
-
-    def _before_writing(self) -> None:
-        """Make the controller take a static set point."""
 
     def read(self) -> ChamberState:
         """Get air temperature, set point (deg C) and alarms."""

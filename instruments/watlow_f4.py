@@ -69,13 +69,12 @@ class WatlowF4(Watlow):
         low, high = self._read(SETPOINT_LOW, "set point low limit"), self._read(SETPOINT_HIGH, "set point high limit")
         return low / self._scale(), high / self._scale()
 
-    def _before_writing(self) -> None:
+    def _write_setpoint(self, temperature_c: float) -> None:
+        """Write a static set point; a profile that runs would not heed it, so it is ended first."""
         if self._read(MODE, "mode") not in MODE_STATIC:
             self._write(TERMINATE_PROFILE, 1, "terminate the running profile")
         if self.settings.enable_event is not None:
             self._write(EVENT + 10 * (self.settings.enable_event - 1), 1, "switch the chamber on")
-
-    def _write_setpoint(self, temperature_c: float) -> None:
         self._write(SETPOINT, round(temperature_c * self._scale()), "set point")
 
     def _write(self, register: int, value: int, what: str) -> None:
@@ -99,7 +98,7 @@ class WatlowF4(Watlow):
         return raw / self._scale()
 
     def _alarms(self) -> tuple[str, ...]:
-        """Alarms come in on the digital inputs that the bench file names; the F4 has no alarm register that is known."""
+        """Return the digital inputs named in the bench file that are active; no alarm register of an F4 is known."""
         active = []
         for number in self.settings.alarm_inputs:
             state = self._read(INPUT_STATE + 12 * (number - 1), f"digital input {number}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from instruments.bench import BenchFile
@@ -24,11 +26,14 @@ class Adam6017(ModbusDevice):
         if self._options.thermometer_channel is not None:
             ranges[self._options.thermometer_channel] = self._options.thermometer_range_code
         registers = {
-            **{n: Register(lambda t, n=n: self._code(n, t)) for n in range(CHANNELS)},
+            **{n: Register(self._reader(n)) for n in range(CHANNELS)},
             **{200 + n: constant(ranges.get(n, 0x0143)) for n in range(CHANNELS)},
             210: constant(0x6017),
         }
         super().__init__("tcp", registers, faults)
+
+    def _reader(self, channel: int) -> Callable[[float], int]:
+        return lambda t_s: self._code(channel, t_s)
 
     def _code(self, channel: int, t_s: float) -> int:
         if t_s > self._sampled_s:

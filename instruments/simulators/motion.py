@@ -26,6 +26,12 @@ class Move:
     steps: float
     rate_hz: float
     acceleration_hz_s: float
+    counts_from_s: float | None = None  #: a tail that replaces the end of another move counts from here
+
+    @property
+    def from_s(self) -> float:
+        """From when on this move says where the table is."""
+        return self.start_s if self.counts_from_s is None else self.counts_from_s
 
     @property
     def ramp_s(self) -> float:
@@ -93,9 +99,9 @@ class TableMotion:
         here = float(move.position(np.array([t_s]))[0])
         begun = t_s - rate / move.acceleration_hz_s
         tail = Move(
-            begun, here - move.direction * ramp_steps, move.direction, 2 * ramp_steps, rate, move.acceleration_hz_s
+            begun, here - move.direction * ramp_steps, move.direction, 2 * ramp_steps, rate, move.acceleration_hz_s, t_s
         )
-        self._moves = [*self._moves[1 - REMEMBERED :], _Cut(move, tail, t_s)]
+        self._moves = [*self._moves[1 - REMEMBERED :], tail]
         return tail.end_s
 
     def home(self, t_s: float) -> float:
@@ -109,7 +115,7 @@ class TableMotion:
 
     def moving(self, t_s: float) -> bool:
         """Whether the table turns."""
-        return any(move.start_s <= t_s < move.end_s for move in self._moves if move.steps)
+        return self._moves[-1].steps > 0 and t_s < self._moves[-1].end_s
 
     def commanded_deg(self, t_s: Array) -> Array:
         """Return the commanded angle, (n,) degrees, unwrapped since home."""
@@ -127,30 +133,11 @@ class TableMotion:
 
     def _steps(self, t_s: Array) -> Array:
         last = self._moves[-1]
-        if len(t_s) and t_s[0] >= last.start_s:
+        if len(t_s) and t_s[0] >= last.from_s:
             return last.position(t_s)
-        which = np.searchsorted([move.start_s for move in self._moves[1:]], t_s, side="right")
+        which = np.searchsorted([move.from_s for move in self._moves[1:]], t_s, side="right")
         found = np.empty(len(t_s))
         for index in np.unique(which):
             rows = which == index
             found[rows] = self._moves[index].position(t_s[rows])
         return found
-
-
-class _Cut(Move):
-    """A move that was aborted: the old one up to a time, then a ramp down."""
-
-    def __init__(self, before: Move, tail: Move, cut_s: float) -> None:
-        super().__init__(cut_s, tail.from_steps, tail.direction, tail.steps, tail.rate_hz, tail.acceleration_hz_s)
-        object.__setattr__(self, "_before", before)
-        object.__setattr__(self, "_tail", tail)
-
-    @property
-    def end_s(self) -> float:
-        return float(self._tail.end_s)
-
-    def position(self, t_s: Array) -> Array:
-        return np.where(t_s < self.start_s, self._before.position(t_s), self._tail.position(t_s))
-
-    def rate(self, t_s: float) -> float:
-        return float(self._tail.rate(t_s))

@@ -186,7 +186,7 @@ class SimulatedGyro:
         )
 
     def _drifts(self, t_s: Array) -> Array:
-        """Return the bias instability, (n, axes): Ornstein-Uhlenbeck processes on a grid of seconds, straight between."""
+        """Return the bias instability, (n, axes): Ornstein-Uhlenbeck on a grid of seconds, straight lines between."""
         out = np.empty((len(t_s), len(self.truth.axes)))
         start = 0
         while start < len(t_s):

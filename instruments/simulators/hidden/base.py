@@ -44,7 +44,7 @@ class HiddenEffect:
         self.size = size
         self.rng = np.random.default_rng([*seed, zlib.crc32(self.id.encode())])
 
-    def error_dps(self, state: State, rate_dps: Array) -> Array:  # noqa: ARG002
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
         """Return what is added to the output, (n, axes) or something that fits it."""
         return np.zeros((len(state.t_s), 1))
 

@@ -1,0 +1,92 @@
+"""Opening a bench: every driver by name, and one thing to close."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from instruments.arrick import ArrickC4
+from instruments.bench import BenchFile
+from instruments.chamber import Chamber
+from instruments.clock import Clock
+from instruments.errors import InstrumentError
+from instruments.gyro import Gyro
+from instruments.gyrostar import Gyrostar
+from instruments.hand import Hand, NoHand, RemoteHand, SimulatedHand
+from instruments.kvh import KvhDsp3000, Rd2100
+from instruments.ports import Ports, Simulation, open_simulation
+from instruments.stim import Stim300
+from instruments.table import RateTable
+from instruments.watlow_f4 import WatlowF4
+from instruments.watlow_f4t import WatlowF4T
+
+TABLES: dict[str, Callable[..., RateTable]] = {"arrick-c4": ArrickC4}
+CHAMBERS: dict[str, Callable[..., Chamber]] = {"watlow-f4": WatlowF4, "watlow-f4t": WatlowF4T}
+GYROS: dict[str, Callable[..., Gyro]] = {
+    "kvh-dsp3000": KvhDsp3000,
+    "kvh-rd2100": Rd2100,
+    "stim300": Stim300,
+    "gyrostar": Gyrostar,
+}
+
+
+@dataclass(frozen=True)
+class Bench:
+    """The instruments of one bench, opened; nothing was sent to any of them yet."""
+
+    table: RateTable
+    chamber: Chamber
+    gyros: dict[str, Gyro]
+    hand: Hand
+    simulation: Simulation | None = None
+
+    def close(self) -> None:
+        """Close every link, also when another cannot be closed; raises the first failure at the end."""
+        closers: list[Callable[[], None]] = [self.table.close, self.chamber.close]
+        failures: list[Exception] = []
+        for close in [*(gyro.stop for gyro in self.gyros.values()), *closers]:
+            try:
+                close()
+            except (InstrumentError, OSError) as failure:
+                failures.append(failure)
+        if failures:
+            raise failures[0]
+
+
+def open_bench(bench: BenchFile, clock: Clock) -> Bench:
+    """Make the drivers of a bench. No byte is sent before one of them is used."""
+    simulation = open_simulation(bench, clock) if bench.has_simulated else None
+    ports = Ports(clock, simulation)
+    return Bench(
+        TABLES[bench.table.driver](bench.table, ports, clock),
+        CHAMBERS[bench.chamber.driver](bench.chamber, ports, clock),
+        {gyro.name: GYROS[gyro.driver](gyro, ports, clock) for gyro in bench.gyros},
+        _hand(bench, simulation, clock),
+        simulation,
+    )
+
+
+def _hand(bench: BenchFile, simulation: Simulation | None, clock: Clock) -> Hand:
+    if simulation is not None:
+        return SimulatedHand(simulation, clock)
+    if bench.simulation is not None and bench.simulation.control is not None:
+        return RemoteHand(bench.simulation.control)
+    return NoHand()
+
+
+def check(bench: BenchFile, clock: Clock) -> list[tuple[str, bool, str]]:
+    """Talk to every instrument; returns (device, whether it answered, what). Nothing moves."""
+    opened = open_bench(bench, clock)
+    asked: dict[str, Any] = {"table": opened.table, "chamber": opened.chamber, **opened.gyros}
+    found = []
+    try:
+        for name, device in asked.items():
+            try:
+                said = device.identify()
+                found.append((name, True, said if isinstance(said, str) else f"{said.model}, serial {said.serial}"))
+            except InstrumentError as error:
+                found.append((name, False, str(error)))
+    finally:
+        opened.close()
+    return found

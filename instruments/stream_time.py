@@ -1,0 +1,42 @@
+"""When the readings of a stream were taken: spaced by the device's own period, anchored to the Clock."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: How much of the distance to the Clock is made up at each read: slow, so that no jitter of the wire is invented.
+FOLLOW = 0.02
+#: A stream further behind than this many periods has lost readings that nothing else showed.
+LOST_PERIODS = 12.0
+
+
+class StreamTime:
+    """Times of a stream of evenly spaced readings, strictly rising."""
+
+    def __init__(self, period_s: float, now_s: float) -> None:
+        self._period_s = period_s
+        self._anchor_s = now_s
+        self._index = -1
+        self._begun = False
+
+    def times(self, advance: NDArray[np.int64], now_s: float, wrap: int = 0) -> tuple[NDArray[np.float64], int]:
+        """Return the clock times (n,) of readings that follow each other by `advance` (n,) periods, and the losses.
+
+        The newest cannot be later than now. `wrap` is how many lost readings leave a device's counter as it was; where
+        the stream falls behind the Clock by whole wraps, they are counted as lost (0: any number of readings).
+        """
+        index = self._index + np.cumsum(advance)
+        newest = int(index[-1])
+        if not self._begun:
+            self._anchor_s, self._begun = now_s - newest * self._period_s, True
+        behind_s = now_s - (self._anchor_s + newest * self._period_s)
+        lost = 0
+        if behind_s > LOST_PERIODS * self._period_s:
+            unit = wrap or 1
+            lost = unit * round(behind_s / self._period_s / unit)
+            index = index + lost
+            behind_s -= lost * self._period_s
+        self._anchor_s += behind_s if behind_s < 0 else FOLLOW * max(behind_s - self._period_s, 0.0)
+        self._index = int(index[-1])
+        return self._anchor_s + index * self._period_s, lost
