@@ -55,24 +55,30 @@ def limits_of(bench: BenchFile) -> BenchLimits:
 
 
 def bench_for(recipe: Recipe) -> str:
-    """Return the shipped simulated bench that fits a recipe best: with its axes, able to do it whole where one can."""
+    """Return the shipped simulated bench that fits a recipe best.
+
+    One that is named after it; else the one with the fewest axes that can do it whole, the fastest of these first.
+    """
+    if f"{recipe.name}-sim" in shipped_benches():
+        return f"{recipe.name}-sim"
     axes = {position.lstrip("-") for position in recipe.positions}
-    fitting = []
+    fitting: list[tuple[bool, int, float, str]] = []
     for name, path in shipped_benches().items():
         bench = load_bench(str(path))
         recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
-        if not bench.is_simulated or not axes <= recorded:
-            continue
-        try:
-            make_plan(recipe, limits_of(bench))
-            fitting.append((len(recorded), name))
-        except PlanRefused:
-            fitting.append((10 + len(recorded), name))
+        if bench.is_simulated and axes <= recorded:
+            fitting.append((not _can_do(recipe, bench), len(recorded), -bench.gyros[0].max_rate_dps, name))
     if not fitting:
-        raise BadBench(
-            f"recipe {recipe.name}: no shipped bench records axes {sorted(axes)}; name one with --bench FILE"
-        )
-    return min(fitting)[1]
+        raise BadBench(f"recipe {recipe.name}: no shipped bench records axes {sorted(axes)}; name one with --bench FILE")
+    return min(fitting)[-1]
+
+
+def _can_do(recipe: Recipe, bench: BenchFile) -> bool:
+    try:
+        make_plan(recipe, limits_of(bench))
+    except PlanRefused:
+        return False
+    return True
 
 
 def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tuple[Plan, BenchFile]:

@@ -160,23 +160,22 @@ class StoreJournal:
         )
 
     def environment(self, sample: EnvironmentSample) -> None:
-        """Record the environment, once for each unit."""
-        with self._database.writing() as connection:
-            connection.execute(
-                sa.insert(tables.environment),
-                [
-                    {
-                        "recording_id": recording,
-                        "t_s": sample.t_s,
-                        "run": sample.run,
-                        "temperature_c": sample.gyro_c[gyro],
-                        "chamber_c": sample.chamber_c,
-                        "chamber_setpoint_c": sample.chamber_setpoint_c,
-                    }
-                    for gyro, recording in self._recordings.items()
-                    if gyro in sample.gyro_c
-                ],
-            )
+        """Record the environment, once for each unit whose thermometer was read."""
+        rows = [
+            {
+                "recording_id": recording,
+                "t_s": sample.t_s,
+                "run": sample.run,
+                "temperature_c": sample.gyro_c[gyro],
+                "chamber_c": sample.chamber_c,
+                "chamber_setpoint_c": sample.chamber_setpoint_c,
+            }
+            for gyro, recording in self._recordings.items()
+            if gyro in sample.gyro_c
+        ]
+        if rows:
+            with self._database.writing() as connection:
+                connection.execute(sa.insert(tables.environment), rows)
 
     def event(self, event: Event, t_s: float, at: datetime) -> None:
         """Record something worth telling a person."""
