@@ -69,7 +69,9 @@ def bench_for(recipe: Recipe) -> str:
         if bench.is_simulated and axes <= recorded:
             fitting.append((not _can_do(recipe, bench), len(recorded), -bench.gyros[0].max_rate_dps, name))
     if not fitting:
-        raise BadBench(f"recipe {recipe.name}: no shipped bench records axes {sorted(axes)}; name one with --bench FILE")
+        raise BadBench(
+            f"recipe {recipe.name}: no shipped bench records axes {sorted(axes)}; name one with --bench FILE"
+        )
     return min(fitting)[-1]
 
 

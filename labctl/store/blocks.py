@@ -93,7 +93,7 @@ def _compress(stack: NDArray[Any], effort: int) -> bytes:
 
 
 def _decompress(data: bytes) -> bytes:
-    return bytes(blosc2.decompress2(data)) if data else b""
+    return bytes(blosc2.decompress2(data, nthreads=1)) if data else b""
 
 
 def _shrink(values: NDArray[np.int64]) -> tuple[list[Any], NDArray[Any] | None]:

@@ -13,9 +13,13 @@ from instruments.gyro import Readings
 from labctl.store import blocks, tables
 from labctl.store.database import Database
 from labctl.store.means import means_rows
-from labctl.store.recordings import block_row, scaled
+from labctl.store.recordings import block_row, blocks_of, scaled
 from procedures.journal import CampaignState, DataSetHeader, DataSetState, EnvironmentSample, Event
 from procedures.steps import StepResult
+
+#: Made once: a statement that is built anew for every second of a campaign costs more than writing it.
+_ADD_BLOCK = sa.insert(tables.sample_blocks)
+_ADD_ENVIRONMENT = sa.insert(tables.environment)
 
 ENDED = frozenset({CampaignState.DONE, CampaignState.ABORTED, CampaignState.FAILED})
 
@@ -36,8 +40,8 @@ class StoreJournal:
         self._channels = {gyro: channels for gyro, _, channels in rows}
         self._kinds: dict[int, str] = {row[0]: row[1] for row in kinds}
         self._power_on_s: float | None = None
-        self._seq: dict[tuple[int, str], int] = {}
-        self._open: dict[int, DataSetHeader] = {}
+        #: What the open data sets' blocks hold, so that closing one need not read it back.
+        self._open: dict[tuple[int, str], list[dict[str, NDArray[Any]]]] = {}
 
     def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:
         """Record a change of state and why, as the campaign's state and as an event."""
@@ -104,7 +108,6 @@ class StoreJournal:
                     for recording in self._recordings.values()
                 ],
             )
-        self._open[number] = header
         return number
 
     def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
@@ -112,13 +115,14 @@ class StoreJournal:
         if not len(readings) and not readings.lost and not readings.damaged:
             return
         recording = self._recordings[gyro]
-        seq = self._seq.get((dataset, gyro), 0)
+        parts = self._open.setdefault((dataset, gyro), [])
         d = tables.data_sets
         with self._database.writing() as connection:
             if len(readings):
-                block = blocks.pack(_columns(readings, chamber_c))
-                connection.execute(sa.insert(tables.sample_blocks).values(**block_row(recording, dataset, seq, block)))
-                self._seq[dataset, gyro] = seq + 1
+                columns = _columns(readings, chamber_c)
+                row = block_row(recording, dataset, len(parts), blocks.pack(columns))
+                connection.execute(_ADD_BLOCK, row)
+                parts.append(columns)
             if readings.lost or readings.damaged:
                 connection.execute(
                     sa.update(d)
@@ -130,34 +134,38 @@ class StoreJournal:
         """Record that no more readings follow: figures are derived and blocks packed into one, in one transaction."""
         with self._database.writing() as connection:
             for gyro, recording in self._recordings.items():
-                self._close_one(connection, gyro, recording, dataset, state, reason)
-        self._open.pop(dataset, None)
+                raw = self._raw_of(connection, gyro, recording, dataset)
+                self._close_one(connection, gyro, recording, dataset, state, reason, raw)
+
+    def _raw_of(
+        self, connection: sa.Connection, gyro: str, recording: int, dataset: int
+    ) -> dict[str, NDArray[Any]] | None:
+        """Return a data set's readings as the device sent them; None when there are none."""
+        parts = self._open.pop((dataset, gyro), None) or blocks_of(connection, recording, dataset)
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else None
 
     def _close_one(
-        self, connection: sa.Connection, gyro: str, recording: int, dataset: int, state: DataSetState, reason: str
+        self,
+        connection: sa.Connection,
+        gyro: str,
+        recording: int,
+        dataset: int,
+        state: DataSetState,
+        reason: str,
+        raw: dict[str, NDArray[Any]] | None,
     ) -> None:
         d, b = tables.data_sets, tables.sample_blocks
-        mine = (b.c.recording_id == recording, b.c.number == dataset)
-        rows = connection.execute(sa.select(b.c.n, b.c.codec, b.c.crc32, b.c.data).where(*mine).order_by(b.c.seq)).all()
-        parts = [blocks.unpack(blocks.Block(*row)) for row in rows]
+        this = (d.c.recording_id == recording, d.c.number == dataset)
         n = 0
-        if parts:
-            raw = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        if raw is not None:
             valid = raw["valid"] != 0
             n = int(valid.sum())
-            head = connection.execute(
-                sa.select(d).where(d.c.recording_id == recording, d.c.number == dataset)
-            ).mappings().one()  # fmt: skip
+            head = connection.execute(sa.select(d).where(*this)).mappings().one()
             means = means_rows(recording, dataset, scaled(raw, self._channels[gyro], dict(head)), valid)
             connection.execute(sa.insert(tables.data_set_means), means)
-            connection.execute(sa.delete(b).where(*mine))
-            packed = block_row(recording, dataset, 0, blocks.pack(raw, blocks.FINAL))
-            connection.execute(sa.insert(b).values(**packed))
-        connection.execute(
-            sa.update(d)
-            .where(d.c.recording_id == recording, d.c.number == dataset)
-            .values(state=state.value, reason=reason, n=n)
-        )
+            connection.execute(sa.delete(b).where(b.c.recording_id == recording, b.c.number == dataset))
+            connection.execute(_ADD_BLOCK, block_row(recording, dataset, 0, blocks.pack(raw, blocks.FINAL)))
+        connection.execute(sa.update(d).where(*this).values(state=state.value, reason=reason, n=n))
 
     def environment(self, sample: EnvironmentSample) -> None:
         """Record the environment, once for each unit whose thermometer was read."""
@@ -175,7 +183,7 @@ class StoreJournal:
         ]
         if rows:
             with self._database.writing() as connection:
-                connection.execute(sa.insert(tables.environment), rows)
+                connection.execute(_ADD_ENVIRONMENT, rows)
 
     def event(self, event: Event, t_s: float, at: datetime) -> None:
         """Record something worth telling a person."""

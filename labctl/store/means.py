@@ -26,7 +26,7 @@ def means_rows(
     for name, values in columns.items():
         if name in NOT_CHANNELS or values.dtype.kind not in "fiu":
             continue
-        figures = statistics(values[valid].astype(np.float64))
+        figures = statistics(values[valid].astype(np.float64), spectrum=name.startswith("gyro_"))
         rows.append(
             {
                 "recording_id": recording,
@@ -34,7 +34,7 @@ def means_rows(
                 "channel": name,
                 "mean": figures.mean,
                 "std": figures.std,
-                "white_std": figures.white_std if name.startswith("gyro_") else None,
+                "white_std": figures.white_std,
                 "n": figures.n,
             }
         )

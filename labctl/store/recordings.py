@@ -90,7 +90,7 @@ class Recordings:
         with self._database.reading() as connection:
             environment = _environment(connection, recording)
             if head.kind != "samples":
-                return Recording(info, _blocks_of(connection, recording, WHOLE_TABLE)[0], environment)
+                return Recording(info, blocks_of(connection, recording, WHOLE_TABLE)[0], environment)
             columns = points_columns(connection, recording)
         return Recording(info.model_copy(update={"kind": "points"}), columns, environment)
 
@@ -129,7 +129,7 @@ class Recordings:
             channels = connection.scalar(
                 sa.select(tables.recordings.c.channels).where(tables.recordings.c.id == recording)
             )
-            raw = _joined(_blocks_of(connection, recording, number))
+            raw = _joined(blocks_of(connection, recording, number))
         return scaled(raw, channels, dict(head)) if channels else raw
 
 
@@ -268,7 +268,8 @@ def block_row(recording: int, number: int, seq: int, block: blocks.Block) -> dic
     }
 
 
-def _blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[Any]]]:
+def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[Any]]]:
+    """Return the unpacked blocks of a data set, in order."""
     b = tables.sample_blocks.c
     query = (
         sa.select(b.n, b.codec, b.crc32, b.data).where(b.recording_id == recording, b.number == number).order_by(b.seq)

@@ -23,15 +23,15 @@ class Statistics:
     n: int
 
 
-def statistics(values: NDArray[np.float64]) -> Statistics:
-    """Return the figures of valid readings (n,)."""
+def statistics(values: NDArray[np.float64], *, spectrum: bool) -> Statistics:
+    """Return the figures of valid readings (n,); the white level only with `spectrum`."""
     n = len(values)
     if n == 0:
         return Statistics(None, None, None, 0)
     return Statistics(
         float(values.mean()),
         float(values.std(ddof=1)) if n > 1 else None,
-        white_std(values) if n >= LEAST_FOR_SPECTRUM else None,
+        white_std(values) if spectrum and n >= LEAST_FOR_SPECTRUM else None,
         n,
     )
 
