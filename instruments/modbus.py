@@ -1,92 +1,67 @@
-"""The one adapter around pymodbus (pinned: its minor releases break its API): links, register types, errors, retries.
+"""The one adapter around pymodbus (pinned: its minor releases break its API): links, registers, errors, retries.
 
-A simulated instrument is reached through the same clients: only the socket or port under them is another, and it
-answers in the calling thread, so that virtual time stays deterministic.
+A driver declares its registers as data and asks for their values; everything that can go wrong on the way comes out as
+an instrument error that names device, quantity and register. A simulated instrument is reached through the same
+clients: only the socket or port under them is another.
 """
 
 from __future__ import annotations
 
-import socket
-from typing import TYPE_CHECKING, Any, Literal
+import struct
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
 
 from pymodbus import FramerType, ModbusException
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+from pymodbus.exceptions import ConnectionException
 from pymodbus.pdu import ModbusPDU
 
-from instruments.clock import Clock
-from instruments.errors import LinkError, NoReply, Refused
+from instruments.clock import Clock, sleep_until
+from instruments.errors import Garbled, InstrumentError, LimitError, LinkError, NoReply, Refused
+from instruments.modbus_registers import Register, WordOrder
 
 if TYPE_CHECKING:
     from instruments.simulators.device import SimulatedDevice
 
-RETRIES = 3
-PAUSE_S = 0.03
+Client = ModbusTcpClient | ModbusSerialClient
+#: How long to wait before each further try. A late reply of the failed try arrives meanwhile, and is thrown away.
+RETRY_PAUSES_S = (0.1, 1.0)
+TRIES = 1 + len(RETRY_PAUSES_S)
+ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ACKNOWLEDGED, BUSY = 1, 2, 5, 6
 EXCEPTIONS = {
-    1: "it does not know the function",
-    2: "it has no such register, or the register cannot be written",
+    ILLEGAL_FUNCTION: "it does not know the function",
+    ILLEGAL_ADDRESS: "it has no such register, or the register cannot be written",
     3: "it does not accept the value",
     4: "it failed inside",
-    6: "it is busy",
+    ACKNOWLEDGED: "it needs more time",
+    BUSY: "it is busy",
 }
+#: What pymodbus's decoders let out when bytes are not what they expect.
+UNDECODABLE = (IndexError, KeyError, ValueError, struct.error)
+CHECK = "check power, cable and address"
 
 
-class _PairedTcpClient(ModbusTcpClient):
-    """A Modbus TCP client on one end of a socket pair; the instrument answers at the other while it sends."""
+class RefusedRegister(Refused):
+    """A Modbus exception reply; `code` is its number."""
 
-    def __init__(self, device: SimulatedDevice, clock: Clock, **settings: Any) -> None:
-        super().__init__("simulated", **settings)
-        self._device, self._clock = device, clock
-        self._far: socket.socket | None = None
-
-    def connect(self) -> bool:
-        """Open the pair."""
-        if self.socket is None:
-            self.socket, self._far = socket.socketpair()
-            self.socket.settimeout(self.comm_params.timeout_connect)
-        return True
-
-    def close(self) -> None:
-        """Close both ends."""
-        super().close()
-        if self._far is not None:
-            self._far.close()
-            self._far = None
-
-    def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
-        """Send a request, and let the instrument answer it."""
-        sent = super().send(request, addr)
-        assert self._far is not None
-        self._device.receive(self._far.recv(65536), self._clock.now_s())
-        answer = self._device.transmit(self._clock.now_s())
-        if answer:
-            self._far.sendall(answer)
-        return int(sent)
-
-
-class _SimulatedRtuClient(ModbusSerialClient):
-    """A Modbus RTU client on a simulated serial port."""
-
-    def __init__(self, device: SimulatedDevice, clock: Clock, **settings: Any) -> None:
-        super().__init__("simulated", framer=FramerType.RTU, **settings)
-        self._device, self._clock = device, clock
-
-    def connect(self) -> bool:
-        """Open the port."""
-        from instruments.simulators.sim_serial import SimSerial  # noqa: PLC0415  a real bench never loads it
-
-        if self.socket is None:
-            self.socket = SimSerial(self._device, self._clock, timeout=self.comm_params.timeout_connect)
-            self.last_frame_end = None
-        return True
+    def __init__(self, device: str, what: str, code: int) -> None:
+        reason = EXCEPTIONS.get(code, "for no reason that is known")
+        super().__init__(device, f"refused to {what}: Modbus exception {code}, {reason}")
+        self.code = code
 
 
 def connect_tcp(
     host: str, tcp_port: int, *, device: str, clock: Clock, timeout_s: float, at: SimulatedDevice | None
 ) -> ModbusTcpClient:
     """Open a Modbus TCP link; `at` is the simulated instrument where the address is one. Raises LinkError."""
-    settings: dict[str, Any] = {"timeout": clock.wall_s(timeout_s), "retries": 0, "reconnect_delay": 0}
-    client = _PairedTcpClient(at, clock, **settings) if at else ModbusTcpClient(host, port=tcp_port, **settings)
-    if not client.connect():
+    wall_s = clock.wall_s(timeout_s)
+    if at is None:
+        client = ModbusTcpClient(host, port=tcp_port, timeout=wall_s, retries=0)
+    else:
+        from instruments.simulators.modbus_clients import PairedTcpClient  # noqa: PLC0415  a real bench never loads it
+
+        client = PairedTcpClient(at, clock, timeout_s, timeout=wall_s, retries=0)
+    if not _connect(client):
         raise LinkError(device, f"no Modbus TCP at {host}:{tcp_port}; check address, cable and that it is switched on")
     return client
 
@@ -94,100 +69,186 @@ def connect_tcp(
 def connect_rtu(
     url: str, *, device: str, clock: Clock, baudrate: int, timeout_s: float, at: SimulatedDevice | None
 ) -> ModbusSerialClient:
-    """Open a Modbus RTU link; `at` is the simulated instrument where the address is one. Raises LinkError."""
-    settings: dict[str, Any] = {"baudrate": baudrate, "timeout": clock.wall_s(timeout_s), "retries": 0}
-    client = (
-        _SimulatedRtuClient(at, clock, **settings) if at else ModbusSerialClient(url, framer=FramerType.RTU, **settings)
-    )
-    if not client.connect():
+    """Open a Modbus RTU link (8N1); `at` is the simulated instrument where the address is one. Raises LinkError."""
+    wall_s = clock.wall_s(timeout_s)
+    if at is None:
+        client = ModbusSerialClient(url, framer=FramerType.RTU, baudrate=baudrate, timeout=wall_s, retries=0)
+    else:
+        from instruments.simulators.modbus_clients import SimulatedRtuClient  # noqa: PLC0415  a real bench: never
+
+        client = SimulatedRtuClient(at, clock, timeout_s, baudrate=baudrate, timeout=wall_s, retries=0)
+    if not _connect(client):
         raise LinkError(device, f"serial port {url} cannot be opened; check its name, the cable and who else uses it")
     return client
 
 
-Client = ModbusTcpClient | ModbusSerialClient
-
-
 class Registers:
-    """The registers of one instrument: typed reads and writes, bounded retries, every failure an instrument error."""
+    """The registers of one instrument: typed reads and writes, bounded retries, every failure an instrument error.
 
-    def __init__(self, device: str, address: int, clock: Clock, open_client: Any) -> None:
+    After a failure the link is closed and opened again for the next try; transaction ids go on counting (TCP) and
+    unread bytes are dropped before each request (RTU), so a late reply is never taken for the answer to a new request.
+    For one thread; `pause_s` is the least time between two requests.
+    """
+
+    def __init__(
+        self,
+        device: str,
+        address: int,
+        clock: Clock,
+        open_client: Callable[[], Client],
+        *,
+        pause_s: float = 0.0,
+        word_order: WordOrder = "little",
+        write_function: Literal[6, 16] = 6,
+    ) -> None:
         self._device, self._address, self._clock = device, address, clock
         self._open_client = open_client
+        self._pause_s, self._word_order = pause_s, word_order
+        self._write_function: Literal[6, 16] = write_function
         self._client: Client | None = None
+        self._quiet_until_s = 0.0
+        self._heard = b""
 
-    def read_int16(self, register: int, what: str) -> int:
-        """Get a signed 16-bit register."""
-        raw = self.read(register, 1, what)[0]
-        return raw - 0x10000 if raw >= 0x8000 else raw
+    def get(self, register: Register) -> float:
+        """Get the value of a register; raises Garbled when it lies outside what the register can hold."""
+        value = register.decode(self.words(register), self._word_order)
+        if not register.holds(value):
+            raise Garbled(
+                self._device,
+                f"{register} reads {value:g} {register.unit}, possible are {register.low:g} to {register.high:g}; "
+                "check the sensor, the word order and that the bench file names the right driver",
+            )
+        return value
 
-    def read(self, register: int, count: int, what: str, *, function: Literal[3, 4] = 3) -> list[int]:
-        """Get `count` unsigned 16-bit registers."""
+    def get_int(self, register: Register) -> int:
+        """Get the value of a 16-bit register; raises as `get` does."""
+        return int(self.get(register))
+
+    def words(self, register: Register, count: int | None = None) -> list[int]:
+        """Get `count` unsigned 16-bit words from a register on; by default as many as it takes."""
+        asked = register.words if count is None else count
+        function = register.read_function
 
         def ask(client: Client) -> ModbusPDU:
             read = client.read_holding_registers if function == 3 else client.read_input_registers
-            return read(register, count=count, device_id=self._address)
+            return read(register.number, count=asked, device_id=self._address)
 
-        found = list(self._exchange(ask, register, f"read {what}").registers)
-        if len(found) != count:
-            raise LinkError(self._device, f"sent {len(found)} registers instead of {count} for {what}")
-        return found
+        def fits(answer: ModbusPDU) -> bool:
+            return answer.function_code == function and len(answer.registers) == asked
 
-    def read_float(self, register: int, what: str, word_order: Literal["little", "big"]) -> float:
-        """Get a 32-bit float of two registers."""
-        words = self.read(register, 2, what)
-        value = ModbusTcpClient.convert_from_registers(words, ModbusTcpClient.DATATYPE.FLOAT32, word_order=word_order)
-        return float(value)  # type: ignore[arg-type]
+        return list(self._exchange(f"read {register}", ask, fits).registers)
 
-    def write_float(self, register: int, value: float, what: str, word_order: Literal["little", "big"]) -> None:
-        """Set a 32-bit float of two registers (function 16)."""
-        words = ModbusTcpClient.convert_to_registers(value, ModbusTcpClient.DATATYPE.FLOAT32, word_order=word_order)
-        self._exchange(
-            lambda client: client.write_registers(register, words, device_id=self._address), register, f"write {what}"
-        )
+    def put(self, register: Register, value: float) -> None:
+        """Set a register: an integer as two's complement, a float as two words. Raises LimitError, RefusedRegister.
 
-    def write(self, register: int, value: int, what: str, *, function: Literal[6, 16] = 6) -> None:
-        """Set one 16-bit register; a negative value as two's complement."""
-        word = value & 0xFFFF
+        A 16-bit register is written by the preferred function; where the instrument does not know it, by the other
+        one from then on. A float always takes function 16.
+        """
+        if register.access == "r":
+            raise LimitError(self._device, f"{register} can only be read; nothing was sent")
+        if not register.holds(value):
+            raise LimitError(
+                self._device,
+                f"{register} takes {register.low:g} to {register.high:g} {register.unit}, not {value:g}; "
+                "nothing was sent",
+            )
+        words = register.encode(value, self._word_order)
+        if len(words) > 1:
+            self._write(register, words, 16)
+            return
+        try:
+            self._write(register, words, self._write_function)
+        except RefusedRegister as refused:
+            if refused.code != ILLEGAL_FUNCTION:
+                raise
+            self._write_function = 16 if self._write_function == 6 else 6
+            self._write(register, words, self._write_function)
 
+    def close(self) -> None:
+        """Control the link: close it; safe to call twice. The next request opens it again."""
+        if self._client is not None:
+            self._client.close()  # type: ignore[no-untyped-call]  # pymodbus left this one untyped
+
+    def _write(self, register: Register, words: list[int], function: Literal[6, 16]) -> None:
         def ask(client: Client) -> ModbusPDU:
             if function == 6:
-                return client.write_register(register, word, device_id=self._address)
-            return client.write_registers(register, [word], device_id=self._address)
+                return client.write_register(register.number, words[0], device_id=self._address)
+            return client.write_registers(register.number, words, device_id=self._address)
 
-        self._exchange(ask, register, f"write {what}")
+        def fits(answer: ModbusPDU) -> bool:
+            echoed = answer.registers == words if function == 6 else answer.count == len(words)
+            return answer.function_code == function and answer.address == register.number and echoed
 
-    def _exchange(self, ask: Any, register: int, what: str) -> ModbusPDU:
-        failure: Exception | None = None
-        for attempt in range(RETRIES):
-            if attempt:
-                self._clock.sleep(PAUSE_S * 2**attempt)
+        self._exchange(f"write {register}", ask, fits)
+
+    def _exchange(self, what: str, ask: Callable[[Client], ModbusPDU], fits: Callable[[ModbusPDU], bool]) -> ModbusPDU:
+        """Ask, up to three times; returns the answer or raises what went wrong at the last try."""
+        begun_s = self._clock.now_s()
+        failure: InstrumentError | None = None
+        for pause_s in (0.0, *RETRY_PAUSES_S):
+            self._clock.sleep(pause_s)
             try:
-                client = self._connected()
-                answer: ModbusPDU = ask(client)
-            except (ModbusException, OSError) as error:
+                return self._answer(what, ask, fits)
+            except RefusedRegister as refused:
+                if refused.code not in {ACKNOWLEDGED, BUSY}:
+                    raise
+                failure = refused
+            except LinkError as error:
                 failure = error
-                self.close()  # a late reply of this request dies with its link
-                continue
-            if answer.isError():
-                code = int(getattr(answer, "exception_code", 0))
-                reason = EXCEPTIONS.get(code, "no reason that is known")
-                raise Refused(self._device, f"refused to {what} (register {register}): exception {code}, {reason}")
-            return answer
-        raise NoReply(
-            self._device,
-            f"did not {what} (register {register}) in {RETRIES} tries ({failure}); check power, cable, address "
-            f"{self._address} and baud rate",
-        ) from failure
+                self.close()
+        assert failure is not None
+        if isinstance(failure, RefusedRegister):
+            raise failure
+        text = str(failure).removeprefix(f"{self._device}: ")
+        spent_s = self._clock.now_s() - begun_s
+        raise type(failure)(self._device, f"{text} ({TRIES} tries in {spent_s:.2g} s)") from failure
+
+    def _answer(self, what: str, ask: Callable[[Client], ModbusPDU], fits: Callable[[ModbusPDU], bool]) -> ModbusPDU:
+        """Ask once; raises NoReply, Garbled, LinkError or RefusedRegister."""
+        sleep_until(self._clock, self._quiet_until_s)
+        self._heard = b""
+        try:
+            client = self._connected()
+            answer = ask(client)
+        except (ConnectionException, OSError) as error:
+            text = f"cannot {what}, the link is gone ({error}); check cable and power"
+            raise LinkError(self._device, text) from error
+        except (ModbusException, *UNDECODABLE) as error:
+            if self._heard:
+                text = f"cannot {what}, {len(self._heard)} bytes came that are no reply; check line settings and cable"
+                raise Garbled(self._device, text) from error
+            raise NoReply(self._device, f"no answer to {what}; {CHECK} {self._address}") from error
+        finally:
+            self._quiet_until_s = self._clock.now_s() + self._pause_s
+        if answer.isError():
+            raise RefusedRegister(self._device, what, answer.exception_code)
+        if not fits(answer) or (isinstance(client, ModbusTcpClient) and not _whole_frames(self._heard)):
+            raise Garbled(self._device, f"cannot {what}, the reply belongs to another request; {CHECK} {self._address}")
+        return answer
 
     def _connected(self) -> Client:
         if self._client is None:
             self._client = self._open_client()
-        elif not self._client.connected:
-            self._client.connect()
+            self._client.transaction.trace_packet = self._listen  # pymodbus's own hook, else given to its constructor
+        elif not _connect(self._client):
+            raise LinkError(self._device, "the link cannot be opened again; check cable and power")
         return self._client
 
-    def close(self) -> None:
-        """Control the link: close it."""
-        if self._client is not None:
-            self._client.close()
-            self._client = None
+    def _listen(self, sending: bool, data: bytes) -> bytes:
+        """Keep what came since the last request, to tell silence from noise."""
+        self._heard = b"" if sending else data
+        return data
+
+
+def _connect(client: Client) -> bool:
+    return bool(client.connect())
+
+
+def _whole_frames(data: bytes) -> bool:
+    """Return whether bytes of a Modbus TCP stream end where a frame ends: it has no checksum that would tell."""
+    while data:
+        length = 6 + int.from_bytes(data[4:6], "big")
+        if len(data) < length:
+            return False
+        data = data[length:]
+    return True

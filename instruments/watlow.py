@@ -11,22 +11,30 @@ from instruments.errors import LimitError, Refused, WrongInstrument
 from instruments.modbus import Registers
 
 REPLY_S = 1.0
+#: Rounding of counts and floats; far below any set point's resolution.
+TINY_C = 1e-6
 
 
 class Watlow(ABC):
-    """A chamber on a Watlow controller. Limits are asked of the controller once, and the narrower of both counts."""
+    """A chamber on a Watlow controller.
+
+    Limits are asked of the controller once, and the narrower of both counts. A profile that runs on the controller is
+    somebody's work: the driver does not end it to make its own set point count. Only the way to the safe state ends
+    one, and only on a chamber that this driver has controlled before.
+    """
+
+    name = "chamber"
 
     def __init__(self, settings: ChamberSettings, registers: Registers, clock: Clock) -> None:
-        self.name = "chamber"
         self.settings = settings
         self.safe_c = settings.safe_c
         self._registers, self._clock = registers, clock
         self._limits: ChamberLimits | None = None
-        self._written_c: float | None = None
+        self._in_charge = False
 
     @property
     def limits(self) -> ChamberLimits:
-        """The narrower of the controller's set-point limits and the bench file's."""
+        """The narrower of the controller's set-point limits and the bench file's; asks the controller at first use."""
         if self._limits is None:
             low, high = self._controller_limits()
             settings = self.settings
@@ -57,45 +65,84 @@ class Watlow(ABC):
 
     @abstractmethod
     def _read_air(self) -> float:
-        """Return the air temperature, deg C; raises InstrumentError when the controller marks it invalid."""
+        """Return the air temperature, deg C; raises Garbled when the controller marks it invalid."""
 
     @abstractmethod
     def _alarms(self) -> tuple[str, ...]:
         """Return what the controller complains of."""
 
+    @abstractmethod
+    def _profile_runs(self) -> bool:
+        """Return whether a profile runs or is held, so that a static set point has no effect."""
+
+    @abstractmethod
+    def _end_profile(self) -> None:
+        """Terminate the profile."""
+
+    @abstractmethod
+    def _switch_on(self) -> None:
+        """Make the controller control; raises Refused where only a person may do that."""
+
     def set_temperature_c(self, temperature_c: float) -> float:
-        """Control the set point, deg C: limited, rounded, written on change only (EEPROM wear), read back."""
-        limits = self.limits
-        if not limits.min_c <= temperature_c <= limits.max_c:
-            raise LimitError(
-                self.name,
-                f"set point {temperature_c:g} deg C lies outside {limits.min_c:g} to {limits.max_c:g} deg C "
-                "(controller and bench file); nothing was written",
-            )
-        rounded = round(temperature_c / limits.resolution_c) * limits.resolution_c
-        if self._written_c is None or abs(rounded - self._read_setpoint()) > limits.resolution_c / 2:
-            self._write_setpoint(rounded)
-        found = self._read_setpoint()
-        if abs(found - rounded) > limits.resolution_c / 2:
-            raise Refused(
-                self.name,
-                f"set point {rounded:g} deg C was written but {found:g} deg C read back; "
-                "the controller must show its run page",
-            )
-        self._written_c = rounded
-        return found
+        """Control the set point, deg C: limited, rounded, written on change only (EEPROM wear), read back.
+
+        Raises LimitError (nothing was sent), Refused while a profile runs or when another value is read back.
+        """
+        rounded = self._checked(temperature_c)
+        self._refuse_while_a_profile_runs()
+        self._switch_on()
+        self._in_charge = True
+        return self._set(rounded)
+
+    def make_safe(self) -> float:
+        """Control the chamber to its safe set point, deg C; returns what was read back. Switches nothing on."""
+        rounded = self._checked(self.safe_c)
+        if self._in_charge and self._profile_runs():
+            self._end_profile()
+        self._refuse_while_a_profile_runs()
+        return self._set(rounded)
 
     def read(self) -> ChamberState:
         """Get air temperature, set point (deg C) and alarms."""
         return ChamberState(self._clock.now_s(), self._read_air(), self._read_setpoint(), self._alarms())
 
-    def make_safe(self) -> float:
-        """Control the chamber to its safe set point, deg C; returns what was read back."""
-        return self.set_temperature_c(self.safe_c)
-
     def close(self) -> None:
         """Control the link: close it. The controller keeps its set point."""
         self._registers.close()
+
+    def _checked(self, temperature_c: float) -> float:
+        limits = self.limits
+        low, high = limits.min_c - TINY_C, limits.max_c + TINY_C
+        # the last rounding takes away what multiplying left behind: 85.1, not 85.10000000000001
+        step = limits.resolution_c
+        rounded = round(round(temperature_c / step) * step, 6) + 0.0 if low <= temperature_c <= high else temperature_c
+        if not low <= rounded <= high:
+            raise LimitError(
+                self.name,
+                f"set point {temperature_c:g} deg C lies outside {limits.min_c:g} to {limits.max_c:g} deg C "
+                "(the narrower of controller and bench file); nothing was written",
+            )
+        return rounded
+
+    def _refuse_while_a_profile_runs(self) -> None:
+        if self._profile_runs():
+            raise Refused(
+                self.name,
+                "a profile runs or is held on the controller, a set point would have no effect; "
+                "end it at the front panel",
+            )
+
+    def _set(self, rounded_c: float) -> float:
+        if abs(self._read_setpoint() - rounded_c) > TINY_C:
+            self._write_setpoint(rounded_c)
+        found = self._read_setpoint()
+        if abs(found - rounded_c) > self.limits.resolution_c / 2:
+            raise Refused(
+                self.name,
+                f"set point {rounded_c:g} deg C was written but {found:g} deg C read back; "
+                "the controller must show its run page",
+            )
+        return found
 
     def _wrong(self, text: str) -> WrongInstrument:
         return WrongInstrument(self.name, f"{text}; check address and driver in the bench file")

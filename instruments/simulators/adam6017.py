@@ -2,55 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from instruments.bench import BenchFile
 from instruments.gyrostar import CHANNELS, FULL_CODE, RANGES_V, Options
 from instruments.simulators.faults import Faults
-from instruments.simulators.modbus_device import ModbusDevice, Register, constant
+from instruments.simulators.modbus_device import ModbusDevice, int16, items
 from instruments.simulators.world import World
+
+UNUSED_RANGE = 0x0143
+
+
+def code_of(volts: float, range_code: int) -> int:
+    """Return the unsigned 16-bit code of a voltage: 0 and 65535 are the ends of the range, beyond them it clips."""
+    low, high = RANGES_V[range_code]
+    return round(min(max((volts - low) / (high - low), 0.0), 1.0) * FULL_CODE)
 
 
 class Adam6017(ModbusDevice):
-    """The world's Gyrostar as codes of an analog input module; inputs that carry nothing read mid-scale."""
+    """The world's Gyrostar as codes of the module's inputs; inputs that carry nothing read mid-scale."""
 
     def __init__(self, world: World, bench: BenchFile, gyro: str, faults: Faults) -> None:
         settings = next(g for g in bench.gyros if g.name == gyro)
-        self._options = Options.model_validate(settings.options)
+        self._wiring = Options.model_validate(settings.options)
         self._unit = world.gyro(gyro)
-        self._sampled_s = -1.0
-        self._codes = [FULL_CODE // 2] * CHANNELS
-        ranges = {self._options.channel: self._options.range_code}
-        if self._options.thermometer_channel is not None:
-            ranges[self._options.thermometer_channel] = self._options.thermometer_range_code
-        registers = {
-            **{n: Register(self._reader(n)) for n in range(CHANNELS)},
-            **{200 + n: constant(ranges.get(n, 0x0143)) for n in range(CHANNELS)},
-            210: constant(0x6017),
+        self._sampled_s = float("-inf")
+        self.module_name = 0x6017
+        self.codes = [FULL_CODE // 2] * CHANNELS
+        self.ranges = [self._wiring.wired.get(n, UNUSED_RANGE) for n in range(CHANNELS)]
+        cells = {
+            **{n: int16(partial(self._code, n)) for n in range(CHANNELS)},
+            **items(200, 1, self.ranges),
+            210: int16(lambda _: self.module_name),
         }
-        super().__init__("tcp", registers, faults)
-
-    def _reader(self, channel: int) -> Callable[[float], int]:
-        return lambda t_s: self._code(channel, t_s)
+        super().__init__("tcp", cells, faults, self._wiring.address)
 
     def _code(self, channel: int, t_s: float) -> int:
         if t_s > self._sampled_s:
             self._sample(t_s)
-        return self._codes[channel]
+        return self.codes[channel]
 
     def _sample(self, t_s: float) -> None:
         self._sampled_s = t_s
-        sample = self._unit.sample(np.array([t_s]))
-        options = self._options
-        volts = options.rest_v + options.v_per_dps * float(sample.rate_dps[0, 0])
-        self._codes[options.channel] = _encode(volts, options.range_code)
-        if options.thermometer_channel is not None:
-            warm = (float(sample.temperature_c[0, 0]) - options.thermometer_zero_c) / options.thermometer_c_per_v
-            self._codes[options.thermometer_channel] = _encode(warm, options.thermometer_range_code)
-
-
-def _encode(volts: float, range_code: int) -> int:
-    low, high = RANGES_V[range_code]
-    return int(np.clip(round((volts - low) / (high - low) * FULL_CODE), 0, FULL_CODE))
+        sample, wiring = self._unit.sample(np.array([t_s])), self._wiring
+        volts = wiring.rest_v + wiring.v_per_dps * float(sample.rate_dps[0, 0])
+        self.codes[wiring.channel] = code_of(volts, wiring.range_code)
+        if wiring.thermometer_channel is not None:
+            volts = (float(sample.temperature_c[0, 0]) - wiring.thermometer_zero_c) / wiring.thermometer_c_per_v
+            self.codes[wiring.thermometer_channel] = code_of(volts, wiring.thermometer_range_code)

@@ -2,64 +2,60 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable
-
 from instruments.bench import BenchFile
 from instruments.simulators.faults import Faults
-from instruments.simulators.modbus_device import ModbusDevice, Register, constant
+from instruments.simulators.modbus_device import Cell, ModbusDevice, constant, float32, int16, items
 from instruments.simulators.world import World
 
-PART = "F4T1A1A1A1A1A1A"
-
-
-def float_words(value: float) -> tuple[int, int]:
-    """Return (high, low) word of a 32-bit float."""
-    high, low = struct.unpack(">HH", struct.pack(">f", value))
-    return int(high), int(low)
+ROOM_C = 25.0
+ALARMS = 4
+AUTO, QUIET, NO_PROFILE = 10, 61, 1782
 
 
 class SimulatedF4T(ModbusDevice):
-    """Low word first unless the bench file says otherwise; Celsius; automatic control."""
+    """Low word first unless the bench file says otherwise; what a person sets at its panel are attributes."""
 
-    def __init__(self, world: World, bench: BenchFile, gyro: str, faults: Faults) -> None:  # noqa: ARG002
-        self._world, self._little = world, bench.chamber.word_order == "little"
-        self._setpoint = 25.0
-        self._low, self._high = bench.chamber.min_c, bench.chamber.max_c
-        self._words = list(float_words(self._setpoint))
-        registers = {
-            **{16 + i: constant(ord(letter)) for i, letter in enumerate(PART)},
-            90: constant(138),
-            6730: constant(15),
-            14080: constant(15),
-            2730: constant(10),
-            2814: constant(10),
-            **{1356 + 100 * n: constant(61) for n in range(4)},
-            **self._float(2774, lambda _: self._low),
-            **self._float(2776, lambda _: self._high),
-            **self._float(2820, world.heat.air_c),
-            **self._float(2810, lambda _: self._setpoint),
-            **self._float(2782, lambda _: self._setpoint, writable=True),
-        }
-        super().__init__("tcp", registers, faults)
+    def __init__(self, world: World, bench: BenchFile, gyro: str, faults: Faults) -> None:  # noqa: ARG002  not a gyro's
+        self._world = world
+        self._order = bench.chamber.word_order
+        self.part_number = [ord(letter) for letter in "F4T1A1A1A1A1A1A"]
+        self.status = 138
+        self.units = 15  #: 30: Fahrenheit
+        self.control_mode = AUTO
+        self.profile_state = NO_PROFILE
+        self.alarms = [QUIET] * ALARMS
+        self.setpoint_c = ROOM_C
+        self.min_c, self.max_c = bench.chamber.min_c, bench.chamber.max_c
+        self.writes: list[float] = []  #: set points written, as they would wear the EEPROM
+        super().__init__("tcp", self._make_cells(), faults, bench.chamber.address)
 
-    def _float(self, first: int, get: Callable[[float], float], *, writable: bool = False) -> dict[int, Register]:
-        high, low = (first + 1, first) if self._little else (first, first + 1)
+    def _make_cells(self) -> dict[int, Cell]:
+        order = self._order
         return {
-            high: Register(lambda t: float_words(get(t))[0], self._put(0, last=high > low) if writable else None),
-            low: Register(lambda t: float_words(get(t))[1], self._put(1, last=low > high) if writable else None),
+            **items(16, 1, self.part_number),
+            90: int16(lambda _: self.status),
+            6730: int16(lambda _: self.units),
+            14080: int16(lambda _: self.units),
+            2730: constant(AUTO),
+            2814: int16(lambda _: self.control_mode),
+            16566: Cell(lambda _: (0,), self._act),
+            16568: int16(lambda _: self.profile_state),
+            **items(1356, 100, self.alarms),
+            2774: float32(order, lambda _: self.min_c),
+            2776: float32(order, lambda _: self.max_c),
+            2782: float32(order, lambda _: self.setpoint_c, self._set),
+            2810: float32(order, lambda _: self.setpoint_c),
+            2820: float32(order, self._world.heat.air_c),
         }
 
-    def _put(self, word: int, *, last: bool) -> Callable[[int, float], bool]:
-        def put(value: int, t_s: float) -> bool:
-            self._words[word] = value
-            if not last:
-                return True
-            (asked,) = struct.unpack(">f", struct.pack(">HH", *self._words))
-            if not self._low <= asked <= self._high:
-                return False
-            self._setpoint = asked
-            self._world.heat.set(t_s, asked)
-            return True
+    def _set(self, temperature_c: float, t_s: float) -> bool:
+        if not self.min_c <= temperature_c <= self.max_c:
+            return False
+        self.writes.append(temperature_c)
+        self.setpoint_c = temperature_c
+        self._world.heat.set(t_s, temperature_c)
+        return True
 
-        return put
+    def _act(self, words: list[int], _t_s: float) -> bool:
+        self.profile_state = NO_PROFILE
+        return words == [148]

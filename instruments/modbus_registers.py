@@ -1,0 +1,59 @@
+"""Modbus registers as data: number, meaning, type, unit, range, access, source; and what their words mean."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, replace
+from typing import Literal
+
+WordOrder = Literal["little", "big"]  #: of 32-bit floats: low word first, or high word first
+
+
+@dataclass(frozen=True)
+class Register:
+    """One quantity of an instrument, as its manual lists it. Numbers go on the wire as written (zero-based)."""
+
+    number: int
+    meaning: str
+    kind: Literal["int16", "uint16", "float32"] = "uint16"
+    unit: str = ""
+    low: float = -float("inf")  #: what can be read from it or written to it, in `unit` or counts
+    high: float = float("inf")
+    access: Literal["r", "rw", "w"] = "r"
+    source: str = ""  #: where the number is from
+    read_function: Literal[3, 4] = 3
+
+    @property
+    def words(self) -> int:
+        """How many 16-bit registers it takes."""
+        return 2 if self.kind == "float32" else 1
+
+    def nth(self, n: int, stride: int, *, first: int = 1) -> Register:
+        """Return the register of the `n`-th of several equal inputs, events or alarms, counted from `first`."""
+        return replace(self, number=self.number + stride * (n - first), meaning=f"{self.meaning} {n}")
+
+    def read_by(self, function: Literal[3, 4]) -> Register:
+        """Return the register as read by another function."""
+        return replace(self, read_function=function)
+
+    def holds(self, value: float) -> bool:
+        """Whether the register can hold a value; nothing holds NaN."""
+        return self.low <= value <= self.high
+
+    def decode(self, words: list[int], order: WordOrder) -> float:
+        """Return the value of its unsigned words."""
+        if self.kind == "float32":
+            high, low = words if order == "big" else reversed(words)
+            (value,) = struct.unpack(">f", struct.pack(">HH", high, low))
+            return float(value)
+        return words[0] - 0x10000 if self.kind == "int16" and words[0] >= 0x8000 else words[0]
+
+    def encode(self, value: float, order: WordOrder) -> list[int]:
+        """Return the unsigned words of a value; an integer as two's complement."""
+        if self.kind == "float32":
+            high, low = struct.unpack(">HH", struct.pack(">f", value))
+            return [high, low] if order == "big" else [low, high]
+        return [round(value) & 0xFFFF]
+
+    def __str__(self) -> str:
+        return f"{self.meaning} (register {self.number})"
