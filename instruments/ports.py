@@ -90,3 +90,10 @@ class Ports:
         if self.simulation is None:
             raise LinkError(device, f"{url} is a simulated instrument, but this bench has no simulation")
         return self.simulation.device(url)
+
+
+def hidden_defaults() -> dict[str, float]:
+    """Return every effect that can be hidden in a simulated unit, with a size that a person would notice."""
+    from instruments.simulators.hidden import EFFECTS  # noqa: PLC0415  a real bench never loads the simulators
+
+    return {effect_id: kind.default for effect_id, kind in EFFECTS.items()}

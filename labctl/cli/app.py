@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import typer
 
 from labctl.cli import bench, calibrations, campaign, recordings, serving
@@ -17,19 +19,21 @@ app = typer.Typer(
 app.add_typer(bench.app, name="bench")
 app.add_typer(campaign.app, name="campaign")
 app.add_typer(recordings.export_app, name="export")
-for command in (recordings.import_, recordings.simulate):
-    app.command(command.__name__.rstrip("_"))(command)
-for command in (
-    calibrations.fit,
-    calibrations.effects,
-    calibrations.certify,
-    calibrations.revoke,
-    calibrations.calibration,
-    calibrations.compensate,
-):
-    app.command(command.__name__)(command)
-for command in (serving.serve, serving.simulator, serving.demo):
-    app.command(command.__name__)(command)
+COMMANDS: dict[str, Callable[..., None]] = {
+    "demo": serving.demo,
+    "serve": serving.serve,
+    "simulator": serving.simulator,
+    "simulate": recordings.simulate,
+    "import": recordings.import_,
+    "fit": calibrations.fit,
+    "effects": calibrations.effects,
+    "certify": calibrations.certify,
+    "revoke": calibrations.revoke,
+    "calibration": calibrations.calibration,
+    "compensate": calibrations.compensate,
+}
+for name, command in COMMANDS.items():
+    app.command(name)(command)
 
 
 def main() -> None:

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from instruments.open import check
-from instruments.ports import serve_simulation
-
 from instruments.bench import shipped_benches
 from instruments.clock import ScaledClock, SystemClock, VirtualClock
+from instruments.open import check
+from instruments.ports import serve_simulation
 from labctl.services.answers import DeviceCheck
 from labctl.services.planning import load_bench
 

@@ -76,7 +76,11 @@ class House:
         """Yield a campaign's events from the one after number `after`, until the campaign ends."""
         bell = asyncio.Event()
         loop = asyncio.get_running_loop()
-        stop = self._runner.listen(lambda: loop.call_soon_threadsafe(bell.set)) if self._runner is not None else None
+
+        def ring() -> None:
+            loop.call_soon_threadsafe(bell.set)
+
+        stop = self._runner.listen(ring) if self._runner is not None else None
         try:
             while True:
                 bell.clear()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from instruments.hand import NoHand
-from instruments.open import Bench, open_bench
 from pydantic import Field
 
 from instruments.bench import BenchFile, SimulationSettings
 from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
 from instruments.gyro import Gyro
+from instruments.hand import NoHand
+from instruments.open import Bench, open_bench
 from labctl.config import default_database
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.acts import Request

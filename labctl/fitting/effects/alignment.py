@@ -20,7 +20,7 @@ class Misalignment(Effect):
     aliases = ("non_orthogonality",)
     experiment = "remove and refit the unit at least three times: what changes is the fixture's"
 
-    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [
             Column(f"misalignment_{other}", "1", channels.rates[other])
             for other in BODY_AXES

@@ -85,7 +85,7 @@ class Effect(ABC):
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the regressors of this effect for one output axis; none where it does not touch the axis."""
 
-    def least(self, term: Term) -> tuple[int, int]:  # noqa: ARG002  most effects need no more than a rate and a temperature
+    def least(self, term: Term) -> tuple[int, int]:
         """Return how many different (rates, temperatures) tell this effect's coefficients apart."""
         return 2, 1
 

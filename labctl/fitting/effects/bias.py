@@ -21,10 +21,10 @@ class Bias(Effect):
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 3.0), "piezo": (0.0, 5.0)}
     experiment = "input axis up, then down, table clamped: half the sum is bias, half the difference is not"
 
-    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("bias", "deg/s", np.ones(len(channels)))]
 
-    def least(self, term: Term) -> tuple[int, int]:  # noqa: ARG002
+    def least(self, term: Term) -> tuple[int, int]:
         return 1, 1
 
 

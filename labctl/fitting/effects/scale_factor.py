@@ -21,7 +21,7 @@ class ScaleFactor(Effect):
     aliases = ("table_rate_ratio",)
     experiment = "count whole turns against an index pulse: the integral of the output is 360 deg each"
 
-    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("scale_factor", "1", channels.rate_dps(axis))]
 
 
@@ -59,7 +59,7 @@ class ScaleFactorAsymmetry(Effect):
     ranges: ClassVar = {"fog": (1e-5, 5e-4), "mems": (5e-5, 1e-3), "piezo": (0.0, 1e-3)}
     experiment = "at least six rates of each sign, in random order"
 
-    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("asymmetry", "1", np.abs(channels.rate_dps(axis)))]
 
 
@@ -69,7 +69,7 @@ class _Power(Effect):
     first: ClassVar[int]
     origin: ClassVar[Origin] = "sensor"
 
-    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         found = powers(channels.rate_dps(axis), range(self.first, self.order(term) + 1))
         return [
             Column(f"scale_factor_r{k}", f"(deg/s)^-{k - 1}", column)
@@ -121,7 +121,7 @@ class SineResponse(Effect):
     ranges: ClassVar = {"fog": (0.0, 1.5), "mems": (0.0, 0.0), "piezo": (0.0, 0.0)}
     experiment = "more rates in the top third of the range"
 
-    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         k = term.parameters.get("k", 0.3)
         rate_rad_s = np.deg2rad(channels.rate_dps(axis))
         return [Column("sine_response", "1", np.rad2deg(np.sin(k * rate_rad_s) / k - rate_rad_s))]
@@ -138,7 +138,7 @@ class Saturation(Effect):
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
     experiment = "rates every 2 to 5 % above 70 % of full scale"
 
-    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:  # noqa: ARG002
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate = channels.rate_dps(axis)
         knee = term.parameters.get("knee_dps", 0.8 * float(np.max(np.abs(rate), initial=1.0)))
         return [Column("saturation", "1", np.sign(rate) * np.maximum(np.abs(rate) - knee, 0.0))]

@@ -1,0 +1,145 @@
+"""The calibration document: canonical JSON that says everything a consumer needs, under a hash that no edit survives."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from importlib.metadata import version as package_version
+from pathlib import Path
+from typing import Any
+
+from labctl.errors import BadCalibrationFile
+from labctl.fitting import FitResult, FittedModel, coefficients_json
+from labctl.fitting.papers import in_paper_units
+from labctl.recording import OutputUnit, RecordingInfo
+
+SCHEMA = "labctl-calibration/1"
+
+
+def canonical(document: Mapping[str, Any]) -> bytes:
+    """Return the one way to write a document: sorted keys, no spaces, UTF-8, shortest exact numbers."""
+    return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+
+def hash_of(document: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of everything in a document but its hash."""
+    return hashlib.sha256(canonical({k: v for k, v in document.items() if k != "hash"})).hexdigest()
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibration as it leaves the house."""
+
+    document: Mapping[str, Any]
+
+    @property
+    def serial(self) -> str:
+        """Serial number of the unit."""
+        return str(self.document["serial"])
+
+    @property
+    def version(self) -> int:
+        """Version, counted per unit."""
+        return int(self.document["version"])
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the canonical document without the hash."""
+        return str(self.document["hash"])
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes that are corrected, in order."""
+        return tuple(self.document["axes"])
+
+    @cached_property
+    def fitted(self) -> FittedModel:
+        """The fitted model that the document holds: sensor and package effects only."""
+        return FittedModel.from_dict(self.document["model"])
+
+    @property
+    def output(self) -> dict[str, OutputUnit]:
+        """How each axis's output becomes a rate before it is corrected."""
+        return {axis: OutputUnit.model_validate(unit) for axis, unit in self.document["output"].items()}
+
+    @property
+    def temperature_c(self) -> tuple[float, float]:
+        """The calibrated temperatures."""
+        low, high = self.document["validity"]["temperature_c"]
+        return float(low), float(high)
+
+    @property
+    def rate_dps(self) -> tuple[float, float]:
+        """The calibrated rates."""
+        low, high = self.document["validity"]["rate_dps"]
+        return float(low), float(high)
+
+    def to_bytes(self) -> bytes:
+        """Return the bytes that are stored and served, always the same."""
+        return canonical(self.document) + b"\n"
+
+
+def build_calibration(
+    info: RecordingInfo,
+    result: FitResult,
+    *,
+    version: int,
+    parent: int | None,
+    issued_at: datetime,
+    provenance: Mapping[str, Any],
+) -> Calibration:
+    """Make the document of a fit. What belongs to bench, fixture or environment is left out, and named."""
+    exported, left_out = result.fitted.exported()
+    document: dict[str, Any] = {
+        "schema": SCHEMA,
+        "serial": info.serial,
+        "version": version,
+        "parent": parent,
+        "issued_at": issued_at.isoformat(),
+        "unit": {"model": info.model, "technology": info.technology},
+        "software": {"name": "labctl", "version": package_version("labctl")},
+        "axes": list(exported.axes),
+        "output": {axis: info.output.get(axis, OutputUnit()).model_dump() for axis in info.axes},
+        "model": exported.to_dict(),
+        "coefficients": {axis: coefficients_json(exported.model, fit) for axis, fit in exported.axes.items()},
+        "papers": in_paper_units(exported),
+        "left_out": left_out,
+        "error": result.error.to_dict(),
+        "noise": dict(result.noise),
+        "environment": dict(result.environment),
+        "validity": {"temperature_c": list(result.temperature_c), "rate_dps": list(result.rate_dps)},
+        "provenance": dict(provenance),
+        "how_to_use": (
+            "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' subtracts "
+            "it as a function of that rate, argument 'rate' solves rate = true + error(true) for the true rate"
+        ),
+    }
+    document["hash"] = hash_of(document)
+    return Calibration(document)
+
+
+def read_calibration(source: Path | bytes) -> Calibration:
+    """Read a calibration file; raises BadCalibrationFile when it is not whole, not ours, or was edited."""
+    name = "calibration" if isinstance(source, bytes) else str(source)
+    try:
+        document = json.loads(source if isinstance(source, bytes) else source.read_bytes())
+    except OSError as error:
+        raise BadCalibrationFile(f"{name}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise BadCalibrationFile(f"{name}: not JSON, or cut short ({error}); fetch it again") from error
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if schema != SCHEMA:
+        raise BadCalibrationFile(
+            f"{name}: schema {schema!r}, this labctl reads {SCHEMA!r}; use the labctl that wrote it"
+        )
+    found, written = hash_of(document), document.get("hash")
+    if found != written:
+        raise BadCalibrationFile(
+            f"{name}: was edited or damaged: its hash is {found[:16]}…, it says {str(written)[:16]}…; fetch it again "
+            "with `labctl calibration`"
+        )
+    return Calibration(document)

@@ -1,0 +1,137 @@
+"""The run-time side: a calibration file in, corrected rates out, in arrays or sample by sample. No database."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.calibration import Calibration, read_calibration
+from labctl.errors import BadInput
+from labctl.fitting.channels import Channels
+from labctl.fitting.horner import Surface, surface_of
+from labctl.fitting.linear import Linear, linear_of
+from labctl.fitting.model import FittedModel
+
+Array = NDArray[np.float64]
+Outside = Literal["clamp", "refuse"]
+#: Beyond the calibrated range by less than this counts as inside: a thermometer's last digits.
+MARGIN_C = 0.5
+MARGIN_SHARE = 0.02
+Correct = Callable[[Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class Compensated:
+    """Corrected rates of the shape that was given, and which samples lay outside what was calibrated, (n,)."""
+
+    rate_dps: Array
+    outside: NDArray[np.bool_]
+
+
+class Compensator:
+    """Corrects a unit's output by its calibration.
+
+    Outside the calibrated temperatures and rates it either holds the temperature at the edge of the range and flags the
+    sample ("clamp"), or raises BadInput ("refuse"). A sample that is not a number comes back as it was, flagged.
+    """
+
+    def __init__(self, calibration: Calibration, outside: Outside = "clamp") -> None:
+        self.calibration = calibration
+        self.axes = calibration.axes
+        self._outside = outside
+        self._low_c, self._high_c = calibration.temperature_c
+        slow, fast = calibration.rate_dps
+        margin = MARGIN_SHARE * max(fast - slow, 1e-9)
+        self._slow, self._fast = slow - margin, fast + margin
+        units = [calibration.output[axis] for axis in self.axes]
+        self._offset = np.array([unit.offset for unit in units])
+        self._scale = np.array([unit.scale for unit in units])
+        self._correct = correction(calibration.fitted, self.axes)
+
+    @classmethod
+    def from_file(cls, path: Path | str, outside: Outside = "clamp") -> Compensator:
+        """Load a calibration file; raises BadCalibrationFile when it was edited or is not whole."""
+        return cls(read_calibration(Path(path)), outside)
+
+    @classmethod
+    def from_bytes(cls, content: bytes, outside: Outside = "clamp") -> Compensator:
+        """Load a calibration from the bytes that the service gives; raises BadCalibrationFile."""
+        return cls(read_calibration(content), outside)
+
+    def compensate_output(self, output: Array, temperature_c: Array) -> Compensated:
+        """Correct what the device gives in its own unit, (n, axes) or (n,); see `compensate`."""
+        values = np.asarray(output, dtype=np.float64)
+        offset, scale = (self._offset, self._scale) if values.ndim == 2 else (self._offset[0], self._scale[0])
+        return self.compensate((values - offset) / scale, temperature_c)
+
+    def compensate(self, raw_dps: Array, temperature_c: Array | float) -> Compensated:
+        """Correct rates, (n, axes) deg/s, or (n,) for one axis, at temperatures (n,), (n, axes) or one for all.
+
+        Raises BadInput for a shape that does not fit, or outside the calibrated range when that is refused.
+        """
+        given = np.asarray(raw_dps, dtype=np.float64)
+        raw = given.reshape(len(given), -1) if given.ndim else given.reshape(1, 1)
+        if raw.shape[1] != len(self.axes):
+            raise BadInput(f"rates of {raw.shape[1]} axes given; the calibration is of {', '.join(self.axes)}")
+        warm = np.asarray(temperature_c, dtype=np.float64)
+        lowest, highest = (float(np.min(warm)), float(np.max(warm))) if warm.size else (self._low_c, self._high_c)
+        least, most = (float(np.min(raw)), float(np.max(raw))) if raw.size else (0.0, 0.0)
+        calm = lowest >= self._low_c and highest <= self._high_c and least >= self._slow and most <= self._fast
+        if calm:  # also false when there is a NaN
+            flags = np.zeros(len(raw), dtype=bool)
+        else:
+            flags = self._judge(raw, warm)
+            warm = np.clip(warm, self._low_c, self._high_c)
+        corrected = self._correct(raw, warm)
+        return Compensated(corrected.reshape(given.shape), flags)
+
+    def _judge(self, raw: Array, warm: Array) -> NDArray[np.bool_]:
+        """Return which samples are outside the range or no numbers, (n,); raises BadInput when that is refused."""
+        spread = warm.reshape(len(raw), -1) if warm.ndim else np.full((len(raw), 1), float(warm))
+        within_c = (spread >= self._low_c - MARGIN_C) & (spread <= self._high_c + MARGIN_C)
+        cold: NDArray[np.bool_] = ~np.all(within_c, axis=1)
+        fast: NDArray[np.bool_] = ~np.all((raw >= self._slow) & (raw <= self._fast), axis=1)
+        if self._outside == "refuse" and (cold.any() or fast.any()):
+            row = int(np.argmax(cold | fast))
+            what = (
+                f"temperature {spread[row].tolist()} deg C outside {self._low_c:g} to {self._high_c:g} deg C"
+                if cold[row]
+                else f"rate {raw[row].tolist()} deg/s outside {self._slow:g} to {self._fast:g} deg/s"
+            )
+            raise BadInput(
+                f"sample {row + 1}: {what} calibrated for {self.calibration.serial} "
+                f"version {self.calibration.version}; use --outside clamp to correct and flag it"
+            )
+        return np.asarray(cold | fast)
+
+    def step(self, raw_dps: Any, temperature_c: float) -> tuple[Array, bool]:
+        """Correct one sample, (axes,) deg/s; returns the corrected rates and whether it lay outside."""
+        found = self.compensate(np.asarray(raw_dps, dtype=np.float64).reshape(1, -1), np.array([temperature_c]))
+        return found.rate_dps[0], bool(found.outside[0])
+
+
+def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
+    """Return the fastest exact way to apply a model: (rates (n, axes), temperatures) -> rates (n, axes)."""
+    surface: Surface | None = surface_of(fitted, axes)
+    if surface is not None:
+        return surface.correct
+    linear: Linear | None = linear_of(fitted, axes)
+    if linear is not None:
+        return linear.correct
+
+    def general(raw: Array, temperature_c: Array) -> Array:
+        n = len(raw)
+        warm = np.broadcast_to(temperature_c, (n,)) if temperature_c.ndim < 2 else temperature_c.mean(axis=1)
+        columns: dict[str, Any] = {"temperature_c": warm}
+        if temperature_c.ndim == 2:
+            columns |= {f"temperature_{axis}_c": temperature_c[:, i] for i, axis in enumerate(axes)}
+        outputs = {axis: raw[:, i] for i, axis in enumerate(axes)}
+        corrected = fitted.compensate(outputs, Channels(columns, outputs))
+        return np.column_stack([corrected[axis] for axis in axes])
+
+    return general

@@ -1,0 +1,192 @@
+"""A calibration as a C99 header: constants, and the evaluation to compile with them."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.calibration import Calibration
+from labctl.errors import BadInput
+from labctl.fitting.horner import Surface, surface_of
+from labctl.fitting.linear import Linear, linear_of
+from labctl.fitting.temperature import LagrangeTable
+
+HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
+ * Hash of the calibration: {hash}
+ * Valid from {low:g} to {high:g} deg C and from {slow:g} to {fast:g} deg/s; the temperature is held at the edge of the
+ * range and the function returns 1 when it was outside, else 0.
+ * Input: output of the gyro as a rate, deg/s ({nominal}); result: rate in deg/s.
+ * Define LABCTL_REAL as float before including it for single precision. */
+#ifndef {guard}
+#define {guard}
+
+#ifndef LABCTL_REAL
+#define LABCTL_REAL double
+#endif
+
+#define {name}_AXES {axes}
+static const char {name}_hash[] = "{hash}";
+static const double {name}_temperature_c[2] = {{{low:.17g}, {high:.17g}}};
+"""
+
+TAIL = """
+#endif
+"""
+
+SURFACE = """
+/* error = sum of c[i][j] * w^i * u^j with u = temperature - {reference:.17g}, by Horner's scheme in u, then in w;
+ * result = w - error (Ojeda et al. 2000, eqs. 12 and 13). */
+static const double {name}_c[{name}_AXES][{rows}][{columns}] = {table};
+
+static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c, LABCTL_REAL *rate)
+{{
+    int outside = 0, a, i, j;
+    LABCTL_REAL u;
+    if (!(temperature_c >= (LABCTL_REAL){name}_temperature_c[0])) {{
+        temperature_c = (LABCTL_REAL){name}_temperature_c[0]; outside = 1;
+    }}
+    if (temperature_c > (LABCTL_REAL){name}_temperature_c[1]) {{
+        temperature_c = (LABCTL_REAL){name}_temperature_c[1]; outside = 1;
+    }}
+    u = temperature_c - (LABCTL_REAL){reference:.17g};
+    for (a = 0; a < {name}_AXES; a++) {{
+        LABCTL_REAL error = 0;
+        for (i = {rows} - 1; i >= 0; i--) {{
+            LABCTL_REAL row = 0;
+            for (j = {columns} - 1; j >= 0; j--) row = row * u + (LABCTL_REAL){name}_c[a][i][j];
+            error = error * w[a] + row;
+        }}
+        rate[a] = w[a] - error;
+    }}
+    return outside;
+}}
+"""
+
+LINEAR = """
+/* output = K w + B with K[output][input] and B at the nodes below and Lagrange interpolation over {points} of them;
+ * result: w, by Gaussian elimination with pivoting (Yang et al. 2018). */
+#define {name}_NODES {nodes}
+static const double {name}_node_c[{name}_NODES] = {node_table};
+static const double {name}_k[{name}_NODES][{name}_AXES][{name}_AXES] = {k_table};
+static const double {name}_b[{name}_NODES][{name}_AXES] = {b_table};
+
+static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c, LABCTL_REAL *rate)
+{{
+    LABCTL_REAL m[{name}_AXES][{name}_AXES + 1], weight[{points}];
+    int outside = 0, last, i, j, r, c, p;
+    if (!(temperature_c >= (LABCTL_REAL){name}_temperature_c[0])) {{
+        temperature_c = (LABCTL_REAL){name}_temperature_c[0]; outside = 1;
+    }}
+    if (temperature_c > (LABCTL_REAL){name}_temperature_c[1]) {{
+        temperature_c = (LABCTL_REAL){name}_temperature_c[1]; outside = 1;
+    }}
+    for (last = {points} - 1; last < {name}_NODES - 1 && temperature_c > (LABCTL_REAL){name}_node_c[last]; last++) {{ }}
+    for (i = 0; i < {points}; i++) {{
+        LABCTL_REAL at = (LABCTL_REAL){name}_node_c[last - {points} + 1 + i];
+        weight[i] = 1;
+        for (j = 0; j < {points}; j++) if (j != i) {{
+            LABCTL_REAL other = (LABCTL_REAL){name}_node_c[last - {points} + 1 + j];
+            weight[i] *= (temperature_c - other) / (at - other);
+        }}
+    }}
+    for (r = 0; r < {name}_AXES; r++) {{
+        for (c = 0; c <= {name}_AXES; c++) m[r][c] = c < {name}_AXES ? 0 : w[r];
+        for (i = 0; i < {points}; i++) {{
+            int node = last - {points} + 1 + i;
+            for (c = 0; c < {name}_AXES; c++) m[r][c] += weight[i] * (LABCTL_REAL){name}_k[node][r][c];
+            m[r][{name}_AXES] -= weight[i] * (LABCTL_REAL){name}_b[node][r];
+        }}
+    }}
+    for (c = 0; c < {name}_AXES; c++) {{
+        p = c;
+        for (r = c + 1; r < {name}_AXES; r++)
+            if ((m[r][c] < 0 ? -m[r][c] : m[r][c]) > (m[p][c] < 0 ? -m[p][c] : m[p][c])) p = r;
+        for (i = 0; i <= {name}_AXES; i++) {{ LABCTL_REAL t = m[c][i]; m[c][i] = m[p][i]; m[p][i] = t; }}
+        for (r = c + 1; r < {name}_AXES; r++) {{
+            LABCTL_REAL f = m[r][c] / m[c][c];
+            for (i = c; i <= {name}_AXES; i++) m[r][i] -= f * m[c][i];
+        }}
+    }}
+    for (r = {name}_AXES - 1; r >= 0; r--) {{
+        rate[r] = m[r][{name}_AXES];
+        for (c = r + 1; c < {name}_AXES; c++) rate[r] -= m[r][c] * rate[c];
+        rate[r] /= m[r][r];
+    }}
+    return outside;
+}}
+"""
+
+#: Polynomials in temperature are exact on this many nodes with as many points.
+POLYNOMIAL_NODES = 6
+
+
+def c_header(calibration: Calibration) -> bytes:
+    """Return a calibration as a C header; raises BadInput for a model that has no closed form in C yet."""
+    name = "gyro_" + re.sub(r"[^0-9A-Za-z]+", "_", calibration.serial).lower()
+    surface = surface_of(calibration.fitted, calibration.axes)
+    linear = linear_of(calibration.fitted, calibration.axes)
+    if surface is not None:
+        body = _surface(name, surface)
+    elif linear is not None:
+        body = _linear(name, linear, calibration.temperature_c)
+    else:
+        raise BadInput(
+            f"format c: model {calibration.fitted.model.name} has effects without a closed form in C "
+            f"({', '.join(calibration.fitted.model.effect_ids)}); use the JSON file with labctl's Compensator"
+        )
+    return (_head(name, calibration) + body + TAIL).encode()
+
+
+def _head(name: str, calibration: Calibration) -> str:
+    (low, high), (slow, fast) = calibration.temperature_c, calibration.rate_dps
+    nominal = "; ".join(
+        f"{axis}: (output in {unit.unit} - {unit.offset:g}) / {unit.scale:g}"
+        for axis, unit in calibration.output.items()
+    )
+    return HEAD.format(
+        serial=calibration.serial.replace("*/", ""),
+        version=calibration.version,
+        model=calibration.fitted.model.name,
+        hash=calibration.hash,
+        low=low,
+        high=high,
+        slow=slow,
+        fast=fast,
+        nominal=nominal,
+        guard=f"LABCTL_{name.upper()}_V{calibration.version}_H",
+        name=name,
+        axes=len(calibration.axes),
+    )
+
+
+def _surface(name: str, surface: Surface) -> str:
+    _, rows, columns = surface.coefficients.shape
+    return SURFACE.format(
+        name=name, rows=rows, columns=columns, reference=surface.reference_c, table=_table(surface.coefficients)
+    )
+
+
+def _linear(name: str, linear: Linear, span_c: tuple[float, float]) -> str:
+    basis = linear.fitted.model.temperature
+    if isinstance(basis, LagrangeTable) and not any("temperature" in e for e in linear.fitted.model.effect_ids):
+        nodes, points = np.array(basis.nodes_c), basis.points
+    else:
+        low, high = span_c
+        nodes, points = np.linspace(low, max(high, low + 1.0), POLYNOMIAL_NODES), POLYNOMIAL_NODES
+    k, b = linear.k_and_b(nodes)
+    return LINEAR.format(
+        name=name,
+        points=points,
+        nodes=len(nodes),
+        node_table=_table(nodes),
+        k_table=_table(k),
+        b_table=_table(b),
+    )
+
+
+def _table(values: NDArray[np.float64]) -> str:
+    if values.ndim == 1:
+        return "{" + ", ".join(f"{value:.17g}" for value in values) + "}"
+    return "{" + ",\n ".join(_table(row) for row in values) + "}"
