@@ -7,6 +7,7 @@ clients: only the socket or port under them is another.
 
 from __future__ import annotations
 
+import logging
 import struct
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
@@ -22,6 +23,9 @@ from instruments.modbus_registers import Register, WordOrder
 
 if TYPE_CHECKING:
     from instruments.simulators.device import SimulatedDevice
+
+#: What goes wrong is raised, not printed; without a handler pymodbus would write it to standard error.
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 Client = ModbusTcpClient | ModbusSerialClient
 #: How long to wait before each further try. A late reply of the failed try arrives meanwhile, and is thrown away.

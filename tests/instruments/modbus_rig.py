@@ -1,0 +1,152 @@
+"""A simulated bench in virtual time with a tap on its Modbus wires: what was sent, byte by byte. A pytest plugin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+
+from instruments.bench import BenchFile, read_bench
+from instruments.clock import VirtualClock
+from instruments.gyrostar import Gyrostar
+from instruments.ports import Ports
+from instruments.simulators.bench import SimulatedBench
+from instruments.simulators.device import SimulatedDevice
+from instruments.simulators.faults import Faults
+from instruments.watlow_f4 import WatlowF4
+from instruments.watlow_f4t import WatlowF4T
+
+
+class Tap:
+    """Passes bytes on and remembers them."""
+
+    def __init__(self, device: SimulatedDevice) -> None:
+        self.device = device
+        self.heard: list[bytes] = []
+        self.heard_s: list[float] = []
+        self.said: list[bytes] = []
+
+    def receive(self, data: bytes, t_s: float) -> None:
+        self.heard.append(data)
+        self.heard_s.append(t_s)
+        self.device.receive(data, t_s)
+
+    def transmit(self, t_s: float) -> bytes:
+        data = self.device.transmit(t_s)
+        if data:
+            self.said.append(data)
+        return data
+
+    def skip(self, t_s: float) -> None:
+        self.device.skip(t_s)
+
+    def next_byte_s(self, t_s: float) -> float | None:
+        return self.device.next_byte_s(t_s)
+
+    def exchanges(self) -> list[tuple[bytes, bytes]]:
+        return list(zip(self.heard, self.said, strict=True))
+
+    def forget(self) -> None:
+        self.heard.clear()
+        self.heard_s.clear()
+        self.said.clear()
+
+
+class WatchedPorts(Ports):
+    """Ports that know whom they opened."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.opened: list[ModbusTcpClient | ModbusSerialClient] = []
+
+    def modbus_tcp(self, *arguments: Any, **settings: Any) -> ModbusTcpClient:
+        client = super().modbus_tcp(*arguments, **settings)
+        self.opened.append(client)
+        return client
+
+    def modbus_rtu(self, *arguments: Any, **settings: Any) -> ModbusSerialClient:
+        client = super().modbus_rtu(*arguments, **settings)
+        self.opened.append(client)
+        return client
+
+
+class Rig:
+    """One instrument of a shipped bench: driver, ports, its simulated self, its faults and its wire."""
+
+    def __init__(self, bench: str, url: str, chamber: dict[str, Any], options: dict[str, Any]) -> None:
+        record = read_bench(bench).model_dump()
+        record["chamber"] |= chamber
+        record["gyros"][0]["options"] |= options
+        self.bench = BenchFile.model_validate(record)
+        self.clock = VirtualClock()
+        simulation = SimulatedBench(self.bench, self.clock)
+        self.ports = WatchedPorts(self.clock, simulation)
+        self.world = simulation.world
+        self.faults: Faults = simulation.faults(url)
+        wire: Any = simulation.device(url)
+        self.simulated: Any = wire._device  # what stands behind the faulty wire
+        self.tap = Tap(wire)
+        simulation._devices[url] = self.tap
+        self.driver = self.make_driver()
+
+    def make_driver(self) -> Any:
+        """Make a driver that knows nothing yet."""
+        return None
+
+    def close(self) -> None:
+        for client in self.ports.opened:
+            client.close()  # type: ignore[no-untyped-call]  # pymodbus left this one untyped
+
+
+class F4Rig(Rig):
+    def make_driver(self) -> WatlowF4:
+        return WatlowF4(self.bench.chamber, self.ports, self.clock)
+
+
+class F4TRig(Rig):
+    def make_driver(self) -> WatlowF4T:
+        return WatlowF4T(self.bench.chamber, self.ports, self.clock)
+
+
+class GyrostarRig(Rig):
+    def make_driver(self) -> Gyrostar:
+        return Gyrostar(self.bench.gyros[0], self.ports, self.clock)
+
+
+PLACES: dict[str, tuple[type[Rig], str, str]] = {
+    "f4": (F4Rig, "single-axis-sim", "sim://watlow-f4"),
+    "f4t": (F4TRig, "triaxial-sim", "sim://watlow-f4t"),
+    "gyrostar": (GyrostarRig, "gyrostar-sim", "sim://adam-6017/gyrostar"),
+}
+
+
+@pytest.fixture
+def make_rig() -> Iterator[Callable[..., Any]]:
+    """Make rigs by name, with what the bench file says changed; their links are closed at the end."""
+    made: list[Rig] = []
+
+    def make(kind: str, *, options: dict[str, Any] | None = None, **chamber: Any) -> Rig:
+        rig, bench, url = PLACES[kind]
+        made.append(rig(bench, url, chamber, options or {}))
+        return made[-1]
+
+    yield make
+    for rig in made:
+        rig.close()
+
+
+@pytest.fixture
+def f4(make_rig: Callable[..., Any]) -> Any:
+    return make_rig("f4")
+
+
+@pytest.fixture
+def f4t(make_rig: Callable[..., Any]) -> Any:
+    return make_rig("f4t")
+
+
+@pytest.fixture
+def gyrostar(make_rig: Callable[..., Any]) -> Any:
+    return make_rig("gyrostar")
