@@ -148,7 +148,7 @@ class ArrickC4:
         if ended < due - tolerance:
             raise Garbled(
                 self.name,
-                f"a move of {abs(run.steps)} steps ended after {ended - began:.1f} s instead of {run.duration_s:.1f} s; "
+                f"{abs(run.steps)} steps took {ended - began:.1f} s instead of {run.duration_s:.1f} s; "
                 "check speed_template, step_clock_hz and acceleration_dps2, or the motor stalls; home the table",
             )
         self._steps += run.steps
@@ -225,7 +225,7 @@ class ArrickC4:
                 if not found and self._clock.now_s() >= deadline - 1e-9:
                     raise NoReply(
                         self.name,
-                        f"{self.settings.port} did not answer within {timeout_s:.1f} s; check power, cable and baud rate",
+                        f"{self.settings.port} gave no answer in {timeout_s:.1f} s; check power, cable and baud rate",
                     )
         except (serial.SerialException, OSError) as error:
             self._lose(error)

@@ -80,6 +80,7 @@ class SimulationSettings(Strict):
     """What the simulated instruments behind `sim://` are like. Ignored by a bench of real instruments."""
 
     seed: int = 1
+    noise_seed: int = 0  #: another one measures the same units on another day
     latitude_deg: float | None = None  #: of the simulated world; default: the bench's
     units: dict[str, dict[str, Any]] = Field(default_factory=dict)  #: gyro name -> profile and deviations from it
     table: dict[str, Any] = Field(default_factory=dict)

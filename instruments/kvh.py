@@ -1,4 +1,4 @@
-"""KVH fibre-optic gyros that send one line of text per reading: DSP-3000, and the E-Core RD2100 as another line format."""
+"""KVH fibre-optic gyros that send a line of text per reading: DSP-3000, and E-Core RD2100 as another line format."""
 
 from __future__ import annotations
 

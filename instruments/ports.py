@@ -1,4 +1,4 @@
-"""Opening a serial port or a Modbus link by address. `sim://` leads to a simulated instrument, through the same library.
+"""Opening a serial port or a Modbus link by address. `sim://` leads to a simulated instrument, by the same library.
 
 This is the only file of the runtime that knows where the simulators are.
 """

@@ -39,4 +39,4 @@ class StreamTime:
             behind_s -= lost * self._period_s
         self._anchor_s += behind_s if behind_s < 0 else FOLLOW * max(behind_s - self._period_s, 0.0)
         self._index = int(index[-1])
-        return self._anchor_s + index * self._period_s, lost
+        return np.asarray(self._anchor_s + index * self._period_s, dtype=np.float64), lost

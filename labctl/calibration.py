@@ -1,4 +1,4 @@
-"""The calibration document: canonical JSON that says everything a consumer needs, under a hash that no edit survives."""
+"""The calibration document: canonical JSON with all that a consumer needs, under a hash that no edit survives."""
 
 from __future__ import annotations
 
@@ -114,8 +114,8 @@ def build_calibration(
         "validity": {"temperature_c": list(result.temperature_c), "rate_dps": list(result.rate_dps)},
         "provenance": dict(provenance),
         "how_to_use": (
-            "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' subtracts "
-            "it as a function of that rate, argument 'rate' solves rate = true + error(true) for the true rate"
+            "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' "
+            "subtracts it as a function of that rate, 'rate' solves rate = true + error(true) for the true rate"
         ),
     }
     document["hash"] = hash_of(document)

@@ -1,1 +1,1 @@
-"""Simulated instruments: bytes in, bytes out, and the physics they share. Reached through ports.py and by tests only."""
+"""Simulated instruments: bytes in, bytes out, and the physics they share. Reached by ports.py and tests only."""

@@ -52,6 +52,10 @@ class SimulatedC4:
         self._replies = [reply for reply in self._replies if reply.due_s > t_s]
         return b"".join(reply.data for reply in due)
 
+    def skip(self, t_s: float) -> None:
+        """Lose the replies that are due."""
+        self.transmit(t_s)
+
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  what waits is known
         """Return when the next reply is due."""
         return min((reply.due_s for reply in self._replies), default=None)

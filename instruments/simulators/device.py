@@ -16,6 +16,10 @@ class SimulatedDevice(Protocol):
         """Return the bytes that the instrument has put on the wire up to `t_s` since the last call."""
         ...
 
+    def skip(self, t_s: float) -> None:
+        """Lose what was put on the wire up to `t_s`: nobody will read it, so it need not be made."""
+        ...
+
     def next_byte_s(self, t_s: float) -> float | None:
         """Return when the next byte comes if the host stays silent; None when it would wait for ever."""
         ...

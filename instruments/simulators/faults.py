@@ -125,6 +125,12 @@ class FaultyWire:
             sent = b""
         return sent
 
+    def skip(self, t_s: float) -> None:
+        """Lose what has arrived and what is on its way."""
+        self._check_link(t_s)
+        self._held.clear()
+        self._device.skip(t_s)
+
     def next_byte_s(self, t_s: float) -> float | None:
         """Return when the next byte comes."""
         if self._held:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 
 from instruments.bench import BenchFile
@@ -14,7 +16,7 @@ MOST_LINES = 400
 RD2100_LSB_DPS = 0.000305
 
 
-class _SimulatedLines:
+class _SimulatedLines(ABC):
     """Sends a line per sampling interval."""
 
     format: LineFormat
@@ -25,7 +27,8 @@ class _SimulatedLines:
         self._sent = 0
 
     def receive(self, data: bytes, t_s: float) -> None:
-        """Mode letters are taken without an answer; the mode asked for is the one it is in."""
+        """Take mode letters, without an answer; the mode asked for is the one it is in."""
+        del data, t_s
 
     def transmit(self, t_s: float) -> bytes:
         """Return the lines up to now."""
@@ -45,13 +48,17 @@ class _SimulatedLines:
             lines = lines[gap.value :]
         return "".join(line + "\r\n" for line in lines).encode("ascii")
 
+    def skip(self, t_s: float) -> None:
+        """Lose the lines up to now."""
+        self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))
+
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the stream never waits
         """Return when the next line is complete."""
         return (self._sent + 1) / self._rate_hz
 
+    @abstractmethod
     def line(self, rate_dps: float, temperature_c: float) -> str:
         """Return one line without its end."""
-        raise TypeError("a line format has to be chosen")
 
 
 class SimulatedDsp3000(_SimulatedLines):

@@ -35,7 +35,7 @@ class PairedTcpClient(ModbusTcpClient):
         """Open the pair; False when the instrument cannot be reached. What it said to an earlier link is gone."""
         if self.socket is None:
             try:
-                self._device.transmit(self._clock.now_s())
+                self._device.skip(self._clock.now_s())
             except OSError:
                 return False
             self.socket, self._far = socket.socketpair()

@@ -112,6 +112,10 @@ class ModbusDevice:
         sent, self._out = bytes(self._out), bytearray()
         return sent
 
+    def skip(self, t_s: float) -> None:
+        """Lose what was answered."""
+        self.transmit(t_s)
+
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002
         """Nothing comes unasked."""
         return None

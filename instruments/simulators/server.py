@@ -10,6 +10,7 @@ import socket
 import threading
 import tty
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ class Server:
                 else:
                     place["host"], place["tcp_port"] = (
                         "127.0.0.1",
-                        self._tcp(lambda link, d=device: self._talk(link, d)),
+                        self._tcp(partial(self._talk, device)),
                     )
                     self.addresses[name] = f"127.0.0.1:{place['tcp_port']}"
         control = self._tcp(self._obey)
@@ -122,7 +123,7 @@ class Server:
                 return
             self._run(serve, link)
 
-    def _talk(self, link: socket.socket, device: SimulatedDevice) -> None:
+    def _talk(self, device: SimulatedDevice, link: socket.socket) -> None:
         link.settimeout(0.2)
         with link:
             while not self._over.is_set():

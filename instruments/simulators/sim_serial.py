@@ -22,6 +22,7 @@ class SimSerial(serial.SerialBase):  # type: ignore[misc]  # pyserial has no typ
         self._device = device
         self._clock = clock
         self._unread = bytearray()
+        self.is_open = False
         super().__init__(**settings)
         self.open()
 
@@ -82,7 +83,9 @@ class SimSerial(serial.SerialBase):  # type: ignore[misc]  # pyserial has no typ
 
     def reset_input_buffer(self) -> None:
         """Drop what was not read."""
-        self._take()
+        if not self.is_open:
+            raise serial.PortNotOpenError
+        self._device.skip(self._clock.now_s())
         self._unread.clear()
 
     def reset_output_buffer(self) -> None:

@@ -45,6 +45,10 @@ class SimulatedStim300:
         self._sent = newest
         return self._encode(index, t_s).tobytes()
 
+    def skip(self, t_s: float) -> None:
+        """Lose the frames up to now."""
+        self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))
+
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the stream never waits
         """Return when the next frame is complete."""
         return (self._sent + 1) / self._rate_hz

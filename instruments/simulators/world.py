@@ -62,7 +62,7 @@ class World:
             float(settings.chamber.get("air_tau_s", 180.0)),
             bodies,
             float(settings.chamber.get("noise_c", 0.02)),
-            settings.seed,
+            settings.seed + 1000 * settings.noise_seed,
         )
         self._gyros = {gyro.name: SimulatedGyro(self, gyro, truths[gyro.name]) for gyro in bench.gyros}
 
@@ -126,7 +126,7 @@ class SimulatedGyro:
         self.truth = truth
         self.sample_rate_hz = settings.sample_rate_hz or USUAL_RATE_HZ[settings.driver]
         seed = [world.settings.seed, zlib.crc32(settings.name.encode()), zlib.crc32(settings.serial.encode())]
-        self._rng = np.random.default_rng(seed)
+        self._rng = np.random.default_rng([*seed, world.settings.noise_seed])
         self._taus = np.asarray(truth.instability_taus_s)
         shape = (len(self._taus), len(truth.axes))
         self._drift_sd = truth.instability_dps / np.sqrt(len(self._taus))

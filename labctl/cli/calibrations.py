@@ -1,4 +1,4 @@
-"""`labctl fit`, `certify`, `revoke`, `calibration`, `compensate` and `effects`: from a recording to a corrected rate."""
+"""`labctl fit`, `certify`, `revoke`, `calibration`, `compensate`, `effects`: from a recording to a corrected rate."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def print_fit(answer: FitAnswer) -> None:
         coefficients = content["coefficients"]
         if "temperature_c" in coefficients:
             console.print(f"\n[bold]axis {axis}[/]: a table over {len(coefficients['temperature_c'])} temperatures")
-            print_table(axis, coefficients)
+            print_table(coefficients)
             continue
         rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
         for name, entry in coefficients.items():
@@ -68,7 +68,7 @@ def print_fit(answer: FitAnswer) -> None:
         console.print(rows)
 
 
-def print_table(axis: str, coefficients: dict[str, object]) -> None:
+def print_table(coefficients: dict[str, object]) -> None:
     """Print a coefficient table over temperature, one row per temperature."""
     names = [name for name in coefficients if name != "temperature_c"]
     nodes: list[float] = coefficients["temperature_c"]  # type: ignore[assignment]

@@ -23,7 +23,11 @@ CampaignId = Annotated[int | None, typer.Argument(metavar="ID", help="Campaign; 
 
 @app.command("plan")
 def plan(
-    recipe: Recipe, bench: BenchName = None, clip: Clip = False, as_json: Json = False, database: Database = None
+    recipe: Recipe,
+    bench: BenchName = None,
+    clip: Clip = False,
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
     """Say what a campaign would do and how long it takes. Nothing moves."""
     from labctl.services.planning import describe_plan
@@ -97,7 +101,8 @@ def print_campaign(answer: CampaignAnswer) -> None:
         console.print(f"  expected end {answer.expected_end:%Y-%m-%d %H:%M} UTC")
     if answer.chamber_c is not None:
         console.print(
-            f"  chamber {figure(answer.chamber_c)} deg C, gyro {figure(answer.gyro_c)} deg C, table {figure(answer.rate_dps)} deg/s"
+            f"  chamber {figure(answer.chamber_c)} deg C, gyro {figure(answer.gyro_c)} deg C, "
+            f"table {figure(answer.rate_dps)} deg/s"
         )
     if answer.last_error:
         console.print(f"  last fault: {answer.last_error}", style="red", markup=False)

@@ -4,7 +4,7 @@ from labctl.fitting.channels import Channels
 from labctl.fitting.context import Context, context_of
 from labctl.fitting.effects import CATALOGUE, describe_effects
 from labctl.fitting.figures import ErrorFigures, Spread, by_turning_axis, rms
-from labctl.fitting.fit import FitResult, coefficients_json, fit, residuals
+from labctl.fitting.fit import FitResult, coefficients_json, fit, fit_turning, residuals
 from labctl.fitting.model import ErrorModel, FittedModel
 from labctl.fitting.presets import PRESETS, describe_presets
 
@@ -24,6 +24,7 @@ __all__ = [
     "describe_effects",
     "describe_presets",
     "fit",
+    "fit_turning",
     "residuals",
     "rms",
 ]

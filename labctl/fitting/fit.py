@@ -110,6 +110,20 @@ def residuals(fitted: FittedModel, context: Context, turning: Mapping[str, Array
     return {axis: corrected[axis] - context.true_rate_dps(axis) for axis in outputs}
 
 
+def fit_turning(fitted: FittedModel, context: Context) -> dict[str, Array]:
+    """Return the once-per-turn Earth rate, axis -> cosine and sine per position, that a recording shows by itself.
+
+    For judging a calibration on a recording that it was not fitted to: where north lies there is not known in advance.
+    """
+    left = residuals(fitted, context)
+    found: dict[str, Array] = {}
+    for axis, values in left.items():
+        columns = turning_columns(context.info, context.channels, axis)
+        independent = columns.shape[1] > 0 and rank_of(columns) == columns.shape[1]
+        found[axis] = np.asarray(np.linalg.lstsq(columns, values)[0] if independent else [], dtype=np.float64)
+    return found
+
+
 def _turned(context: Context, axis: str, coefficients: Array | None) -> Array:
     if coefficients is None or len(coefficients) == 0:
         return np.zeros(len(context))

@@ -1,0 +1,45 @@
+"""(b) The fibre-optic gyro of Ojeda et al. 2000: error per rate, and per full turn."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from labctl.cli.demo.stage import Stage
+from labctl.cli.output import table
+from labctl.fitting import context_of, fit
+from labctl.turns import LEAST_RATE_DPS, error_per_turn
+
+SERIAL = "FOG-0001"
+
+
+def play(stage: Stage) -> None:
+    """Measure, fit, and show what is left per rate and per turn of 360 deg."""
+    stage.title("(b) Fibre-optic gyro: 21 rates x 11 temperatures on a single-axis table")
+    answer = stage.campaign("ojeda2000", "single-axis-sim")
+    recording = answer.recordings[SERIAL]
+    fitted = stage.fit(SERIAL, "ojeda2000", recording)
+    points = stage.store.recordings.points(recording)
+    context, result = context_of(points), fit(points, "ojeda2000")
+    rate = np.asarray(points.columns["table_rate_dps"])
+    raw = context.outputs["z"] - context.true_rate_dps("z")
+    at_rest = np.abs(rate) < 1e-9
+    bias = float(raw[at_rest].mean())
+    rows = table(
+        "RMS over all temperatures", "rate, deg/s", "error, deg/s", "compensated", "per turn, deg (less static bias)",
+        "per turn, compensated", numbers=5,
+    )  # fmt: skip
+    for asked in np.unique(np.round(rate[np.abs(rate) >= LEAST_RATE_DPS], 0))[::4]:
+        here = np.abs(rate - asked) < 0.5
+        before, after = raw[here], result.residual_dps["z"][here]
+        turns = (_rms(error_per_turn(errors, rate[here])) for errors in (before - bias, after))
+        rows.add_row(f"{asked:+.0f}", f"{_rms(before):.3f}", f"{_rms(after):.4f}", *(f"{t:.4f}" for t in turns))
+    stage.console.print(rows)
+    held = fitted.error.heldout_rms_dps
+    assert held is not None
+    assert fitted.error.raw_rms_dps is not None
+    stage.figures["single_axis"] = {"raw_over_held_out": fitted.error.raw_rms_dps / held}
+    stage.say(f"raw over held-out compensated error: {fitted.error.raw_rms_dps / held:.0f}")
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

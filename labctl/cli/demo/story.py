@@ -1,0 +1,46 @@
+"""The order of the demo."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+from instruments.clock import VirtualClock
+from labctl.cli.demo import published, served, single_axis, triaxial
+from labctl.cli.demo.stage import Stage, maybe_silent
+from labctl.errors import BadInput
+from labctl.services.acts import CertifyRequest
+from labctl.services.calibrations import certify
+from labctl.store import open_store
+
+DATABASE = "demo.sqlite"
+
+
+def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) -> dict[str, Any]:
+    """Play the whole story into `folder`; returns its figures, each computed in this run."""
+    location = database or str(_fresh(folder) / DATABASE)
+    with maybe_silent(quiet) as console, open_store(location, write=True) as store:
+        stage = Stage(store, folder, console, quiet)
+        triaxial.play(stage, quick=quick)
+        single_axis.play(stage)
+        published.play(stage)
+        serials = [triaxial.SERIAL, single_axis.SERIAL, "WEISS-ENV05S", "OSU-FOG-2024"]
+        for serial in serials:
+            request = CertifyRequest(by="the demo", reason="computed and checked in this run")
+            certify(store, serial, 1, "certify", request, VirtualClock().utc())
+        served.play(stage, serials)
+        stage.title("Where to look")
+        stage.say(f"labctl serve --simulate --database {location}     then http://127.0.0.1:8420/docs")
+        stage.say(f"labctl campaign list --database {location};  labctl calibration FOG-0001 --database {location}")
+    return stage.figures
+
+
+def _fresh(folder: Path) -> Path:
+    """Return an empty folder; one that an earlier demo made is emptied, any other is left alone."""
+    if folder.exists() and any(folder.iterdir()):
+        if not (folder / DATABASE).exists():
+            raise BadInput(f"{folder}: not empty, and not from an earlier demo; name another with --out DIR")
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

@@ -1,0 +1,52 @@
+"""Error after a full turn, and the static bias before a mission (Ojeda et al. 2000, eqs. 1 and 14 to 16)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadInput, NotEnoughData
+
+#: The error per turn grows without bound towards rest.
+LEAST_RATE_DPS = 5.0
+LEAST_READINGS = 10
+
+
+def error_per_turn(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the error after one turn of 360 deg, (n,) deg, of rate errors (n,) deg/s at table rates (n,) deg/s.
+
+    Eq. 14 is error x sampling rate x time for an error per sample; for an error in deg/s it is error x time, with
+    360 / |rate| seconds for a turn. Raises BadInput below 5 deg/s.
+    """
+    slow = np.abs(rate_dps) < LEAST_RATE_DPS
+    if np.any(slow):
+        raise BadInput(
+            f"rate {float(np.asarray(rate_dps)[slow][0]):g} deg/s: the error per turn is given from {LEAST_RATE_DPS:g} "
+            "deg/s on; look at the error in deg/s instead"
+        )
+    return error_dps * 360.0 / np.abs(rate_dps)
+
+
+@dataclass(frozen=True)
+class StaticBias:
+    """The output at rest before a mission, to be taken off during it (eq. 16). It contains the Earth's rate there."""
+
+    bias_dps: float
+    u_dps: (
+        float  #: standard uncertainty: white noise of the mean, and the bias instability that averaging cannot remove
+    )
+    readings: int
+
+
+def static_bias(at_rest_dps: NDArray[np.float64], instability_dps: float = 0.0) -> StaticBias:
+    """Return the mean of readings at rest, (n,) deg/s, raw (eq. 1) or compensated (eq. 15), with its uncertainty.
+
+    10 to 20 s of readings are usual. Raises NotEnoughData for fewer than 10 readings.
+    """
+    n = len(at_rest_dps)
+    if n < LEAST_READINGS or not np.all(np.isfinite(at_rest_dps)):
+        raise NotEnoughData(f"a static bias needs at least {LEAST_READINGS} finite readings at rest; {n} were given")
+    white = float(np.std(at_rest_dps, ddof=1)) / np.sqrt(n)
+    return StaticBias(float(np.mean(at_rest_dps)), float(np.hypot(white, instability_dps)), n)
