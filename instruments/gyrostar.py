@@ -157,6 +157,8 @@ class Gyrostar:
         while self._due_s() <= end_s + TINY / self.sample_rate_hz:
             sleep_until(self._clock, self._due_s())
             lost += self._skip()
+            if self._due_s() > end_s + TINY / self.sample_rate_hz:
+                break  # what delayed the reading before took longer than the rest of the time
             times.append(self._clock.now_s())
             self._k += 1
             try:
