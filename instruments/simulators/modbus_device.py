@@ -96,6 +96,8 @@ class ModbusDevice:
 
     def receive(self, data: bytes, t_s: float) -> None:
         """Take bytes; every whole request to this address in them is answered."""
+        if self._pending and not self._is_whole(self._pending + data) and self._is_whole(data):
+            self._pending = b""  # the rest of something that never was a request
         self._pending += data
         while self._pending:
             used, unit, transaction, pdu = self._framer.decode(self._pending)
@@ -119,6 +121,9 @@ class ModbusDevice:
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002
         """Nothing comes unasked."""
         return None
+
+    def _is_whole(self, data: bytes) -> bool:
+        return bool(self._framer.decode(data)[3])
 
     def _is_no_frame(self) -> bool:
         return not self._rtu and self._pending[2:4].strip(b"\0") != b""  # TCP: the protocol number is 0

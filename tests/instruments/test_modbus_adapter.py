@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from instruments import modbus
@@ -241,8 +241,11 @@ def test_no_garbage_ever_raises_anything_else(framing: str, answers: list[bytes]
     assert bench.clock.now_s() < 10 * ALL_TRIES_S
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.sampled_from(["tcp", "rtu"]), st.binary(max_size=300))
+@example("tcp", b"\0\0\0")
+@example("tcp", b"\0\0\0\0\0\xff\1\3")
+@example("rtu", b"\1\x10\0\0\0\1\xff")
 def test_a_simulated_instrument_survives_garbage_too(framing: str, garbage: bytes) -> None:
     bench = Bench(framing)
     bench.device.receive(garbage, 0.0)
