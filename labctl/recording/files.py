@@ -53,7 +53,8 @@ def _read_head(path: Path) -> RecordingInfo:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise BadRecording(f"{path}: not TOML: {error}") from error
     except ValidationError as error:
-        first = error.errors()[0]
+        # a misspelt key is both unknown and missing: the unknown one is what a person looks for
+        first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         place = ".".join(str(part) for part in first["loc"])
         given = "" if first["type"] == "missing" else f" (is {first['input']!r})"
         raise BadRecording(f"{path}: {place}: {first['msg']}{given}") from error

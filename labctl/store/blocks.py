@@ -22,7 +22,7 @@ from labctl.errors import StoreError
 
 CODEC = 1
 #: Compression effort while readings come in, and when a finished data set is packed for good.
-LIVE, FINAL = 1, 6
+LIVE, FINAL = 0, 6
 _HEAD = struct.Struct("<I")
 
 
@@ -53,7 +53,7 @@ def pack(columns: Mapping[str, NDArray[Any]], effort: int = LIVE) -> Block:
         if residue is not None:
             groups.setdefault(width, []).append(residue)
     parts = [_compress(np.stack(group), effort) for _, group in sorted(groups.items())]
-    head = json.dumps([heads, [len(part) for part in parts]], separators=(",", ":")).encode()
+    head = json.dumps([heads, [len(part) for part in parts], effort], separators=(",", ":")).encode()
     data = _HEAD.pack(len(head)) + head + b"".join(parts)
     return Block(n, CODEC, zlib.crc32(data), data)
 
@@ -67,12 +67,12 @@ def unpack(block: Block) -> dict[str, NDArray[Any]]:
             f"a block of readings is packed by codec {block.codec}, this labctl knows {CODEC}; use a newer one"
         )
     (size,) = _HEAD.unpack_from(block.data)
-    heads, lengths = json.loads(block.data[_HEAD.size : _HEAD.size + size])
+    heads, lengths, effort = json.loads(block.data[_HEAD.size : _HEAD.size + size])
     at, widths = _HEAD.size + size, sorted({head[1] for head in heads if head[1]})
     stacks: dict[str, Any] = {}
     for width, length in zip(widths, lengths, strict=True):
         rows = sum(head[1] == width for head in heads)
-        raw = _decompress(block.data[at : at + length])
+        raw = _decompress(block.data[at : at + length]) if effort else block.data[at : at + length]
         stacks[width] = iter(np.frombuffer(raw, dtype=width).reshape(rows, block.n))
         at += length
     return {head[0]: _restore(head, next(stacks[head[1]]) if head[1] else None, block.n) for head in heads}
@@ -81,6 +81,8 @@ def unpack(block: Block) -> dict[str, NDArray[Any]]:
 def _compress(stack: NDArray[Any], effort: int) -> bytes:
     if stack.size == 0:
         return b""
+    if effort == 0:
+        return stack.tobytes()
     packed: bytes = blosc2.compress2(
         np.ascontiguousarray(stack),
         codec=blosc2.Codec.ZSTD,
@@ -116,6 +118,8 @@ def _even_ramp(values: NDArray[np.int64]) -> tuple[int, int, int] | None:
     steps = len(values) - 1
     first, span = int(values[0]), int(values[-1]) - int(values[0])
     if abs(span) >= 2**62 // max(steps, 1):
+        return None
+    if abs(int(values[1]) - first - span // steps) > 1:
         return None
     index = np.arange(len(values), dtype=np.int64)
     return (first, span, steps) if np.array_equal(values, first + (index * span) // steps) else None

@@ -75,6 +75,7 @@ class Database:
         self._guard = threading.RLock()
         self._lock: FileLock | None = None
         self._sqlite = not is_url(location)
+        self._synced = True
         if self._sqlite:
             Path(location).parent.mkdir(parents=True, exist_ok=True)
         if write:
@@ -151,14 +152,29 @@ class Database:
             ) from error
 
     @contextmanager
-    def writing(self) -> Iterator[sa.Connection]:
-        """Give the one writing connection inside a transaction: all of it is kept, or nothing."""
+    def writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
+        """Give the one writing connection inside a transaction: all of it is kept, or nothing.
+
+        What is not `synced` outlives this process at once, but a power cut only when the next synced transaction ends:
+        a log is written in order, so that one carries all before it to the disk.
+        """
         with self._guard:
             try:
+                self._sync(synced)
                 with self._engine.begin() as connection:
                     yield connection
             except sa.exc.OperationalError as error:
                 raise StoreError(f"{self.location}: {error.orig}; nothing of this act was kept") from error
+
+    def _sync(self, synced: bool) -> None:
+        if not self._sqlite or synced == self._synced:
+            return
+        driver = self._engine.raw_connection()
+        try:
+            driver.cursor().execute(f"PRAGMA synchronous={'FULL' if synced else 'NORMAL'}")
+        finally:
+            driver.close()
+        self._synced = synced
 
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:

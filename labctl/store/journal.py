@@ -1,4 +1,8 @@
-"""The engine's journal in the database: every call is durable before it returns."""
+"""The engine's journal in the database.
+
+Every call outlives this process when it returns. A power cut may take the readings and the environment of the data set
+that is open, which is redone anyway; closing a data set, and every change of step or state, is on the disk.
+"""
 
 from __future__ import annotations
 
@@ -117,7 +121,7 @@ class StoreJournal:
         recording = self._recordings[gyro]
         parts = self._open.setdefault((dataset, gyro), [])
         d = tables.data_sets
-        with self._database.writing() as connection:
+        with self._database.writing(synced=False) as connection:
             if len(readings):
                 columns = _columns(readings, chamber_c)
                 row = block_row(recording, dataset, len(parts), blocks.pack(columns))
@@ -182,7 +186,7 @@ class StoreJournal:
             if gyro in sample.gyro_c
         ]
         if rows:
-            with self._database.writing() as connection:
+            with self._database.writing(synced=False) as connection:
                 connection.execute(_ADD_ENVIRONMENT, rows)
 
     def event(self, event: Event, t_s: float, at: datetime) -> None:
