@@ -53,6 +53,10 @@ class Context:
             white_var=white,
         )
 
+    def white_dps(self, axis: str) -> float | None:
+        """Return the white noise of a data-set mean, root mean square, deg/s; None when it is not known."""
+        return None if self.white_var is None else float(np.sqrt(self.white_var[axis].mean()))
+
     def scatter(self, axis: str) -> Scatter:
         """Return what is known of the noise of one axis before the fit."""
         m = len(self)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from labctl.fitting.channels import Array, Channels
+from labctl.fitting.noise import Scatter
 from labctl.recording import RecordingInfo
 
 EARTH_RATE_DPS = 15.041067 / 3600.0  #: sidereal
@@ -20,6 +22,34 @@ def up_rate_dps(info: RecordingInfo) -> float:
     tilt, azimuth = math.radians(info.tilt_deg or 0.0), math.radians(info.tilt_azimuth_deg or 0.0)
     up = math.sin(latitude) * math.cos(tilt) + math.cos(latitude) * math.sin(tilt) * math.cos(azimuth)
     return EARTH_RATE_DPS * up
+
+
+def turning_size_dps(info: RecordingInfo) -> float:
+    """Return the size of the Earth's rate that goes round with the table, deg/s; 0 where the latitude is not known."""
+    return 0.0 if info.latitude_deg is None else EARTH_RATE_DPS * math.cos(math.radians(info.latitude_deg))
+
+
+def with_known_size(
+    columns: Array, turning: Array, y: Array, scatter: Scatter, size_dps: float
+) -> tuple[Array, Array, Scatter]:
+    """Return design, y and scatter with the turning columns beside the model's, and what is known of their size.
+
+    Only the direction of north is unknown: each of cosine and sine is 0 with the standard deviation that a vector of
+    the known size has along a random direction, said by one more row for each.
+    """
+    extra = turning.shape[1]
+    if extra == 0 or scatter.white_var is None:
+        return columns, y, scatter
+    upper = np.column_stack([columns, turning])
+    lower = np.column_stack([np.zeros((extra, columns.shape[1])), np.eye(extra)])
+    more = replace(
+        scatter,
+        t_s=np.concatenate([scatter.t_s, np.zeros(extra)]),
+        run=np.concatenate([scatter.run, -1 - np.arange(extra)]),
+        rate_dps=np.concatenate([scatter.rate_dps, np.zeros(extra)]),
+        white_var=np.concatenate([scatter.white_var, np.full(extra, size_dps**2 / 2)]),
+    )
+    return np.vstack([upper, lower]), np.concatenate([y, np.zeros(extra)]), more
 
 
 def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from labctl.errors import NotEnoughData
 from labctl.fitting.channels import Array
 from labctl.fitting.context import Context, context_of
-from labctl.fitting.earth import EARTH_RATE_DPS, turning_columns, up_rate_dps
+from labctl.fitting.earth import turning_columns, turning_size_dps, up_rate_dps, with_known_size
 from labctl.fitting.effects import effect
 from labctl.fitting.estimate import Solution, rank_of, solve
 from labctl.fitting.figures import ErrorFigures, floor_from_repeats, rms
@@ -153,12 +153,15 @@ def _solve_axes(
     for axis in context.outputs:
         columns, names, earth = design(context, model, axis)
         k = columns.shape[1]
-        together = np.column_stack([columns, earth])
-        if earth.shape[1] and rank_of(together) < together.shape[1]:
-            together = columns  # whole turns only: the once-per-turn part has averaged out
+        if k == 0:
+            raise NotEnoughData(
+                f"{context.info.serial}, axis {axis}: the recording exercises no effect of model {model.name} "
+                f"({', '.join(model.effect_ids)}); turn the unit about its other axes too"
+            )
         y = context.outputs[axis] - context.true_rate_dps(axis)
+        together, y, scatter = with_known_size(columns, earth, y, context.scatter(axis), turning_size_dps(context.info))
         try:
-            solution = solve(together, y, context.scatter(axis), fixed[axis].drift if fixed else None)
+            solution = solve(together, y, scatter, fixed[axis].drift if fixed else None)
         except NotEnoughData as error:
             raise NotEnoughData(f"{context.info.serial}, axis {axis}, model {model.name}: {error}") from None
         nodes = k // max(len(names), 1)
@@ -169,7 +172,7 @@ def _solve_axes(
             solution.values[:k].reshape(len(names), nodes),
             solution.covariance[:k, :k],
         )
-        solutions[axis], turning[axis] = solution, solution.values[k:]
+        solutions[axis], turning[axis] = replace(solution, white_dps=context.white_dps(axis)), solution.values[k:]
     return fits, solutions, turning
 
 
@@ -256,5 +259,5 @@ def _environment(context: Context, turning: Mapping[str, Array]) -> dict[str, An
     fitted = {a: np.hypot(c[0::2], c[1::2]).tolist() for a, c in turning.items() if len(c)}
     if fitted:
         said["once_per_turn_dps"] = fitted
-        said["once_per_turn_expected_dps"] = EARTH_RATE_DPS * float(np.cos(np.radians(info.latitude_deg)))
+        said["once_per_turn_expected_dps"] = turning_size_dps(info)
     return said

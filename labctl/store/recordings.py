@@ -192,7 +192,8 @@ def _add_samples(connection: sa.Connection, recording: int, samples: Recording) 
         part = {name: values[start:end] for name, values in columns.items()}
         number = int(part["dataset"][0])
         valid = part["valid"] != 0 if "valid" in part else np.ones(end - start, dtype=bool)
-        heads.append(_head_of(recording, number, part, int(valid.sum())))
+        counted = {name: values[valid] for name, values in part.items()} if valid.any() else part
+        heads.append(_head_of(recording, number, counted, int(valid.sum())))
         means += means_rows(recording, number, part, valid)
         packed.append(block_row(recording, number, 0, blocks.pack(part, blocks.FINAL)))
     _insert(connection, (tables.data_sets, heads), (tables.data_set_means, means), (tables.sample_blocks, packed))

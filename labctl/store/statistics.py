@@ -42,5 +42,6 @@ def white_std(values: NDArray[np.float64]) -> float:
     Lines from the table's steps make a reading scatter, but average out over a data set; they fill few frequencies, so
     the median does not see them. Neither does it see drift, which fills only the lowest.
     """
-    spectrum = np.abs(np.fft.rfft(values - values.mean())[1:-1]) ** 2 / len(values)
+    window = np.hanning(len(values))  # a strong line must not leak into the frequencies beside it
+    spectrum = np.abs(np.fft.rfft((values - values.mean()) * window)[2:-1]) ** 2 / np.sum(window**2)
     return float(np.sqrt(np.median(spectrum) / _MEDIAN_TO_MEAN))

@@ -1,0 +1,201 @@
+"""The command line: what it prints, and one clear line with exit status 2 for everything that is wrong."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from labctl.cli.app import app
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+runner = CliRunner()
+
+
+class Lab:
+    """labctl with its own database."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.database = folder / "lab.sqlite"
+
+    def run(self, *arguments: str, status: int = 0) -> Any:
+        result = runner.invoke(app, [*arguments, "--database", str(self.database)])
+        assert result.exit_code == status, result.output + result.stderr + repr(result.exception)
+        return result
+
+    def json(self, *arguments: str) -> Any:
+        return json.loads(self.run(*arguments, "--json").stdout)
+
+    def content(self) -> str:
+        with sqlite3.connect(self.database) as raw:
+            text = "\n".join(raw.iterdump())
+        raw.close()
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Lab:
+    return Lab(tmp_path)
+
+
+@pytest.fixture
+def fog(lab: Lab) -> Lab:
+    lab.run("import", str(EXAMPLES / "osu-fog"))
+    return lab
+
+
+def test_import_says_what_came_in(lab: Lab) -> None:
+    assert lab.json("import", str(EXAMPLES / "osu-fog")) == {
+        "serial": "OSU-FOG-2024", "recording": 1, "datasets": 695, "readings": 695,
+    }  # fmt: skip
+
+
+def test_fit_answers_what_the_contract_says(fog: Lab) -> None:
+    answer = fog.json("fit", "OSU-FOG-2024", "--model", "ojeda2000")
+    assert answer["serial"] == "OSU-FOG-2024"
+    assert answer["version"] == 1
+    assert answer["model"] == {"name": "ojeda2000", "effects": ["rate_temperature_surface"], "argument": "output"}
+    assert set(answer["error"]) >= {"raw_rms_dps", "rms_dps", "heldout_rms_dps", "noise_floor_dps"}
+    assert answer["error"]["rms_dps"] < answer["error"]["heldout_rms_dps"] < 0.1 < answer["error"]["raw_rms_dps"]
+    assert len(answer["axes"]["z"]["coefficients"]) == 12
+    assert set(answer["axes"]["z"]["coefficients"]["c_r0_t0"]) == {"value", "u", "unit"}
+    assert answer["validity"]["rate_dps"][0] < -100 < 100 < answer["validity"]["rate_dps"][1]
+
+
+def test_effects_with_orders_are_a_complete_model(fog: Lab) -> None:
+    answer = fog.json("fit", "OSU-FOG-2024", "--effects", "bias,scale_factor,bias_temperature:1")
+    assert answer["model"]["effects"] == ["bias", "scale_factor", "bias_temperature"]
+    assert answer["model"]["argument"] == "rate"
+    added = fog.json("fit", "OSU-FOG-2024", "--model", "bias_scale", "--effects", "scale_factor_odd:5")
+    assert added["model"]["effects"][-1] == "scale_factor_odd"
+    assert added["version"] == 2
+
+
+def test_from_import_to_a_corrected_file(fog: Lab) -> None:
+    fog.run("fit", "OSU-FOG-2024", "--model", "ojeda2000")
+    refused = fog.run("calibration", "OSU-FOG-2024", status=1)
+    assert "no certified calibration" in refused.stderr
+    fog.run("certify", "OSU-FOG-2024", "1", "--by", "A", "--reason", "fits")
+    file = fog.folder / "fog.json"
+    fog.run("calibration", "OSU-FOG-2024", "--out", str(file))
+    raw = fog.folder / "raw.csv"
+    raw.write_text("t_s,gyro_z,temperature_c\n0.0,-1.4,40\n0.1,-1.4,40\n0.2,-1.4,90\n")
+    out = fog.folder / "out.csv"
+    answer = fog.json("compensate", str(file), str(raw), str(out))
+    assert (answer["rows"], answer["outside"]) == (3, 1)
+    rows = out.read_text().splitlines()
+    assert rows[0].replace('"', "").split(",")[-2:] == ["rate_z_dps", "outside"]
+    assert float(rows[1].split(",")[3]) == pytest.approx(51.0, abs=2.0)
+    fog.run("compensate", str(file), str(raw), str(out), "--outside", "refuse", status=2)
+
+
+def test_a_published_table_becomes_a_calibration(lab: Lab) -> None:
+    assert lab.json("import", str(EXAMPLES / "weiss-gyrostar"))["datasets"] == 0
+    table = lab.json("fit", "WEISS-ENV05S", "--model", "weiss1995")["axes"]["z"]["coefficients"]
+    assert table["temperature_c"] == [16.0, 18.0, 19.5, 22.0, 23.0, 45.0]
+    assert table["bias"]["value"][0] == pytest.approx((2.428 - 2.5) / 0.022)
+    assert table["scale_factor"]["value"][4] == pytest.approx(22.078 / 22.0 - 1)
+    assert "only model weiss1995" in lab.run("fit", "WEISS-ENV05S", "--model", "ojeda2000", status=2).stderr
+
+
+def test_export_and_import_again_give_the_same_fit(fog: Lab) -> None:
+    fog.run("export", "recording", "1", "--out", str(fog.folder / "out"))
+    fog.run("import", str(fog.folder / "out"))
+    one, two = (
+        fog.json("fit", "OSU-FOG-2024", "--model", "ojeda2000", "--recording", number)["axes"] for number in "12"
+    )
+    assert one == two
+
+
+def test_simulate_hides_an_effect(lab: Lab) -> None:
+    plain = lab.json("simulate", "short", "--out", str(lab.folder / "a"), "--seed", "4")
+    hidden = lab.json("simulate", "short", "--out", str(lab.folder / "b"), "--seed", "4", "--hide", "bias=0.7")
+    assert hidden["hidden"] == {"bias": 0.7}
+    assert plain["readings"] == hidden["readings"]
+    biases = []
+    for folder in "ab":
+        lab.run("import", str(lab.folder / folder))
+        answer = lab.json("fit", plain["serial"], "--effects", "bias,scale_factor")
+        biases.append(answer["axes"]["z"]["coefficients"]["bias"]["value"])
+    assert biases[1] - biases[0] == pytest.approx(0.7, abs=1e-6)
+
+
+def test_a_campaign_from_plan_to_status(lab: Lab) -> None:
+    plan = lab.json("campaign", "plan", "table1-x-table2")
+    assert plan["datasets"] == 630
+    started = lab.json("campaign", "start", "short")
+    assert started["state"] == "done"
+    assert started["progress"] == 1.0
+    status = lab.json("campaign", "status")
+    assert status["id"] == started["id"]
+    assert [c["id"] for c in lab.json("campaign", "list")] == [1]
+
+
+def _edited(lab: Lab) -> list[str]:
+    lab.run("fit", "OSU-FOG-2024", "--model", "ojeda2000")
+    file = lab.folder / "edited.json"
+    lab.run("calibration", "OSU-FOG-2024", "--version", "1", "--out", str(file))
+    file.write_text(file.read_text().replace('"version":1', '"version":2'))
+    raw = lab.folder / "raw.csv"
+    raw.write_text("gyro_z,temperature_c\n0,40\n")
+    return ["compensate", str(file), str(raw), str(lab.folder / "out.csv")]
+
+
+def _recipe(lab: Lab, text: str) -> str:
+    path = lab.folder / "recipe.toml"
+    path.write_text(text)
+    return str(path)
+
+
+WRONG_KEY = 'format = "labctl-recipe/1"\nname = "x"\ntemperature_c = [25]\nrates_dps = [1]\npositions = ["z"]\n'
+TOO_FAST = 'format = "labctl-recipe/1"\nname = "x"\ntemperatures_c = [25]\nrates_dps = [1, 900]\npositions = ["z"]\n'
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (lambda _: ["fit", "NOBODY", "--model", "ojeda2000"], "unit 'NOBODY' is not in this database"),
+        (lambda _: ["fit", "OSU-FOG-2024", "--model", "nonsense"], "error model 'nonsense' is not known"),
+        (lambda _: ["fit", "OSU-FOG-2024", "--effects", "saturatoin"], "did you mean saturation"),
+        (lambda _: ["fit", "OSU-FOG-2024", "--model", "ojeda2000", "--recording", "77"], "recording 77 is not in"),
+        (lambda _: ["fit", "OSU-FOG-2024", "--effects", "misalignment"], "axis z"),
+        (lambda lab: ["campaign", "plan", _recipe(lab, WRONG_KEY)], "temperature_c"),
+        (lambda lab: ["campaign", "plan", _recipe(lab, TOO_FAST)], "900"),
+        (lambda _: ["campaign", "plan", "no-such-recipe"], "no-such-recipe"),
+        (lambda _: ["campaign", "plan", "short", "--bench", "nowhere.toml"], "nowhere.toml"),
+        (_edited, "was edited or damaged"),
+        (lambda lab: ["import", str(lab.folder)], "recording.toml: not found"),
+        (
+            lambda lab: ["simulate", "short", "--out", str(lab.folder / "s"), "--hide", "ghost"],
+            "'ghost' cannot be hidden",
+        ),
+        (lambda _: ["certify", "OSU-FOG-2024", "9", "--by", "A", "--reason", "B"], "no calibration version 9"),
+        (lambda _: ["serve", "--host", "0.0.0.0"], "loopback only"),
+    ],
+)
+def test_what_is_wrong_gets_one_clear_line_and_changes_nothing(fog: Lab, arguments: Any, said: str) -> None:
+    given = arguments(fog)
+    before = fog.content()
+    result = fog.run(*given, status=2)
+    assert said in result.stderr
+    assert result.stderr.count("\n") == 1, result.stderr
+    assert result.stdout == ""
+    assert fog.content() == before
+
+
+def test_clip_leaves_out_what_the_bench_cannot_do(lab: Lab) -> None:
+    plan = lab.json("campaign", "plan", _recipe(lab, TOO_FAST), "--clip")
+    assert plan["datasets"] == 1
+    assert "900" in plan["clipped"][0]
+
+
+def test_a_bench_is_checked(lab: Lab) -> None:
+    answer = lab.json("bench", "check", "triaxial-sim")
+    assert answer["ok"]
+    assert [device["device"] for device in answer["devices"]] == ["table", "chamber", "mems"]

@@ -1,0 +1,191 @@
+"""One writer, known steps, nothing half-written."""
+
+from __future__ import annotations
+
+import io
+import sqlite3
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sqlalchemy as sa
+from alembic import command
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from sqlalchemy.dialects import postgresql
+
+from labctl.errors import Conflict, NotCertified, NotFound, StoreError
+from labctl.recording import Recording, RecordingInfo, to_points
+from labctl.store import NewCalibration, Store, holder_of, migrations, open_store, tables
+
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+
+
+@pytest.fixture
+def location(tmp_path: Path) -> str:
+    return str(tmp_path / "lab.sqlite")
+
+
+def samples(seed: int = 1) -> Recording:
+    rng = np.random.default_rng(seed)
+    columns = {
+        "dataset": np.repeat([1, 2, 3], 200),
+        "t_s": np.arange(600) * 0.1,
+        "position": np.full(600, "z"),
+        "run": np.ones(600, dtype=np.int64),
+        "mounting": np.ones(600, dtype=np.int64),
+        "table_rate_dps": np.repeat([0.0, 10.0, -10.0], 200),
+        "temperature_c": rng.normal(25, 0.1, 600),
+        "humidity_rh": rng.normal(40, 1, 600),
+        "gyro_z": rng.normal(0, 1, 600),
+        "valid": (rng.uniform(size=600) > 0.1).astype(np.int64),
+    }
+    info = RecordingInfo(serial="G-1", model="M", axes=("z",), kind="samples", started_at=AT, technology="fog")
+    environment = {"t_s": np.array([0.0, 10.0]), "run": np.array([1, 1]), "temperature_c": np.array([25.0, 25.5])}
+    return Recording(info, columns, environment)
+
+
+def test_migrations_make_todays_tables(location: str) -> None:
+    with open_store(location, write=True):
+        pass
+    engine = sa.create_engine(f"sqlite:///{location}")
+    with engine.connect() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": False})
+        assert compare_metadata(context, tables.metadata) == []
+    engine.dispose()
+
+
+def test_migrations_can_be_written_for_postgresql() -> None:
+    out = io.StringIO()
+    config = migrations.configuration()
+    config.output_buffer = out
+    config.set_main_option("sqlalchemy.url", "postgresql+psycopg://nowhere/none")
+    command.upgrade(config, "head", sql=True)
+    text = out.getvalue()
+    assert "CREATE TABLE sample_blocks" in text
+    assert "BYTEA" in text
+    for table in tables.metadata.sorted_tables:
+        assert str(sa.schema.CreateTable(table).compile(dialect=postgresql.dialect()))
+
+
+def test_a_newer_database_is_refused_and_left_alone(location: str) -> None:
+    with open_store(location, write=True):
+        pass
+    with sqlite3.connect(location) as raw:
+        raw.execute("UPDATE alembic_version SET version_num = '9999'")
+    raw.close()
+    before = Path(location).read_bytes()
+    with pytest.raises(StoreError, match="newer than this labctl"), open_store(location, write=True):
+        pass
+    assert Path(location).read_bytes() == before
+
+
+def test_something_else_is_refused(location: str) -> None:
+    Path(location).write_bytes(b"this is not a database at all" * 100)
+    with pytest.raises(StoreError, match="not a labctl database, or damaged"), open_store(location, write=True):
+        pass
+
+
+def test_a_second_writer_is_told_who_holds_it(location: str) -> None:
+    with open_store(location, write=True, url="http://127.0.0.1:1") as store:
+        holder = holder_of(location)
+        assert holder is not None
+        assert holder.url == "http://127.0.0.1:1"
+        with (
+            pytest.raises(Conflict, match=r"the service at http://127\.0\.0\.1:1 writes"),
+            open_store(location, write=True),
+        ):
+            pass
+        with open_store(location, write=False) as reader:
+            assert reader.units.all() == []
+        store.recordings.add_import(samples(), AT)
+        with open_store(location, write=False) as reader:
+            assert [unit.serial for unit in reader.units.all()] == ["G-1"]
+    assert holder_of(location) is None
+
+
+def test_a_reader_cannot_write(location: str) -> None:
+    with (
+        open_store(location, write=False) as reader,
+        pytest.raises(StoreError, match="readonly"),
+    ):
+        reader.recordings.add_import(samples(), AT)
+
+
+def test_an_import_comes_back_exactly(location: str) -> None:
+    given = samples()
+    with open_store(location, write=True) as store:
+        number = store.recordings.add_import(given, AT)
+        back = store.recordings.samples(number)
+        points, expected = store.recordings.points(number), to_points(given)
+        head = store.recordings.get(number)
+    for name, values in given.columns.items():
+        assert np.array_equal(back.columns[name], values), name
+    assert back.environment is not None
+    assert np.array_equal(back.environment["temperature_c"], [25.0, 25.5])
+    for name in ("gyro_z", "temperature_c", "humidity_rh", "gyro_z_std", "table_rate_dps", "t_s"):
+        assert points.columns[name] == pytest.approx(expected.columns[name], abs=1e-12), name
+    assert points.columns["n"].tolist() == expected.columns["n"].tolist()
+    assert head.readings == int(given.columns["valid"].sum())
+
+
+def test_nothing_is_left_of_an_import_that_fails(location: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_store(location, write=True) as store:
+        monkeypatch.setattr("labctl.store.recordings._add_environment", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            store.recordings.add_import(samples(), AT)
+        assert store.units.all() == []
+        with pytest.raises(NotFound):
+            store.recordings.get(1)
+
+
+def _calibration(version: int) -> NewCalibration:
+    return NewCalibration(None, None, "m", f"document {version}".encode(), "h" * 64, {"error": {}})
+
+
+@pytest.fixture
+def store(location: str) -> Store:
+    with open_store(location, write=True) as opened:
+        opened.recordings.add_import(samples(), AT)
+        yield opened  # type: ignore[misc]
+
+
+def test_versions_count_per_unit_and_never_change(store: Store) -> None:
+    assert [store.calibrations.add("G-1", AT, _calibration).version for _ in range(3)] == [1, 2, 3]
+    assert store.calibrations.document("G-1", 2) == (b"document 2", "h" * 64)
+    with pytest.raises(NotFound, match="no calibration version 4"):
+        store.calibrations.document("G-1", 4)
+
+
+def test_certifying_an_older_version_is_a_rollback(store: Store) -> None:
+    for _ in range(2):
+        store.calibrations.add("G-1", AT, _calibration)
+    with pytest.raises(NotCertified):
+        store.calibrations.certified_version("G-1")
+    act: Callable[..., object] = store.calibrations.certify
+    act("G-1", 2, "certify", by="A", reason="new", at=AT)
+    act("G-1", 1, "certify", by="B", reason="the new one drifts", at=AT)
+    assert store.calibrations.certified_version("G-1") == 1
+    with pytest.raises(Conflict, match="not in force"):
+        act("G-1", 2, "revoke", by="B", reason="wrong", at=AT)
+    act("G-1", 1, "revoke", by="B", reason="lost trust", at=AT)
+    with pytest.raises(NotCertified):
+        store.calibrations.certified_version("G-1")
+    assert [row.act for row in store.calibrations.history("G-1")] == ["revoke", "certify", "certify"]
+
+
+def test_the_audit_trail_notices_an_edit(store: Store, location: str) -> None:
+    for _ in range(3):
+        store.calibrations.add("G-1", AT, _calibration)
+    assert store.first_broken_audit_row() is None
+    with sqlite3.connect(location) as raw:
+        raw.execute("UPDATE audit SET actor = 'somebody else' WHERE id = 2")
+    raw.close()
+    assert store.first_broken_audit_row() == 2
+
+
+def test_naive_instants_are_refused(store: Store) -> None:
+    with pytest.raises(sa.exc.StatementError, match="needs a time zone"):
+        store.calibrations.add("G-1", datetime(2026, 1, 1), _calibration)  # noqa: DTZ001  that is the point
