@@ -31,7 +31,8 @@ def test_no_file_passes_400_lines(path: Path) -> None:
     assert lines <= 400, f"{name(path)} has {lines} lines; split it by reason to change"
 
 
-@pytest.mark.parametrize("path", RUNTIME, ids=name)
+# A migration is a frozen list of tables: data, not a function to read.
+@pytest.mark.parametrize("path", [path for path in RUNTIME if "versions" not in path.parts], ids=name)
 def test_no_function_passes_70_lines(path: Path) -> None:
     long = [
         f"{name(path)}:{node.lineno} {node.name}"

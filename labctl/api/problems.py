@@ -9,6 +9,7 @@ from starlette.exceptions import HTTPException
 
 from instruments.errors import InstrumentError
 from labctl.errors import LabctlError
+from procedures.errors import PlanRefused, ProcedureError
 
 TYPE_PREFIX = "urn:labctl:problem:"
 
@@ -33,6 +34,11 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(InstrumentError)
     def of_an_instrument(request: Request, error: InstrumentError) -> JSONResponse:
         return problem(502, "instrument", _title(type(error)), str(error), request.url.path)
+
+    @app.exception_handler(ProcedureError)
+    def of_a_procedure(request: Request, error: ProcedureError) -> JSONResponse:
+        slug = "plan-refused" if isinstance(error, PlanRefused) else "recipe"
+        return problem(400, slug, _title(type(error)), str(error), request.url.path)
 
     @app.exception_handler(RequestValidationError)
     def of_the_request(request: Request, error: RequestValidationError) -> JSONResponse:

@@ -19,11 +19,11 @@ from procedures.control import Control
 
 TINY = """format = "labctl-recipe/1"
 name = "tiny"
-temperatures_c = [24, 28, 32]
+temperatures_c = [10, 25, 40]
 rates_dps = [-300, -40, 0, 40, 300]
 positions = ["x", "y", "z"]
 [soak]
-hold_s = 2400
+hold_s = 3600
 [acquire]
 duration_s = 10
 settle_s = 2
@@ -71,10 +71,10 @@ def test_a_triaxial_campaign_finds_the_unit_as_it_was_made(tmp_path: Path) -> No
             k, b = truth.k(warm), truth.b(warm)
             values = dict(zip(found.names, found.values[:, node], strict=True))
             assert values["bias"] == pytest.approx(b[row], abs=0.01)
-            assert 1 + values["scale_factor"] == pytest.approx(k[row, row], abs=5e-5)
+            assert 1 + values["scale_factor"] == pytest.approx(k[row, row], abs=1e-4)
             for column, other in enumerate("xyz"):
                 if other != axis:
-                    assert values[f"misalignment_{other}"] == pytest.approx(k[row, column], abs=5e-5)
+                    assert values[f"misalignment_{other}"] == pytest.approx(k[row, column], abs=1e-4)
 
 
 def test_readings_are_kept_when_a_campaign_is_aborted(tmp_path: Path) -> None:
