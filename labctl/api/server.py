@@ -71,6 +71,7 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> None:
         url = f"http://{request.host}:{listener.getsockname()[1]}"
         house = open_house(request, url)
         server = uvicorn.Server(uvicorn.Config(create_app(house), log_level="warning", lifespan="on"))
+        listener.listen(server.config.backlog)  # whoever reads the address may connect at once
         ready(url)
         server.run(sockets=[listener])
 

@@ -84,7 +84,8 @@ class House:
         try:
             while True:
                 bell.clear()
-                state = (await asyncio.to_thread(self.status, campaign)).state
+                # from the database, not the live picture: the last event is written before the state there ends
+                state = (await asyncio.to_thread(self.store.campaigns.get, campaign)).state
                 for row in await asyncio.to_thread(self.store.campaigns.events, campaign, after):
                     after = row.id
                     yield event_answer(row)

@@ -16,6 +16,23 @@ from labctl.store.database import Database
 from labctl.store.records import CalibrationRecord, CertificationRow
 
 
+def _document_query() -> sa.Select[tuple[bytes, str]]:
+    c = tables.calibrations.c
+    return sa.select(c.document, c.hash).where(c.serial == sa.bindparam("serial"))
+
+
+def _in_force_query() -> sa.Select[tuple[bytes, str]]:
+    x = tables.certifications.c
+    last = sa.select(sa.func.max(x.id)).where(x.serial == sa.bindparam("serial")).scalar_subquery()
+    act = sa.select(x.version).where(x.id == last, x.act == "certify").scalar_subquery()
+    return _document_query().where(tables.calibrations.c.version == act)
+
+
+#: Made once: what every GET asks.
+_DOCUMENT = _document_query().where(tables.calibrations.c.version == sa.bindparam("version"))
+_IN_FORCE = _in_force_query()
+
+
 @dataclass(frozen=True)
 class NewCalibration:
     """A calibration about to be kept; `document` and `answer` know their version number."""
@@ -125,14 +142,16 @@ class Calibrations:
 
     def document(self, serial: str, version: int | None) -> tuple[bytes, str]:
         """Return the bytes and hash of a version, or of the one in force: the point read behind every GET."""
-        c = tables.calibrations.c
-        wanted = version if version is not None else self.certified_version(serial)
-        query = sa.select(c.document, c.hash).where(c.serial == serial, c.version == wanted)
         with self._database.reading() as connection:
-            row = connection.execute(query).first()
-        if row is None:
-            raise NotFound(f"unit {serial!r} has no calibration version {wanted}")
-        return bytes(row[0]), str(row[1])
+            if version is None:
+                row = connection.execute(_IN_FORCE, {"serial": serial}).first()
+            else:
+                row = connection.execute(_DOCUMENT, {"serial": serial, "version": version}).first()
+        if row is not None:
+            return bytes(row[0]), str(row[1])
+        if version is None:
+            self.certified_version(serial)  # says why there is none
+        raise NotFound(f"unit {serial!r} has no calibration version {version}")
 
     def history(self, serial: str) -> list[CertificationRow]:
         """Return every act of certifying and revoking, newest first."""

@@ -85,6 +85,8 @@ class Database:
         try:
             self._engine = self._make_engine(write=write)
             self._migrate(write=write)
+            #: Reading has connections of its own: it neither waits for the writer nor makes it wait.
+            self._reader = self._make_engine(write=False) if write and self._sqlite else self._engine
         except BaseException:
             self._release()
             raise
@@ -179,15 +181,15 @@ class Database:
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:
         """Give a connection to read with."""
-        with self._guard:
-            try:
-                with self._engine.connect() as connection:
-                    yield connection
-            except sa.exc.DatabaseError as error:
-                raise StoreError(f"{self.location}: {error.orig}") from error
+        try:
+            with self._reader.connect() as connection:
+                yield connection
+        except sa.exc.DatabaseError as error:
+            raise StoreError(f"{self.location}: {error.orig}") from error
 
     def close(self) -> None:
         """Close the database and let the next writer in."""
+        self._reader.dispose()
         self._engine.dispose()
         self._release()
 
