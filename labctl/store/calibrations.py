@@ -16,12 +16,12 @@ from labctl.store.database import Database
 from labctl.store.records import CalibrationRecord, CertificationRow
 
 
-def _document_query() -> sa.Select[tuple[bytes, str]]:
+def _document_query() -> sa.Select[bytes, str]:
     c = tables.calibrations.c
     return sa.select(c.document, c.hash).where(c.serial == sa.bindparam("serial"))
 
 
-def _in_force_query() -> sa.Select[tuple[bytes, str]]:
+def _in_force_query() -> sa.Select[bytes, str]:
     x = tables.certifications.c
     last = sa.select(sa.func.max(x.id)).where(x.serial == sa.bindparam("serial")).scalar_subquery()
     act = sa.select(x.version).where(x.id == last, x.act == "certify").scalar_subquery()
