@@ -23,6 +23,9 @@ lint: $(VENV)/.tested
 bench: $(VENV)/.tested
 	@$(BIN)/python -m benchmarks
 
+study: $(VENV)/.tested
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m studies
+
 $(VENV)/bin/python:
 	@scripts/make-venv "$(PYTHON)" "$(VENV)"
 

@@ -26,7 +26,8 @@ BAD_STATUS = 0xF8
 #: The output saturates here; what stands at the rail is no measurement (data sheet, table 5-3).
 SATURATION_DPS = 480.0
 SILENCE_S = 2.0
-#: The port keeps 4096 bytes; it is emptied at least this often.
+#: A port may keep no more than this; it is emptied when half of it can have come, and at least every second.
+PORT_KEEPS_BYTES = 4096
 EMPTY_EVERY_S = 1.0
 START_WITHIN_S = 1.5
 
@@ -50,6 +51,8 @@ class Stim300:
         self.axes: tuple[str, ...] = tuple(settings.axes)
         self.sample_rate_hz = settings.sample_rate_hz or 125.0
         self.limits = GyroLimits(settings.max_rate_dps, settings.min_c, settings.max_c)
+        half_full_s = 0.5 * PORT_KEEPS_BYTES / (self.layout.stride * self.sample_rate_hz)
+        self._empty_every_s = min(EMPTY_EVERY_S, half_full_s)
         self._ports, self._clock = ports, clock
         self._port: serial.SerialBase | None = None
         self._rest = b""
@@ -109,7 +112,7 @@ class Stim300:
         end_s = self._clock.now_s() + duration_s
         data = b""
         while True:
-            sleep_until(self._clock, min(self._clock.now_s() + EMPTY_EVERY_S, end_s))
+            sleep_until(self._clock, min(self._clock.now_s() + self._empty_every_s, end_s))
             data += self._take()
             if self._clock.now_s() >= end_s - 1e-9:
                 break

@@ -119,7 +119,7 @@ def scan(data: bytes, layout: Layout) -> Scan:
             found.append(frames)
             at += n * stride
             continue
-        last = int(np.flatnonzero(good)[-1]) + 1 if good.any() else 0
+        last = _last_at_stride(good)
         found.append(frames[:last][good[:last]])
         garbage += int((~good[:last]).sum()) * stride
         at += last * stride
@@ -131,6 +131,17 @@ def scan(data: bytes, layout: Layout) -> Scan:
         raw[at:].tobytes(),
         -(-garbage // stride),
     )
+
+
+def _last_at_stride(good: NDArray[np.bool_]) -> int:
+    """Return how many frames, by mask (n,), the stride may be trusted for.
+
+    One bad frame between good ones is only damaged; where two follow each other, one may hide at another offset.
+    """
+    hiding = ~good[:-1] & ~good[1:]
+    if hiding.any():
+        return int(np.argmax(hiding))
+    return int(np.flatnonzero(good)[-1]) + 1 if good.any() else 0
 
 
 def _next_intact(raw: Bytes, at: int, layout: Layout) -> int:

@@ -19,6 +19,7 @@ class StreamTime:
         self._anchor_s = now_s
         self._index = -1
         self._begun = False
+        self._last_s = -np.inf
 
     def times(self, advance: NDArray[np.int64], now_s: float, wrap: int = 0) -> tuple[NDArray[np.float64], int]:
         """Return the clock times (n,) of readings that follow each other by `advance` (n,) periods, and the losses.
@@ -38,5 +39,10 @@ class StreamTime:
             index = index + lost
             behind_s -= lost * self._period_s
         self._anchor_s += behind_s if behind_s < 0 else FOLLOW * max(behind_s - self._period_s, 0.0)
-        self._index = int(index[-1])
-        return np.asarray(self._anchor_s + index * self._period_s, dtype=np.float64), lost
+        times = self._anchor_s + index * self._period_s
+        if times[0] - self._last_s < 0.5 * self._period_s:
+            # The device is ahead of the Clock and was just held back: its readings share the time since the last one.
+            share = (index - self._index) / (index[-1] - self._index)
+            times = self._last_s + share * (max(float(times[-1]), now_s) - self._last_s)
+        self._index, self._last_s = int(index[-1]), float(times[-1])
+        return np.asarray(times, dtype=np.float64), lost

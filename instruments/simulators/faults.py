@@ -110,19 +110,15 @@ class FaultyWire:
         if sent and (noise := self.faults.strike(["noise"], t_s)) is not None:
             at = int(self.faults.rng.integers(0, len(sent) + 1))
             sent = sent[:at] + self.faults.rng.bytes(max(noise.value, 1)) + sent[at:]
-        if self.faults.present("merge", t_s):
+        if self.faults.present("merge", t_s) or (self._held and t_s < self._later_s):
             self._held += sent
             return b""
+        sent, self._held = bytes(self._held) + sent, bytearray()
         if sent and self.faults.strike(["split"], t_s) is not None:
             at = int(self.faults.rng.integers(0, len(sent) + 1))
             self._held += sent[at:]
             self._later_s = t_s + 0.02
             return sent[:at]
-        if self._held and t_s >= self._later_s:
-            sent, self._held = bytes(self._held) + sent, bytearray()
-        elif self._held:
-            self._held += sent
-            sent = b""
         return sent
 
     def skip(self, t_s: float) -> None:

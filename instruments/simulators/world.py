@@ -148,7 +148,7 @@ class SimulatedGyro:
         rate = np.einsum("nij,nj->ni", gain, body) + truth.offset(sensor)
         if truth.bend is not None:
             rate = rate + truth.bend(body[:, self._rows], sensor)
-        on_s = t_s - (world.powered_on_s if world.powered_on_s is not None else t_s[0] if n else 0.0)
+        on_s = t_s - (world.powered_on_s if world.powered_on_s is not None else 0.0)
         if truth.warm_up is not None:
             rate = rate + truth.warm_up(np.maximum(on_s, 0.0))[:, None]
         shown = sensor

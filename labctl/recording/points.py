@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.recording import Recording
+from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
 #: Columns that one data set has one value of: its first reading's.
 FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg")
@@ -22,7 +23,7 @@ def to_points(recording: Recording) -> Recording:
     """Return the recording with one row per data set (kind "points"); points and coefficients return as they are.
 
     Only valid readings count. `t_s` is the middle of the data set, `table_angle_deg` its start, `duration_s` its
-    length; each gyro column gains `_std` (n - 1) and every row `n`. A data set without a valid reading is left out.
+    length; each gyro column gains `_std` (n - 1), `_white_std` where every set has readings enough, and every row `n`. A data set without a valid reading is left out.
     """
     if recording.info.kind != "samples":
         return recording
@@ -43,6 +44,9 @@ def to_points(recording: Recording) -> Recording:
             points[name], spread = _mean_and_std(values.astype(np.float64), starts, counts)
             if name.startswith("gyro_"):
                 points[f"{name}_std"] = spread
+                if counts.min() >= LEAST_FOR_SPECTRUM:
+                    sets = np.split(values.astype(np.float64), starts[1:])
+                    points[f"{name}_white_std"] = np.array([white_std(readings) for readings in sets])
     points["n"] = counts.astype(np.int64)
     return Recording(recording.info.model_copy(update={"kind": "points"}), points, recording.environment)
 

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: The median of an exponential distribution, over its mean: a periodogram's lines do not move its median.
-_MEDIAN_TO_MEAN = float(np.log(2.0))
-#: Too few readings for a spectrum.
-LEAST_FOR_SPECTRUM = 32
+from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
 
 @dataclass(frozen=True)
@@ -34,14 +31,3 @@ def statistics(values: NDArray[np.float64], *, spectrum: bool) -> Statistics:
         white_std(values) if spectrum and n >= LEAST_FOR_SPECTRUM else None,
         n,
     )
-
-
-def white_std(values: NDArray[np.float64]) -> float:
-    """Return the standard deviation of the white part of readings (n,), n >= 32, from their periodogram's median.
-
-    Lines from the table's steps make a reading scatter, but average out over a data set; they fill few frequencies, so
-    the median does not see them. Neither does it see drift, which fills only the lowest.
-    """
-    window = np.hanning(len(values))  # a strong line must not leak into the frequencies beside it
-    spectrum = np.abs(np.fft.rfft((values - values.mean()) * window)[2:-1]) ** 2 / np.sum(window**2)
-    return float(np.sqrt(np.median(spectrum) / _MEDIAN_TO_MEAN))

@@ -1,0 +1,26 @@
+"""`python -m studies [NAME ...]`: run the studies and print their figures."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+STUDIES = ("coverage",)
+
+
+def main(names: list[str]) -> int:
+    """Run the named studies, or all."""
+    unknown = [name for name in names if name not in STUDIES]
+    if unknown:
+        print(f"no study {unknown[0]!r} (there are {', '.join(STUDIES)})", file=sys.stderr)
+        return 2
+    for name in names or STUDIES:
+        module = importlib.import_module(f"studies.{name}")
+        print(f"\n== {name}: {(module.__doc__ or '').splitlines()[0]}", flush=True)
+        for key, value in module.run().items():
+            print(f"   {key:28} {value:.4g}", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
