@@ -87,6 +87,7 @@ class SimulationSettings(Strict):
     chamber: dict[str, Any] = Field(default_factory=dict)
     hidden: dict[str, float | str] = Field(default_factory=dict)  #: effect id -> size, hidden in every unit
     control: str | None = None  #: address of a simulator in another process, for the hand that turns its units
+    speed: float = Field(default=1.0, gt=0)  #: how fast that other process runs; `labctl simulator` writes both
 
 
 class BenchFile(Strict):

@@ -39,9 +39,7 @@ def scores(seed: int) -> NDArray[np.float64]:
     return np.concatenate([_axis_scores(result, axis, k[:, row], b[:, row]) for row, axis in enumerate("xyz")])
 
 
-def _axis_scores(
-    result: FitResult, axis: str, k: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _axis_scores(result: FitResult, axis: str, k: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     found = result.fitted.axes[axis]
     own = {"bias": b, "scale_factor": k[:, "xyz".index(axis)]}
     parts = [

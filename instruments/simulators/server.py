@@ -17,7 +17,7 @@ from typing import Any
 import tomli_w
 
 from instruments.bench import BenchFile, SimulationSettings
-from instruments.clock import Clock
+from instruments.clock import Clock, ScaledClock
 from instruments.ports import SIMULATED
 from instruments.simulators.bench import SimulatedBench
 from instruments.simulators.device import SimulatedDevice
@@ -59,7 +59,8 @@ class Server:
         control = self._tcp(self._obey)
         self.addresses["control"] = f"127.0.0.1:{control}"
         simulation = record["simulation"] or SimulationSettings().model_dump()
-        record["simulation"] = {**simulation, "control": self.addresses["control"]}
+        speed = self._clock.speed if isinstance(self._clock, ScaledClock) else 1.0
+        record["simulation"] = {**simulation, "control": self.addresses["control"], "speed": speed}
         return BenchFile.model_validate(record)
 
     def wait(self) -> None:

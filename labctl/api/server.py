@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import uvicorn
 
-from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
+from instruments.clock import Clock, SystemClock
 from labctl.api.app import create_app
 from labctl.config import default_database
 from labctl.errors import BadInput
 from labctl.services.bench_runner import BenchRunner
 from labctl.services.house import House
 from labctl.services.planning import load_bench
+from labctl.services.running import clock_for
 from labctl.store import Store
 from labctl.store.database import Database
 
@@ -44,9 +45,8 @@ def open_house(request: ServeRequest, url: str | None) -> House:
             bench = load_bench(name)
 
             def make_clock() -> Clock:
-                if not bench.is_simulated:
-                    return SystemClock()
-                return VirtualClock() if request.speed == 0 else ScaledClock(request.speed)
+                own_pace = request.speed == 0 or not bench.is_simulated
+                return clock_for(bench, None if own_pace else request.speed)
 
             runner = BenchRunner(store, bench, make_clock)
         return House(store, SystemClock(), runner)

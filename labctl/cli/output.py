@@ -14,13 +14,16 @@ console = Console(highlight=False)
 complaints = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
-def print_json(answer: Any) -> None:
-    """Print one JSON document on standard output."""
+def print_json(answer: Any, *, one_line: bool = False) -> None:
+    """Print one JSON document on standard output; on one line and at once where a program waits for it."""
     if isinstance(answer, BaseModel):
         answer = answer.model_dump(mode="json", by_alias=True, exclude_none=False)
     elif isinstance(answer, list):
         answer = [a.model_dump(mode="json", by_alias=True) if isinstance(a, BaseModel) else a for a in answer]
-    sys.stdout.write(json.dumps(answer, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    indent = None if one_line else 2
+    sys.stdout.write(json.dumps(answer, indent=indent, ensure_ascii=False, allow_nan=False) + "\n")
+    if one_line:
+        sys.stdout.flush()
 
 
 def table(title: str, *columns: str, numbers: int = 0) -> Table:

@@ -26,7 +26,7 @@ def serve(
 
     def ready(url: str) -> None:
         if as_json:
-            print_json({"url": url})
+            print_json({"url": url}, one_line=True)
         else:
             console.print(f"labctl listens on {url}  (API text: {url}/docs)", markup=False)
 
@@ -50,7 +50,7 @@ def simulator(
 
     def ready(addresses: dict[str, str]) -> None:
         if as_json:
-            print_json({"addresses": addresses, "bench_file": str(out) if out else None})
+            print_json({"addresses": addresses, "bench_file": str(out) if out else None}, one_line=True)
             return
         for device, address in addresses.items():
             console.print(f"{device:14} {address}", markup=False)

@@ -51,10 +51,7 @@ COLUMNS = (
         Column(f"gyro_{a}_std", "number", "as [output]", f"standard deviation of the readings behind gyro_{a}")
         for a in "xyz"
     ),
-    *(
-        Column(f"gyro_{a}_white_std", "number", "as [output]", f"the white part of gyro_{a}_std")
-        for a in "xyz"
-    ),
+    *(Column(f"gyro_{a}_white_std", "number", "as [output]", f"the white part of gyro_{a}_std") for a in "xyz"),
     Column("n", "integer", "", "number of readings behind a mean"),
     Column("scale_factor", "number", "output unit per deg/s", "scale factor", frozenset({"coefficients"})),
     Column("offset", "number", "output unit", "output at rest", frozenset({"coefficients"})),

@@ -13,6 +13,7 @@ from instruments.gyro import Gyro
 from instruments.hand import NoHand
 from instruments.open import Bench, open_bench
 from labctl.config import default_database
+from labctl.errors import BadInput
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.acts import Request
 from labctl.services.answers import CampaignAnswer
@@ -59,9 +60,15 @@ def seeded(bench: BenchFile, seed: int | None) -> BenchFile:
 
 
 def clock_for(bench: BenchFile, speed: float | None) -> Clock:
-    """Return the wall's clock for real instruments; for simulated ones a scaled or a virtual clock."""
+    """Return the wall's clock for real instruments; for simulated ones a scaled or a virtual clock.
+
+    Simulators in another process set the pace themselves. Raises BadInput for a speed on a bench that has its own.
+    """
     if not bench.is_simulated:
-        return SystemClock()
+        if speed is not None:
+            raise BadInput(f"--speed {speed:g}: bench {bench.name} keeps its own time; leave the option out")
+        simulation = bench.simulation
+        return ScaledClock(simulation.speed) if simulation is not None and simulation.control else SystemClock()
     return VirtualClock() if speed is None else ScaledClock(speed)
 
 
