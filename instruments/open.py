@@ -9,7 +9,7 @@ from typing import Any
 from instruments.arrick import ArrickC4
 from instruments.bench import BenchFile
 from instruments.chamber import Chamber
-from instruments.clock import Clock
+from instruments.clock import Clock, SystemClock
 from instruments.errors import InstrumentError
 from instruments.gyro import Gyro
 from instruments.gyrostar import Gyrostar
@@ -65,6 +65,13 @@ def open_bench(bench: BenchFile, clock: Clock) -> Bench:
         _hand(bench, simulation, clock),
         simulation,
     )
+
+
+def check_options(bench: BenchFile) -> None:
+    """Raise pydantic.ValidationError where a gyro's options are not its driver's; no byte is sent."""
+    clock = SystemClock()
+    for gyro in bench.gyros:
+        GYROS[gyro.driver](gyro, Ports(clock), clock)
 
 
 def _hand(bench: BenchFile, simulation: Simulation | None, clock: Clock) -> Hand:

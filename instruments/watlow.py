@@ -34,7 +34,7 @@ class Watlow(ABC):
 
     @property
     def limits(self) -> ChamberLimits:
-        """Get the narrower of the controller's set-point limits and the bench file's; asks the controller at first use."""
+        """Get the narrower of the controller's limits and the bench file's; asks the controller at first use."""
         if self._limits is None:
             low, high = self._controller_limits()
             settings = self.settings

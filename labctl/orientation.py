@@ -1,9 +1,9 @@
 """Orientation by integrating one axis, with the offset renewed at standstill (Weiss, muRata Gyrostar report).
 
-The report's program is a lesson in what goes wrong: an integer angle that overflows, a divider that truncates, readings
-taken to be exactly periodic, an offset that goes on averaging while the vehicle turns, and an angle that creeps while it
-stands. Here every reading carries its time, numbers are 64-bit, the offset is learned only from stretches that were at
-rest from end to end, and the angle is held while they last.
+The report's program is a lesson in what goes wrong: an integer angle that overflows, a divider that truncates,
+readings taken to be exactly periodic, an offset that goes on averaging while the vehicle turns, and an angle that
+creeps while it stands. Here every reading carries its time, numbers are 64-bit, the offset is learned only from
+stretches that were at rest from end to end, and the angle is held while they last.
 """
 
 from __future__ import annotations

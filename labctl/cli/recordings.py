@@ -38,6 +38,7 @@ def export_recording(
     recording: Annotated[int, typer.Argument(metavar="ID", help="Recording.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write; it may not exist yet.")],
     csv: Annotated[bool, typer.Option("--csv", help="CSV instead of Parquet.")] = False,
+    points: Annotated[bool, typer.Option("--points", help="One row per data set instead of every reading.")] = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -46,7 +47,7 @@ def export_recording(
     from labctl.services.recordings import export_recording as export
 
     with one_clear_line(), open_reading(database) as store:
-        written = export(store, recording, out, "csv" if csv else "parquet")
+        written = export(store, recording, out, "csv" if csv else "parquet", points=points)
     if as_json:
         print_json({"recording": recording, "folder": str(out), "files": written})
     else:

@@ -23,7 +23,8 @@ def to_points(recording: Recording) -> Recording:
     """Return the recording with one row per data set (kind "points"); points and coefficients return as they are.
 
     Only valid readings count. `t_s` is the middle of the data set, `table_angle_deg` its start, `duration_s` its
-    length; each gyro column gains `_std` (n - 1), `_white_std` where every set has readings enough, and every row `n`. A data set without a valid reading is left out.
+    length; each gyro column gains `_std` (n - 1) and, where every set has readings enough, `_white_std`; every row
+    gains `n`. A data set without a valid reading is left out.
     """
     if recording.info.kind != "samples":
         return recording

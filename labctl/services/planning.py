@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from instruments.bench import BenchFile, read_bench, shipped_benches
 from instruments.chamber import ChamberLimits
 from instruments.gyro import GyroLimits
+from instruments.open import check_options
 from instruments.table import TableLimits
 from labctl.errors import BadBench
 from labctl.services.answers import PlanAnswer
@@ -32,7 +33,9 @@ def load_recipe(source: str) -> Recipe:
 def load_bench(source: str) -> BenchFile:
     """Return a bench by shipped name or path; raises BadBench naming the file and the key."""
     try:
-        return read_bench(source)
+        bench = read_bench(source)
+        check_options(bench)
+        return bench
     except FileNotFoundError:
         known = ", ".join(shipped_benches())
         raise BadBench(f"bench {source!r} is neither a file nor a bench that ships with labctl ({known})") from None

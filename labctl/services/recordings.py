@@ -48,9 +48,12 @@ def import_files(acts: Acts, files: Mapping[str, BinaryIO]) -> Imported:
             raise BadRecording(str(error).replace(f"{folder}/", "")) from None
 
 
-def export_recording(store: Store, recording: int, folder: Path, file_format: Literal["parquet", "csv"]) -> list[str]:
-    """Write a recording into a new folder; returns the names of its files."""
-    return write_recording(store.recordings.samples(recording), folder, file_format)
+def export_recording(
+    store: Store, recording: int, folder: Path, file_format: Literal["parquet", "csv"], *, points: bool = False
+) -> list[str]:
+    """Write a recording, or its points (one row per data set), into a new folder; returns the names of its files."""
+    taken = store.recordings.points(recording) if points else store.recordings.samples(recording)
+    return write_recording(taken, folder, file_format)
 
 
 def newest_recording(store: Store, serial: str, recording: int | None) -> int:

@@ -53,7 +53,8 @@ def test_frames_as_the_wire_has_them(c4: Any) -> None:
     assert sent[:2] == [b"!1fp", b"!1h1"]
     assert sent[2] == b"!1ra1,400"  # 90 deg/s^2 in steps of 0.225 deg, written once
     assert sent[3] == b"!1sp1,10000"  # 200 steps a second from 2 MHz
-    assert sent[4].startswith(b"!1m1f") and sent[4].endswith(b"n")
+    assert sent[4].startswith(b"!1m1f")
+    assert sent[4].endswith(b"n")
     assert sent[5].startswith(b"!1m1r")
     assert len([line for line in sent if line]) == 6  # the speed was not written again
     assert c4.tap.said.endswith(b"ao")
@@ -151,7 +152,7 @@ def test_silence(c4: Any) -> None:
 
 def test_the_wrong_instrument(c4: Any) -> None:
     c4.tap._device._device._obey = lambda command, t_s: c4.tap._device._device._say("MX1 2.3\r\n", t_s)
-    with pytest.raises(WrongInstrument, match="answered 'MX1 2.3', not a C4"):
+    with pytest.raises(WrongInstrument, match=r"answered 'MX1 2\.3', not a C4"):
         c4.table.identify()
 
 

@@ -74,9 +74,10 @@ def test_nothing_is_lost_between_reads(streaming: Any) -> None:
 def test_silence_is_an_error_that_names_port_and_remedy(streaming: Any) -> None:
     streaming.gyro.read(1.0)
     streaming.faults(streaming.gyro_url).arm("silence")
+    streaming.gyro.read(1.0)
+    streaming.gyro.read(1.0)  # up to two seconds are only a gap
     with pytest.raises(NoReply, match=r"sim://.*check power"):
-        for _ in range(5):
-            streaming.gyro.read(1.0)
+        streaming.gyro.read(1.0)
     with pytest.raises(NoReply):
         streaming.gyro.glance()
 

@@ -157,9 +157,83 @@ WRONG_KEY = 'format = "labctl-recipe/1"\nname = "x"\ntemperature_c = [25]\nrates
 TOO_FAST = 'format = "labctl-recipe/1"\nname = "x"\ntemperatures_c = [25]\nrates_dps = [1, 900]\npositions = ["z"]\n'
 
 
+HEAD = """format = "labctl-recording/1"
+serial = "BAD-1"
+axes = ["z"]
+kind = "{kind}"
+started_at = "2026-01-05T08:00:00Z"
+{extra}
+[output.z]
+unit = "deg/s"
+"""
+POINTS = "dataset,t_s,table_rate_dps,temperature_c,gyro_z"
+
+
+def _recording(lab: Lab, lines: list[str], *, kind: str = "points", head: str = POINTS, extra: str = "") -> Path:
+    """Write a recording of a unit BAD-1 with these rows."""
+    folder = lab.folder / "bad"
+    folder.mkdir()
+    (folder / "recording.toml").write_text(HEAD.format(kind=kind, extra=extra))
+    (folder / f"{kind}.csv").write_text("\n".join([head, *lines]) + "\n")
+    return folder
+
+
+def _grid(rates: list[float], temperatures: list[float]) -> list[str]:
+    pairs = [(rate, warm) for warm in temperatures for rate in rates]
+    return [f"{i + 1},{60 * i},{rate},{warm},{1.01 * rate + 0.1}" for i, (rate, warm) in enumerate(pairs)]
+
+
+def _import(lines: list[str], head: str = POINTS, kind: str = "points", extra: str = "") -> Any:
+    return lambda lab: ["import", str(_recording(lab, lines, head=head, kind=kind, extra=extra))]
+
+
+def _fit(rates: list[float], temperatures: list[float]) -> Any:
+    def arguments(lab: Lab) -> list[str]:
+        lab.run("import", str(_recording(lab, _grid(rates, temperatures))))
+        return ["fit", "BAD-1", "--model", "ojeda2000"]
+
+    return arguments
+
+
+def _truncated(lab: Lab) -> list[str]:
+    lab.run("export", "recording", "1", "--out", str(lab.folder / "out"))
+    parquet = lab.folder / "out" / "points.parquet"
+    parquet.write_bytes(parquet.read_bytes()[:-100])
+    return ["import", str(lab.folder / "out")]
+
+
+def _newer(lab: Lab) -> list[str]:
+    with sqlite3.connect(lab.database) as raw:
+        raw.execute("UPDATE alembic_version SET version_num = '9999'")
+    raw.close()
+    return ["fit", "OSU-FOG-2024", "--model", "ojeda2000"]
+
+
+def _bad_option(lab: Lab) -> list[str]:
+    bench = lab.folder / "bench.toml"
+    text = (Path(EXAMPLES).parent / "instruments" / "benches" / "triaxial-sim.toml").read_text()
+    bench.write_text(text.replace("sample_rate_hz = 125", "sample_rate_hz = 125\noptions = { datagram = 0x99 }"))
+    return ["campaign", "plan", "short", "--bench", str(bench)]
+
+
+FEW = [-90.0, 0.0, 90.0]
+MANY = [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0]
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        (_import(["1,0,10,25"], head="dataset,t_s,table_rate_dps,temperature_c"), "gyro_z"),
+        (_import(["1,0,10,25,nan", "2,60,10,25,1"]), "row 1"),
+        (_import(["1,0,10,25,10.1", "2,60,ten,25,10.1"]), "'ten'"),
+        (_import(["1,0,10,25,10.1", "2,60,10,22,007,10.1"]), "Expected 5 columns, got 6"),
+        (_import(["1,60,10,25,10.1", "2,30,10,25,10.1"]), "t_s"),
+        (_import(["1,0,10,25,10.1"], extra="colour = 'red'"), "colour"),
+        (_truncated, "parquet"),
+        (_newer, "9999"),
+        (_bad_option, "datagram"),
+        (_fit(FEW, [25, 35, 45]), "rates"),
+        (_fit(MANY, [25, 25.2, 25.4]), "temperature"),
         (lambda _: ["fit", "NOBODY", "--model", "ojeda2000"], "unit 'NOBODY' is not in this database"),
         (lambda _: ["fit", "OSU-FOG-2024", "--model", "nonsense"], "error model 'nonsense' is not known"),
         (lambda _: ["fit", "OSU-FOG-2024", "--effects", "saturatoin"], "did you mean saturation"),

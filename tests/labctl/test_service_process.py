@@ -1,0 +1,90 @@
+"""A running service holds the database: commands ask it, a second one is refused, and its end leaves the bench safe."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+class Service:
+    """`labctl serve` in a process of its own, and other commands beside it on the same database."""
+
+    def __init__(self, database: Path) -> None:
+        self.database = database
+        command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json"]
+        self.process = subprocess.Popen(
+            self.command(*command), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None
+        self.url = json.loads(self.process.stdout.readline())["url"]
+        self.http = httpx.Client(base_url=self.url, timeout=30)
+
+    def command(self, *arguments: str) -> list[str]:
+        return [sys.executable, "-m", "labctl", *arguments, "--database", str(self.database)]
+
+    def run(self, *arguments: str, status: int = 0) -> Any:
+        done = subprocess.run(self.command(*arguments), capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stderr
+        return done
+
+
+@pytest.fixture
+def service(tmp_path: Path) -> Iterator[Service]:
+    made = Service(tmp_path / "lab.sqlite")
+    yield made
+    made.http.close()
+    made.process.kill()
+    made.process.wait()
+    for stream in (made.process.stdout, made.process.stderr):
+        assert stream is not None
+        stream.close()
+
+
+def test_commands_ask_the_service_that_holds_the_database(service: Service) -> None:
+    assert json.loads(service.run("import", str(EXAMPLES / "osu-fog"), "--json").stdout)["datasets"] == 695
+    fitted = json.loads(service.run("fit", "OSU-FOG-2024", "--model", "ojeda2000", "--json").stdout)
+    assert fitted["version"] == 1
+    refused = service.run("fit", "NOBODY", status=2)
+    assert "unit 'NOBODY' is not in this database" in refused.stderr
+    service.run("certify", "OSU-FOG-2024", "1", "--by", "A. Person", "--reason", "first look")
+    answer = service.http.get("/api/units/OSU-FOG-2024/calibration")
+    assert answer.json()["version"] == 1
+    again = service.http.get("/api/units/OSU-FOG-2024/calibration", headers={"If-None-Match": answer.headers["etag"]})
+    assert again.status_code == 304
+    service.run("revoke", "OSU-FOG-2024", "1", "--by", "A. Person", "--reason", "thought again")
+    assert service.http.get("/api/units/OSU-FOG-2024/calibration").status_code == 404
+
+
+def test_a_second_service_is_refused_and_told_where_the_first_is(service: Service) -> None:
+    refused = service.run("serve", "--port", "0", status=2)
+    assert service.url in refused.stderr
+
+
+def test_a_campaign_is_aborted_from_the_command_line(service: Service) -> None:
+    campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
+    busy = service.http.post("/api/campaigns", json={"recipe": "short"})
+    assert busy.status_code == 409
+    answer = json.loads(service.run("campaign", "abort", str(campaign), "--reason", "tea", "--json").stdout)
+    assert (answer["state"], "tea" in answer["reason"]) == ("aborted", True)
+    assert json.loads(service.run("campaign", "status", str(campaign), "--json").stdout)["state"] == "aborted"
+    again = service.run("campaign", "abort", str(campaign), status=2)
+    assert "aborted" in again.stderr
+
+
+def test_sigterm_ends_the_campaign_in_the_safe_state(service: Service) -> None:
+    campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
+    service.process.send_signal(signal.SIGTERM)
+    assert service.process.wait(timeout=60) in {0, -signal.SIGTERM}
+    answer = json.loads(service.run("campaign", "status", str(campaign), "--json").stdout)
+    assert answer["state"] == "aborted"
+    assert "the service stops" in answer["reason"]
