@@ -10,7 +10,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+#: A serial number stands in file names, addresses and C comments.
+SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
 
 
 class Strict(BaseModel):
@@ -55,6 +58,14 @@ class ChamberSettings(Strict):
     alarm_inputs: tuple[Literal[1, 2, 3, 4], ...] = ()  #: digital inputs that carry alarms, if wired (watlow-f4)
     enable_event: int | None = Field(default=None, ge=1, le=8)  #: event output that switches the chamber, if wired
 
+    @model_validator(mode="after")
+    def _in_order(self) -> ChamberSettings:
+        if not self.min_c < self.max_c:
+            raise ValueError(f"min_c {self.min_c:g} must be below max_c {self.max_c:g}")
+        if not self.min_c <= self.safe_c <= self.max_c:
+            raise ValueError(f"safe_c {self.safe_c:g} must lie between min_c {self.min_c:g} and max_c {self.max_c:g}")
+        return self
+
 
 class GyroSettings(Strict):
     """One unit on the bench: how to read it, who it is and what it may be exposed to."""
@@ -64,7 +75,7 @@ class GyroSettings(Strict):
     port: str | None = None  #: serial devices
     host: str | None = None  #: Modbus TCP devices
     tcp_port: int = 502
-    serial: str
+    serial: str = Field(pattern=SERIAL)
     model: str = ""
     technology: Literal["fog", "mems", "piezo", ""] = ""
     axes: tuple[Literal["x", "y", "z"], ...] = ("z",)

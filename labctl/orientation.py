@@ -45,6 +45,8 @@ class Orientation:
     """
 
     def __init__(self, angle_deg: float = 0.0, offset_dps: float = 0.0, rule: StandstillRule | None = None) -> None:
+        _refuse_no_number("angle", angle_deg)
+        _refuse_no_number("offset", offset_dps)
         self._rule = rule or StandstillRule()
         self._angle_deg = float(angle_deg)
         self._offset_dps = float(offset_dps)
@@ -72,11 +74,13 @@ class Orientation:
         return self._standing
 
     def set_angle(self, angle_deg: float) -> None:
-        """Set the angle from outside, deg. The offset stays."""
+        """Set the angle from outside, deg. The offset stays. Raises BadInput when it is no number."""
+        _refuse_no_number("angle", angle_deg)
         self._angle_deg = self._angle_at_stretch_deg = float(angle_deg)
 
     def set_offset(self, offset_dps: float) -> None:
-        """Set the offset from outside, deg/s, such as a static bias. The angle stays."""
+        """Set the offset from outside, deg/s, such as a static bias; the angle stays. Raises BadInput for a NaN."""
+        _refuse_no_number("offset", offset_dps)
         self._offset_dps = float(offset_dps)
         self._forget_rest()
 
@@ -165,3 +169,8 @@ class Orientation:
         self._stretch = []
         self._waiting = None
         self._rest = []
+
+
+def _refuse_no_number(what: str, value: float) -> None:
+    if not np.isfinite(value):
+        raise BadInput(f"{what} {value} is not a number")

@@ -39,7 +39,7 @@ class Table(BaseModel):
 class SoakRules(Table):
     """When a unit counts as having taken a temperature."""
 
-    hold_s: Number = Field(default=3600.0, ge=0)  #: time inside the band before anything is measured
+    hold_s: Number = Field(default=3600.0, ge=0, le=7 * 86_400)  #: time inside the band before anything is measured
     band_c: Number = Field(default=0.5, gt=0)  #: chamber air within +- this of the set point
     max_drift_c: Number = Field(default=0.2, gt=0)  #: of each unit's own thermometer over the window below
     drift_window_s: Number = Field(default=600.0, gt=0)
@@ -50,7 +50,7 @@ class SoakRules(Table):
 class AcquireRules(Table):
     """How one data set is taken."""
 
-    duration_s: Number = Field(default=60.0, gt=0)
+    duration_s: Number = Field(default=60.0, ge=1)
     settle_s: Number = Field(default=5.0, ge=0)  #: at the steady rate, before the first reading that counts
     #: From this rate up a data set lasts whole turns, so that what hangs on the table's angle averages out.
     whole_turns_above_dps: Number | None = Field(default=None, gt=0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-STUDIES = ("coverage",)
+STUDIES = ("coverage", "criticism")
 
 
 def main(names: list[str]) -> int:

@@ -183,7 +183,15 @@ class SimulatedGyro:
             mounting=world.mounting,
             full_scale_dps=self.settings.max_rate_dps,
             north_deg=world.north_deg,
+            own_at=self._own_at,
         )
+
+    def _own_at(self, t_s: Array) -> Array:
+        """Return the rates along the recorded axes at times (k,), from the table's motion."""
+        half = 0.05
+        angle = self.world.table.angle_deg(np.concatenate([t_s - half, t_s + half]))
+        k = len(t_s)
+        return self.world.body_rates((angle[k:] - angle[:k]) / (2 * half), angle[:k])[:, self._rows]
 
     def _drifts(self, t_s: Array) -> Array:
         """Return the bias instability, (n, axes): Ornstein-Uhlenbeck on a grid of seconds, straight lines between."""

@@ -8,8 +8,9 @@ from fastapi import APIRouter, Header, Query, Response
 
 from labctl.api.rooms import HouseOf
 from labctl.services import calibrations as services
-from labctl.services.acts import CertifyRequest, FitRequest
-from labctl.services.answers import CalibrationRow, Certified, FitAnswer
+from labctl.services import criticism as criticism_services
+from labctl.services.acts import CertifyRequest, FitRequest, ImproveRequest
+from labctl.services.answers import CalibrationRow, Certified, CriticismAnswer, FitAnswer, LadderAnswer
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 
@@ -43,6 +44,30 @@ def calibrations(serial: str, house: HouseOf) -> list[CalibrationRow]:
 def fit(serial: str, request: FitRequest, house: HouseOf) -> FitAnswer:
     """Fit a model to a recording; it becomes the unit's next version."""
     return house.acts().fit(serial, request)
+
+
+@router.post("/calibrations/{version}/improve", summary="Change a model", status_code=201)
+def improve(serial: str, version: int, request: ImproveRequest, house: HouseOf) -> FitAnswer:
+    """Add effects to a version, or take some out, and fit everything again; it becomes the unit's next version."""
+    return house.acts().improve(serial, request.model_copy(update={"version": version}))
+
+
+@router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")
+def criticism(
+    serial: str,
+    version: int,
+    house: HouseOf,
+    recording: Annotated[int | None, Query(description="Recording; default: the unit's newest.")] = None,
+    formula: Annotated[list[str] | None, Query(description="Effects of your own that compete: 'name: expr'.")] = None,
+) -> CriticismAnswer:
+    """What the model leaves, where, which effect may be missing, and what this recording cannot say."""
+    return criticism_services.criticise_unit(house.store, serial, version, recording, formula or [])
+
+
+@router.get("/ladder", summary="The error, version by version")
+def ladder(serial: str, house: HouseOf) -> LadderAnswer:
+    """Every version's errors, oldest first, down to the noise floor."""
+    return criticism_services.ladder(house.store, serial)
 
 
 @router.post("/calibrations/{version}/certify", summary="Make a version current")

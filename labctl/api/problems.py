@@ -45,6 +45,11 @@ def install(app: FastAPI) -> None:
         places = "; ".join(f"{'.'.join(str(p) for p in e['loc'])}: {e['msg']}" for e in error.errors())
         return problem(422, "bad-request", "The request does not fit its description", places, request.url.path)
 
+    @app.exception_handler(OverflowError)
+    def of_a_number(request: Request, error: OverflowError) -> JSONResponse:
+        text = f"a number is larger than anything here can be ({error})"
+        return problem(400, "bad-input", "A number is too large", text, request.url.path)
+
     @app.exception_handler(HTTPException)
     def of_http(request: Request, error: HTTPException) -> JSONResponse:
         return problem(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
+import signal
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -62,6 +64,8 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> None:
             f"--host {request.host}: labctl listens on loopback only (127.0.0.1), it has no keys to give out yet; "
             "put a reverse proxy with authentication in front of it"
         )
+    if not 0 <= request.speed < float("inf"):
+        raise BadInput(f"--speed {request.speed}: a positive number, or 0 for as fast as it can")
     with socket.socket() as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -73,7 +77,11 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> None:
         server = uvicorn.Server(uvicorn.Config(create_app(house), log_level="warning", lifespan="on"))
         listener.listen(server.config.backlog)  # whoever reads the address may connect at once
         ready(url)
-        server.run(sockets=[listener])
+        signal.signal(
+            signal.SIGHUP, lambda *_: setattr(server, "should_exit", True)
+        )  # a lost terminal ends it in order
+        with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how it is stopped
+            server.run(sockets=[listener])
 
 
 def _is_loopback(host: str) -> bool:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 
-from labctl.cli import bench, calibrations, campaign, recordings, serving
+from labctl.cli import bench, calibrations, campaign, criticism, recordings, serving
 
 app = typer.Typer(
     name="labctl",
@@ -27,6 +29,9 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "import": recordings.import_,
     "fit": calibrations.fit,
     "effects": calibrations.effects,
+    "criticise": criticism.criticise,
+    "improve": criticism.improve,
+    "ladder": criticism.ladder,
     "certify": calibrations.certify,
     "revoke": calibrations.revoke,
     "calibration": calibrations.calibration,
@@ -34,6 +39,22 @@ COMMANDS: dict[str, Callable[..., None]] = {
 }
 for name, command in COMMANDS.items():
     app.command(name)(command)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"labctl {version('labctl')}")
+        raise typer.Exit
+
+
+@app.callback()
+def everywhere(
+    show: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Take the options that need no command."""
+    del show
 
 
 def main() -> None:

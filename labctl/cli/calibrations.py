@@ -130,8 +130,8 @@ def _act(
     from labctl.services.acts import CertifyRequest
     from labctl.services.opening import open_acts
 
-    request = CertifyRequest(by=by, reason=reason, due_days=due_days)
     with one_clear_line(), open_acts(database) as acts:
+        request = CertifyRequest(by=by, reason=reason, due_days=due_days)
         answer = acts.certify(serial, version, request) if act == "certify" else acts.revoke(serial, version, request)
     if as_json:
         print_json(answer)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labctl.cli.errors import one_clear_line
+from labctl.cli.errors import ending_is_an_interrupt, one_clear_line
 from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import console, figure, print_json, table
 
@@ -72,14 +72,14 @@ def start(
     from labctl.services.opening import service_url
     from labctl.services.running import StartRequest, run_here
 
-    request = StartRequest(recipe=recipe, bench=bench, clip=clip, speed=speed, seed=seed)
     with one_clear_line():
+        request = StartRequest(recipe=recipe, bench=bench, clip=clip, speed=speed, seed=seed)
         if url := service_url(database):
             from labctl.services.remote import RemoteActs
 
             answer = RemoteActs(url).start_campaign(request)
         else:
-            with CampaignProgress(quiet=as_json) as progress:
+            with ending_is_an_interrupt(), CampaignProgress(quiet=as_json) as progress:
                 answer = run_here(database, request, progress.update)
     if as_json:
         print_json(answer)
@@ -155,7 +155,7 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
             with open_reading(database) as store:
                 answer = campaign_status(store, campaign)
             progress.update(answer)
-            if answer.state not in {"planned", "running", "paused", "waiting"}:
+            if answer.abandoned or answer.state not in {"planned", "running", "paused", "waiting"}:
                 break
             clock.sleep(1.0)
     print_json(answer) if as_json else print_campaign(answer)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
 
 import typer
+from pydantic import ValidationError
 
 from labctl.cli.output import complaints
 
 
 @contextmanager
 def one_clear_line() -> Iterator[None]:
-    """Turn an error of the house into one line on standard error and its exit status."""
+    """Turn what is wrong into one line on standard error and its exit status."""
     from instruments.errors import InstrumentError
     from labctl.errors import LabctlError
     from procedures.errors import ProcedureError
@@ -20,11 +23,36 @@ def one_clear_line() -> Iterator[None]:
     try:
         yield
     except LabctlError as error:
-        complaints.print(f"labctl: {error}", markup=False)
-        raise typer.Exit(error.exit_status) from error
+        raise _said(str(error), error.exit_status) from error
     except (InstrumentError, ProcedureError) as error:
-        complaints.print(f"labctl: {error}", markup=False)
-        raise typer.Exit(2) from error
+        raise _said(str(error), 2) from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        option = "--" + "-".join(str(part) for part in first["loc"]).replace("_", "-")
+        raise _said(f"{option} {first['input']!r}: {first['msg'][0].lower()}{first['msg'][1:]}", 2) from error
+    except OverflowError as error:
+        raise _said(f"a number is larger than anything here can be ({error})", 2) from error
+    except OSError as error:
+        raise _said(f"{error.filename or 'output'}: {error.strerror or error}; nothing was written there", 2) from error
     except KeyboardInterrupt:
-        complaints.print("labctl: interrupted", markup=False)
-        raise typer.Exit(130) from None
+        raise _said("interrupted", 130) from None
+
+
+def _said(text: str, status: int) -> typer.Exit:
+    complaints.print(f"labctl: {' '.join(text.split())}", markup=False)
+    return typer.Exit(status)
+
+
+@contextmanager
+def ending_is_an_interrupt() -> Iterator[None]:
+    """Let a request to end (SIGTERM) and a lost terminal (SIGHUP) do what Ctrl-C does: the bench is left safe."""
+
+    def interrupt(*_: int | FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, interrupt) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

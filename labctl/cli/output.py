@@ -10,7 +10,8 @@ from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Table
 
-console = Console(highlight=False)
+#: Where nobody looks at a terminal, lines are not cut to its width.
+console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
 complaints = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
@@ -30,7 +31,9 @@ def table(title: str, *columns: str, numbers: int = 0) -> Table:
     """Make a table whose last `numbers` columns are numbers, right-aligned."""
     made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim")
     for index, column in enumerate(columns):
-        made.add_column(column, justify="right" if index >= len(columns) - numbers else "left")
+        made.add_column(
+            column, justify="right" if index >= len(columns) - numbers else "left", no_wrap=index == 0, overflow="fold"
+        )
     return made
 
 

@@ -26,7 +26,7 @@ class CampaignProgress:
             TextColumn("left"),
             TimeRemainingColumn(elapsed_when_finished=False),
             console=complaints,
-            disable=quiet,
+            disable=quiet or not complaints.is_terminal,
             transient=True,
         )
         self._task = self._progress.add_task(title or "starting", total=1.0)

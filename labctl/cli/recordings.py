@@ -30,7 +30,7 @@ def import_(
     console.print(
         f"recording {answer.recording} of {answer.serial}: {answer.datasets} data sets, {answer.readings} readings"
     )
-    console.print(f"next: labctl fit {answer.serial}", style="dim")
+    console.print(f"next: labctl fit {answer.serial} --model {answer.suggested_model}", style="dim", markup=False)
 
 
 @export_app.command("recording")
@@ -65,7 +65,9 @@ def simulate(
     ] = None,
     hide: Annotated[
         list[str] | None,
-        typer.Option("--hide", metavar="EFFECT[=SIZE]", help="Hide an effect in the gyro; may be given several times."),
+        typer.Option(
+            "--hide", metavar="EFFECT[=SIZE]", help="Hide an effect; SIZE in its unit, or z10: ten noise units."
+        ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", help="Same seed, same recording.")] = 1,
     sample_rate_hz: Annotated[

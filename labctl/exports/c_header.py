@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.calibration import Calibration
+from labctl.compensator import MARGIN_SHARE
 from labctl.errors import BadInput
 from labctl.fitting.horner import Surface, surface_of
 from labctl.fitting.linear import Linear, linear_of
@@ -15,8 +16,9 @@ from labctl.fitting.temperature import LagrangeTable
 
 HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * Hash of the calibration: {hash}
- * Valid from {low:g} to {high:g} deg C and from {slow:g} to {fast:g} deg/s; the temperature is held at the edge of the
- * range and the function returns 1 when it was outside, else 0.
+ * Valid from {low:g} to {high:g} deg C and from {slow:g} to {fast:g} deg/s; outside, the error at the edge of the
+ * range is taken off and the function returns 1, else 0. The range of rates is taken {margin:g} deg/s wider, as it was
+ * measured in true rates.
  * Input: output of the gyro as a rate, deg/s ({nominal}); result: rate in deg/s.
  * Define LABCTL_REAL as float before including it for single precision. */
 #ifndef {guard}
@@ -29,6 +31,14 @@ HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
 #define {name}_AXES {axes}
 static const char {name}_hash[] = "{hash}";
 static const double {name}_temperature_c[2] = {{{low:.17g}, {high:.17g}}};
+static const double {name}_output_dps[2] = {{{slowest:.17g}, {fastest:.17g}}};
+
+static inline LABCTL_REAL {name}_held(LABCTL_REAL w, int *outside)
+{{
+    if (!(w >= (LABCTL_REAL){name}_output_dps[0])) {{ *outside = 1; return (LABCTL_REAL){name}_output_dps[0]; }}
+    if (w > (LABCTL_REAL){name}_output_dps[1]) {{ *outside = 1; return (LABCTL_REAL){name}_output_dps[1]; }}
+    return w;
+}}
 """
 
 TAIL = """
@@ -52,11 +62,11 @@ static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c
     }}
     u = temperature_c - (LABCTL_REAL){reference:.17g};
     for (a = 0; a < {name}_AXES; a++) {{
-        LABCTL_REAL error = 0;
+        LABCTL_REAL error = 0, held = {name}_held(w[a], &outside);
         for (i = {rows} - 1; i >= 0; i--) {{
             LABCTL_REAL row = 0;
             for (j = {columns} - 1; j >= 0; j--) row = row * u + (LABCTL_REAL){name}_c[a][i][j];
-            error = error * w[a] + row;
+            error = error * held + row;
         }}
         rate[a] = w[a] - error;
     }}
@@ -92,7 +102,7 @@ static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c
         }}
     }}
     for (r = 0; r < {name}_AXES; r++) {{
-        for (c = 0; c <= {name}_AXES; c++) m[r][c] = c < {name}_AXES ? 0 : w[r];
+        for (c = 0; c <= {name}_AXES; c++) m[r][c] = c < {name}_AXES ? 0 : {name}_held(w[r], &outside);
         for (i = 0; i < {points}; i++) {{
             int node = last - {points} + 1 + i;
             for (c = 0; c < {name}_AXES; c++) m[r][c] += weight[i] * (LABCTL_REAL){name}_k[node][r][c];
@@ -114,6 +124,7 @@ static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c
         for (c = r + 1; c < {name}_AXES; c++) rate[r] -= m[r][c] * rate[c];
         rate[r] /= m[r][r];
     }}
+    for (r = 0; r < {name}_AXES; r++) rate[r] += w[r] - {name}_held(w[r], &outside);
     return outside;
 }}
 """
@@ -141,6 +152,7 @@ def c_header(calibration: Calibration) -> bytes:
 
 def _head(name: str, calibration: Calibration) -> str:
     (low, high), (slow, fast) = calibration.temperature_c, calibration.rate_dps
+    margin = MARGIN_SHARE * max(fast - slow, 1e-9)
     nominal = "; ".join(
         f"{axis}: (output in {unit.unit} - {unit.offset:g}) / {unit.scale:g}"
         for axis, unit in calibration.output.items()
@@ -154,6 +166,9 @@ def _head(name: str, calibration: Calibration) -> str:
         high=high,
         slow=slow,
         fast=fast,
+        margin=margin,
+        slowest=slow - margin,
+        fastest=fast + margin,
         nominal=nominal,
         guard=f"LABCTL_{name.upper()}_V{calibration.version}_H",
         name=name,

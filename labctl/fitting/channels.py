@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.past import Past, past_of
 from labctl.recording import Recording
 
 Array = NDArray[np.float64]
 BODY_AXES = ("x", "y", "z")
+#: A wave, "cos" or "sin", and how often it comes per turn of the table.
+Carrier = tuple[str, int]
+#: How long a data set is taken to be where nobody says.
+USUAL_DURATION_S = 60.0
 
 
 @dataclass(frozen=True)
@@ -24,6 +29,8 @@ class Channels:
 
     columns: Mapping[str, NDArray[Any]]
     rates: Mapping[str, Array]  #: body axis -> (n,) deg/s
+    past: Past = field(default_factory=Past)  #: what was before each row
+    harmonics: Mapping[Carrier, Array] = field(default_factory=dict)  #: means over each row of waves in the table angle
 
     def __len__(self) -> int:
         return len(next(iter(self.rates.values())))
@@ -52,7 +59,45 @@ class Channels:
         return Channels(
             {name: values[rows] for name, values in self.columns.items()},
             {axis: values[rows] for axis, values in self.rates.items()},
+            self.past,
+            {carrier: values[rows] for carrier, values in self.harmonics.items()},
         )
+
+    def table_rate_dps(self) -> Array:
+        """Return the table's rate, (n,) deg/s."""
+        return np.asarray(self.columns["table_rate_dps"], dtype=np.float64)
+
+    def up(self, axis: str) -> Array:
+        """Return how much of a body axis points up along the table axis, (n,): 1, -1 or 0."""
+        position = np.asarray(self.columns["position"]).astype(np.str_)
+        return (position == axis).astype(np.float64) - (position == f"-{axis}").astype(np.float64)
+
+    def positions(self) -> list[tuple[str, NDArray[np.bool_]]]:
+        """Return every position that occurs and which rows are in it, (n,)."""
+        position = np.asarray(self.columns["position"]).astype(np.str_)
+        return [(str(there), position == there) for there in np.unique(position)]
+
+    def harmonic(self, carrier: Carrier) -> Array:
+        """Return the mean of a wave in the table angle over each row, (n,)."""
+        if carrier in self.harmonics:
+            return self.harmonics[carrier]
+        wave, n = carrier
+        begin = np.deg2rad(np.asarray(self.columns["table_angle_deg"], dtype=np.float64))
+        turned = np.deg2rad(self.table_rate_dps() * self.durations_s())
+        at = n * (begin + turned / 2)
+        return np.asarray((np.cos(at) if wave == "cos" else np.sin(at)) * np.sinc(n * turned / 2 / np.pi))
+
+    def durations_s(self) -> Array:
+        """Return how long each row lasted, (n,) s."""
+        if "duration_s" in self.columns:
+            return np.asarray(self.columns["duration_s"], dtype=np.float64)
+        return np.full(len(self), USUAL_DURATION_S)
+
+    def decayed(self, tau_s: float) -> Array:
+        """Return the mean over each row of exp(-time since its data set's begin / tau), (n,)."""
+        begin = np.asarray(self.columns["since_begin_s"]) if "since_begin_s" in self.columns else np.zeros(len(self))
+        length = np.maximum(self.durations_s(), 1e-9)
+        return np.asarray(np.exp(-begin / tau_s) * -np.expm1(-length / tau_s) * tau_s / length)
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Return which of the names are not logged."""
@@ -72,7 +117,8 @@ def channels_of(points: Recording, up_rate_dps: float = 0.0) -> Channels:
     `up_rate_dps` is a rate that the table axis has besides the table's own: the Earth's, upwards.
     """
     columns = dict(points.columns)
+    columns.setdefault("position", np.full(len(points), points.info.axes[0]))
     true = np.asarray(columns["table_rate_dps"], dtype=np.float64) + up_rate_dps
     if "previous_rate_dps" not in columns and points.info.kind == "points":
         columns["previous_rate_dps"] = np.concatenate([[0.0], np.asarray(columns["table_rate_dps"])[:-1]])
-    return Channels(columns, body_rates(true, np.asarray(columns["position"])))
+    return Channels(columns, body_rates(true, np.asarray(columns["position"])), past_of(points))

@@ -90,7 +90,8 @@ def _at(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift) -
     chi2 = float(whitened[:, k] @ whitened[:, k] - projected @ projected)
     freedom = max(m - k, 1)
     log_dets = noise.log_determinant(blocks) + 2 * float(np.log(np.abs(np.diag(r)) * norms).sum())
-    scale = 1.0 if known else max(chi2, 1e-300) / freedom
+    # what no noise explains is the model's fault, and makes its coefficients that much less certain
+    scale = max(chi2 / freedom, 1.0) if known else max(chi2, 1e-300) / freedom
     fit_term = chi2 if known else freedom * np.log(max(chi2, 1e-300))
     log_evidence = -0.5 * (log_dets + fit_term) + noise.log_prior(scatter, drift)
     return _Point(drift, values, inverse @ inverse.T * scale, log_evidence, scale)
@@ -98,12 +99,14 @@ def _at(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift) -
 
 def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, fit: _Point) -> float:
     """Return the scatter that white noise does not explain, deg/s; in units of the white part when that is unknown."""
-    if scatter.white_var is None:
-        return 1.0
     residual = y - design @ fit.values
     freedom = max(len(y) - design.shape[1], 1)
     total = float(residual @ residual) / freedom
-    return float(np.sqrt(max(total - scatter.white_var.mean(), 0.01 * scatter.white_var.mean(), 1e-24)))
+    largest = scatter.largest_drift_dps / max(noise.DRIFT_SIZES)
+    if scatter.white_var is None:
+        return float(min(1.0, largest / np.sqrt(max(total, 1e-300))))
+    unexplained = np.sqrt(max(total - scatter.white_var.mean(), 0.01 * scatter.white_var.mean(), 1e-24))
+    return float(min(unexplained, largest))
 
 
 def _per_rate(design: NDArray[np.float64], y: Array, scatter: Scatter, fit: _Point) -> float:

@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.channels import Array
 from labctl.fitting.context import Context, context_of
 from labctl.fitting.earth import turning_columns, turning_size_dps, up_rate_dps, with_known_size
-from labctl.fitting.effects import effect
+from labctl.fitting.effects import kind_of
 from labctl.fitting.estimate import Solution, rank_of, solve
 from labctl.fitting.figures import ErrorFigures, floor_from_repeats, rms
 from labctl.fitting.levels import folds
-from labctl.fitting.model import AxisFit, ErrorModel, FittedModel, expand
+from labctl.fitting.model import AxisFit, ErrorModel, FittedModel
 from labctl.fitting.presets import Preset, preset_for
 from labctl.fitting.temperature import LagrangeTable
 from labctl.recording import Recording
@@ -42,7 +43,12 @@ class FitResult:
         """Return what `labctl fit --json` says of the model, besides serial and version."""
         model = self.fitted.model
         return {
-            "model": {"name": model.name, "effects": model.effect_ids, "argument": model.argument},
+            "model": {
+                "name": model.name,
+                "effects": model.effect_ids,
+                "argument": model.argument,
+                **{key: model.to_dict()[key] for key in ("terms", "temperature", "reference")},
+            },
             "axes": {axis: {"coefficients": coefficients_json(model, fit)} for axis, fit in self.fitted.axes.items()},
             "error": self.error.to_dict(),
             "validity": {"temperature_c": list(self.temperature_c), "rate_dps": list(self.rate_dps)},
@@ -131,19 +137,37 @@ def _turned(context: Context, axis: str, coefficients: Array | None) -> Array:
     return np.asarray(columns @ coefficients if columns.shape[1] == len(coefficients) else np.zeros(len(context)))
 
 
-def design(
-    context: Context, model: ErrorModel, axis: str
-) -> tuple[NDArray[np.float64], list[tuple[str, str, str]], NDArray[np.float64]]:
-    """Return an axis's columns (m, k*nodes), (effect, name, unit) of the k, and the Earth's columns (m, e).
+@dataclass(frozen=True)
+class AxisDesign:
+    """One axis: columns (m, c) that are estimated, how they become a table's coefficients (k * nodes, c), whose."""
 
-    Columns that are zero throughout were never exercised and are left out.
-    """
+    columns: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    names: list[tuple[str, str, str]]  #: (effect, name, unit) of the k
+    turning: NDArray[np.float64]  #: the Earth's columns (m, e)
+
+
+def design(context: Context, model: ErrorModel, axis: str) -> AxisDesign:
+    """Return what one axis is fitted by. Columns that are zero throughout were never exercised and are left out."""
     channels = context.channels if model.argument == "rate" else context.channels.with_rates(context.outputs)
+    steady = model.steady
     found = [(owner, column) for owner, column in model.columns(channels, axis) if np.any(column.values)]
-    values = np.column_stack([column.values for _, column in found]) if found else np.zeros((len(context), 0))
     basis = model.temperature.basis(context.channels.temperature_c(axis))
-    names = [(owner, column.name, column.unit) for owner, column in found]
-    return expand(values, basis), names, turning_columns(context.info, context.channels, axis)
+    nodes = basis.shape[1]
+    columns, spread = [np.zeros((len(context), 0))], [np.zeros((0, 0))]
+    for owner, column in found:
+        if owner in steady:
+            columns.append(column.values[:, None])
+            spread.append(np.ones((nodes, 1)))
+        else:
+            columns.append(column.values[:, None] * basis)
+            spread.append(np.eye(nodes))
+    return AxisDesign(
+        np.concatenate(columns, axis=1),
+        block_diag(*spread[1:]) if found else np.zeros((0, 0)),
+        [(owner, column.name, column.unit) for owner, column in found],
+        turning_columns(context.info, context.channels, axis),
+    )
 
 
 def _solve_axes(
@@ -151,26 +175,27 @@ def _solve_axes(
 ) -> tuple[dict[str, AxisFit], dict[str, Solution], dict[str, Array]]:
     fits, solutions, turning = {}, {}, {}
     for axis in context.outputs:
-        columns, names, earth = design(context, model, axis)
-        k = columns.shape[1]
+        made = design(context, model, axis)
+        names, k = made.names, made.columns.shape[1]
         if k == 0:
             raise NotEnoughData(
                 f"{context.info.serial}, axis {axis}: the recording exercises no effect of model {model.name} "
                 f"({', '.join(model.effect_ids)}); turn the unit about its other axes too"
             )
         y = context.outputs[axis] - context.true_rate_dps(axis)
-        together, y, scatter = with_known_size(columns, earth, y, context.scatter(axis), turning_size_dps(context.info))
+        together, y, scatter = with_known_size(
+            made.columns, made.turning, y, context.scatter(axis), turning_size_dps(context.info)
+        )
         try:
             solution = solve(together, y, scatter, fixed[axis].drift if fixed else None)
         except NotEnoughData as error:
             raise NotEnoughData(f"{context.info.serial}, axis {axis}, model {model.name}: {error}") from None
-        nodes = k // max(len(names), 1)
         fits[axis] = AxisFit(
             tuple(owner for owner, _, _ in names),
             tuple(name for _, name, _ in names),
             tuple(unit for _, _, unit in names),
-            solution.values[:k].reshape(len(names), nodes),
-            solution.covariance[:k, :k],
+            (made.spread @ solution.values[:k]).reshape(len(names), -1),
+            made.spread @ solution.covariance[:k, :k] @ made.spread.T,
         )
         solutions[axis], turning[axis] = replace(solution, white_dps=context.white_dps(axis)), solution.values[k:]
     return fits, solutions, turning
@@ -178,11 +203,11 @@ def _solve_axes(
 
 def _demand(context: Context, model: ErrorModel) -> None:
     """Refuse what the recording cannot carry, saying how much more it takes."""
-    needs = [(term.effect, *effect(term.effect).least(term)) for term in model.terms]
+    needs = [(term.effect, *kind_of(term).least(term)) for term in model.terms]
     temperatures, span = context.distinct_temperatures(), float(np.ptp(context.temperature_c))
     serial = context.info.serial
     for term in model.terms:
-        if absent := context.channels.missing(effect(term.effect).needs):
+        if absent := context.channels.missing(kind_of(term).needs):
             raise NotEnoughData(f"{serial}: effect {term.effect} needs column {absent[0]!r}; the recording has none")
     for axis in context.outputs:
         rates = context.distinct_rates(axis)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -11,12 +11,20 @@ from numpy.typing import NDArray
 
 from labctl.errors import LabctlError
 from labctl.fitting.channels import Array, Channels
-from labctl.fitting.effects import Column, Reference, Term, effect
+from labctl.fitting.effects import Column, Reference, Term, kind_of
 from labctl.fitting.temperature import Constant, TemperatureBasis, basis_from_dict
 
 Argument = Literal["rate", "output"]
 #: Effects of these origins belong to the unit and leave the house with its calibration.
+#: Rounds over the axes, and halvings of an interval, where the quick way to invert a model does not converge.
+ROUNDS, HALVINGS = 8, 50
 EXPORTED_ORIGINS = frozenset({"sensor", "package"})
+
+
+def leaves_the_house(term: Term) -> bool:
+    """Return whether an effect is the unit's own and can be corrected where the unit is used."""
+    found = kind_of(term)
+    return found.origin in EXPORTED_ORIGINS and found.in_use
 
 
 @dataclass(frozen=True)
@@ -34,17 +42,46 @@ class ErrorModel:
         """The ids of the effects, in order."""
         return [term.effect for term in self.terms]
 
+    @property
+    def steady(self) -> frozenset[str]:
+        """The ids of the effects that have one coefficient for all temperatures."""
+        return frozenset(term.effect for term in self.terms if term.steady)
+
     def columns(self, channels: Channels, axis: str) -> list[tuple[str, Column]]:
         """Return (effect id, regressor) of one output axis, before temperature multiplies the regressors."""
         return [
-            (term.effect, column)
+            (term.effect, replace(column, values=column.mean(channels), carrier=None))
             for term in self.terms
-            for column in effect(term.effect).columns(channels, axis, term, self.reference)
+            for column in kind_of(term).columns(channels, axis, term, self.reference)
         ]
 
     def with_terms(self, terms: tuple[Term, ...], name: str | None = None) -> ErrorModel:
         """Return the same model with other effects."""
         return replace(self, terms=terms, name=name or self.name)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model without coefficients, as JSON."""
+        return {
+            "name": self.name,
+            "argument": self.argument,
+            "terms": [{**asdict(t), "parameters": dict(t.parameters)} for t in self.terms],
+            "temperature": self.temperature.to_dict(),
+            "reference": {"temperature_c": self.reference.temperature_c},
+        }
+
+    @staticmethod
+    def from_dict(record: Mapping[str, Any]) -> ErrorModel:
+        """Return the model that `to_dict` described."""
+        return ErrorModel(
+            record["name"],
+            tuple(
+                Term(t["effect"], t["order"], dict(t["parameters"]), t.get("formula", ""), t.get("steady", False))
+                for t in record["terms"]
+            ),
+            record["argument"],
+            basis_from_dict(record["temperature"]),
+            Reference(record["reference"]["temperature_c"]),
+        )
 
     def forward(self) -> ErrorModel:
         """Return the same effects as a law of the true rate: the form that is physics, and that criticism judges."""
@@ -114,18 +151,39 @@ class FittedModel:
             rates = nearer
             if change < 1e-12:
                 return rates
+        return self._enclosed(outputs, channels, rates)
+
+    def _enclosed(self, outputs: Mapping[str, Array], channels: Channels, rates: dict[str, Array]) -> dict[str, Array]:
+        """Solve by halving intervals, axis by axis: slower, and right where an error has a steep flank."""
+        for _ in range(ROUNDS):
+            before = dict(rates)
+            for axis, output in outputs.items():
+                rates = {**rates, axis: self._halved(output, channels, rates, axis)}
+            change = max(float(np.max(np.abs(rates[axis] - before[axis]), initial=0.0)) for axis in outputs)
+            if change < 1e-9:
+                return rates
         raise NotConverged(
             f"model {self.model.name!r} could not be inverted: the last step still changed the rate by {change:.3g} "
             "deg/s; its coefficients are not those of a gyro (check the fit's validity range and the output's scale)"
         )
 
+    def _halved(self, output: Array, channels: Channels, rates: Mapping[str, Array], axis: str) -> Array:
+        reach = 0.02 * np.max(np.abs(output), initial=0.0) + 10.0
+        low, high = output - reach, output + reach
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            seen = channels.with_rates({**rates, axis: middle})
+            above = middle + self.error_dps(seen, axis) > output
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+        return np.asarray(0.5 * (low + high))
+
     def exported(self) -> tuple[FittedModel, list[dict[str, str]]]:
         """Return the part that belongs to the unit, and what was left out with its origin."""
-        kept = tuple(t for t in self.model.terms if effect(t.effect).origin in EXPORTED_ORIGINS)
+        kept = tuple(t for t in self.model.terms if leaves_the_house(t))
         left_out = [
-            {"effect": t.effect, "origin": effect(t.effect).origin, "term": effect(t.effect).term}
+            {"effect": t.effect, "origin": kind_of(t).origin, "term": kind_of(t).term}
             for t in self.model.terms
-            if effect(t.effect).origin not in EXPORTED_ORIGINS
+            if not leaves_the_house(t)
         ]
         if not left_out:
             return self, []
@@ -137,13 +195,7 @@ class FittedModel:
     def to_dict(self) -> dict[str, Any]:
         """Return everything needed to rebuild this model, as JSON."""
         return {
-            "name": self.model.name,
-            "argument": self.model.argument,
-            "terms": [
-                {"effect": t.effect, "order": t.order, "parameters": dict(t.parameters)} for t in self.model.terms
-            ],
-            "temperature": self.model.temperature.to_dict(),
-            "reference": {"temperature_c": self.model.reference.temperature_c},
+            **self.model.to_dict(),
             "axes": {
                 axis: {
                     "effects": list(fit.effects),
@@ -159,13 +211,7 @@ class FittedModel:
     @staticmethod
     def from_dict(record: Mapping[str, Any]) -> FittedModel:
         """Return the model that `to_dict` described."""
-        model = ErrorModel(
-            record["name"],
-            tuple(Term(t["effect"], t["order"], dict(t["parameters"])) for t in record["terms"]),
-            record["argument"],
-            basis_from_dict(record["temperature"]),
-            Reference(record["reference"]["temperature_c"]),
-        )
+        model = ErrorModel.from_dict(record)
         axes = {
             axis: AxisFit(
                 tuple(fit["effects"]),

@@ -18,6 +18,10 @@ from labctl.fitting.channels import Array
 TAU_SPACINGS = (0.25, 3.0, 12.0, 50.0, 200.0)
 #: Drift sizes tried, in units of the scatter that white noise does not explain.
 DRIFT_SIZES = (0.0, 0.35, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2)
+#: No drift is larger than this many times half the bias stability: what is left beyond it is the model's fault.
+LARGEST = 12.0
+#: The usual bias stability, deg/s, where no data sheet says it.
+USUAL_STABILITY_DPS = 0.004
 #: Prior width of the drift about half the data sheet's bias stability: a factor.
 PRIOR_FACTOR = 2.5
 
@@ -35,6 +39,11 @@ class Scatter:
     rate_dps: Array
     white_var: Array | None
     datasheet_drift_dps: float | None = None
+
+    @property
+    def largest_drift_dps(self) -> float:
+        """The largest drift that is believed."""
+        return LARGEST * (self.datasheet_drift_dps or USUAL_STABILITY_DPS) / 2
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -128,10 +128,25 @@ def preset_for(model: str | None, effects: list[str]) -> Preset:
 
     def extended(context: Context) -> tuple[ErrorModel, Rows]:
         base, rows = preset.build(context)
-        added = tuple(term for term in terms if term.effect not in base.effect_ids)
+        added = tuple(replace(term, steady=True) for term in terms if term.effect not in base.effect_ids)
         return base.with_terms((*base.terms, *added), f"{model}+{'+'.join(t.effect for t in added)}"), rows
 
     return Preset(model, extended, preset.inner_only)
+
+
+def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ...] = ()) -> Preset:
+    """Return how to fit a model again in its forward form, with effects added and others left out."""
+    kept = tuple(t for t in model.terms if t.effect not in {*remove, *(term.effect for term in add)})
+    name = model.name + "".join(f"+{t.effect}" for t in add) + "".join(f"-{effect_id}" for effect_id in remove)
+
+    def build(context: Context) -> tuple[ErrorModel, Rows]:
+        table = model.temperature
+        if isinstance(table, LagrangeTable):
+            table = LagrangeTable(_nodes(context, table.points, model.name), table.points)
+        terms = (*kept, *(replace(term, steady=True) for term in add))
+        return replace(model.forward(), name=name, terms=terms, temperature=table), _all(context)
+
+    return Preset(name, build, isinstance(model.temperature, LagrangeTable))
 
 
 def _custom(terms: tuple[Term, ...], context: Context) -> ErrorModel:

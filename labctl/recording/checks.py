@@ -12,6 +12,8 @@ from labctl.errors import BadRecording
 from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, needed
 from labctl.recording.info import RecordingInfo
 
+#: What no gyro, table or chamber has ever been at: another unit, or a slip.
+POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
 POSITIONS = frozenset(sign + axis for sign in ("", "-") for axis in "xyz")
 
 
@@ -23,12 +25,25 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -
                 f"{path}: column {name!r} is missing (needed for kind = {info.kind!r}: {BY_NAME[name].meaning})"
             )
         _finite(path, name, columns[name], columns.get("valid"))
+    for name, (low, high) in POSSIBLE.items():
+        if name in columns:
+            _possible(path, name, columns[name], low, high)
     if info.kind == "coefficients":
         return columns
     if "t_s" in columns:
         _time(path, columns["t_s"], strict=info.kind == "samples")
     _datasets(path, columns["dataset"], points=info.kind == "points")
     return _defaults(path, info, columns)
+
+
+def _possible(path: Path, name: str, values: NDArray[Any], low: float, high: float) -> None:
+    wrong = (values < low) | (values > high)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise BadRecording(
+            f"{path}: column {name!r}, row {row + 1}: {values[row]:g} is not possible ({low:g} to {high:g} "
+            f"{BY_NAME[name].unit}); check the column's unit"
+        )
 
 
 def checked_environment(path: Path, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

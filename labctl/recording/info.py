@@ -48,7 +48,7 @@ class RecordingInfo(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     format: Literal["labctl-recording/1"] = "labctl-recording/1"
-    serial: str = Field(min_length=1)
+    serial: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$")
     model: str = ""
     axes: tuple[Axis, ...] = Field(min_length=1, max_length=3)
     kind: Literal["samples", "points", "coefficients"]

@@ -30,12 +30,22 @@ class FitRequest(Request):
     )
 
 
+class ImproveRequest(Request):
+    """How to change the effects of a version; the changed model is fitted again and becomes the next version."""
+
+    add: list[str] = Field(default_factory=list, description="Effect ids; `name:2` sets an order.")
+    remove: list[str] = Field(default_factory=list, description="Effect ids that are in the version.")
+    formula: list[str] = Field(default_factory=list, description="Effects of your own: 'name: expression'.")
+    version: int | None = Field(default=None, description="Version to change; default: the newest.")
+    recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
+
+
 class CertifyRequest(Request):
     """Who makes a version current, and why."""
 
     by: str = Field(min_length=1)
     reason: str = Field(min_length=1)
-    due_days: int | None = Field(default=None, gt=0, description="Days until the unit is due again.")
+    due_days: int | None = Field(default=None, gt=0, le=36_500, description="Days until the unit is due again.")
 
 
 class CampaignRequest(Request):
@@ -60,6 +70,10 @@ class Acts(Protocol):
 
     def fit(self, serial: str, request: FitRequest) -> FitAnswer:
         """Fit a model and keep it as the unit's next version."""
+        ...
+
+    def improve(self, serial: str, request: ImproveRequest) -> FitAnswer:
+        """Change a version's effects and keep the fit as the unit's next version."""
         ...
 
     def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:

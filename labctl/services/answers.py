@@ -21,6 +21,7 @@ class Imported(Answer):
     recording: int
     datasets: int
     readings: int
+    suggested_model: str = Field(default="bias_scale", description="A published model for such a recording.")
 
 
 class ModelAnswer(Answer):
@@ -58,6 +59,46 @@ class FitAnswer(Answer):
     axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
     error: ErrorFigures
     validity: Validity
+
+
+class CriticismAnswer(Answer):
+    """A model held against a recording: the verdict in one of five forms, and what it stands on."""
+
+    serial: str
+    version: int
+    recording: int
+    verdict: Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
+    text: list[str] = Field(description="The verdict in words, the answer first.")
+    error: dict[str, Any]
+    noise: dict[str, Any]
+    lack_of_fit: dict[str, float | None]
+    where: list[dict[str, Any]] = Field(description="Ranges of channels in which the residual is far from 0.")
+    suspects: list[dict[str, Any]]
+    named: list[str] = Field(description="The effects that the verdict stands on.")
+    depends_on: list[str] = Field(description="Channels that the residual hangs on, strongest first.")
+    not_testable: list[dict[str, Any]]
+    experiments: list[dict[str, Any]]
+
+
+class LadderRow(Answer):
+    """One version of a unit's calibration, with its errors."""
+
+    version: int
+    parent: int | None
+    model: str
+    effects: list[str]
+    raw_rms_dps: float | None
+    rms_dps: float | None
+    heldout_rms_dps: float | None
+    noise_floor_dps: float | None
+
+
+class LadderAnswer(Answer):
+    """The error, version by version, oldest first."""
+
+    serial: str
+    steps: list[LadderRow]
+    noise_floor_dps: float | None
 
 
 class CalibrationRow(Answer):
@@ -126,6 +167,7 @@ class CampaignAnswer(Answer):
     gyro_c: float | None = None
     rate_dps: float | None = None
     last_error: str | None = None
+    abandoned: bool = Field(default=False, description="No process runs it any more, and it has no end.")
     started_at: datetime | None = None
     ended_at: datetime | None = None
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")

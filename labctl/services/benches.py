@@ -10,6 +10,7 @@ from instruments.bench import shipped_benches
 from instruments.clock import ScaledClock, SystemClock, VirtualClock
 from instruments.open import check
 from instruments.ports import serve_simulation
+from labctl.errors import BadInput
 from labctl.services.answers import DeviceCheck
 from labctl.services.planning import load_bench
 
@@ -33,4 +34,6 @@ def shipped() -> list[dict[str, Any]]:
 
 def serve_simulator(source: str, out: Path | None, speed: float, ready: Callable[[dict[str, str]], None]) -> None:
     """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until interrupted."""
+    if not 0 < speed < float("inf"):
+        raise BadInput(f"--speed {speed}: a positive number, 1 for the wall's own pace")
     serve_simulation(load_bench(source), ScaledClock(speed), out, ready)

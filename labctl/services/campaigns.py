@@ -62,13 +62,21 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
 
 def list_campaigns(store: Store) -> list[CampaignAnswer]:
     """Return every campaign, newest first."""
-    return [from_rows(store, row) for row in store.campaigns.all()]
+    return [_looked_after(store, from_rows(store, row)) for row in store.campaigns.all()]
 
 
 def campaign_status(store: Store, campaign: int | None) -> CampaignAnswer:
     """Return where a campaign is; without a number the newest. Raises NotFound."""
     row = store.campaigns.newest() if campaign is None else store.campaigns.get(campaign)
-    return from_rows(store, row)
+    return _looked_after(store, from_rows(store, row))
+
+
+def _looked_after(store: Store, answer: CampaignAnswer) -> CampaignAnswer:
+    """Say so when no process runs a campaign that has not ended."""
+    if answer.state in ENDED or store.is_held:
+        return answer
+    reason = "no process runs it any more: look after the bench; the next start of labctl on this database closes it"
+    return answer.model_copy(update={"reason": reason, "abandoned": True})
 
 
 def event_answer(row: EventRow) -> EventAnswer:

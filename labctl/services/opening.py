@@ -9,8 +9,8 @@ from pathlib import Path
 from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
-from labctl.services import calibrations, recordings
-from labctl.services.acts import Acts, CertifyRequest, FitRequest
+from labctl.services import calibrations, criticism, recordings
+from labctl.services.acts import Acts, CertifyRequest, FitRequest, ImproveRequest
 from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
 from labctl.services.campaigns import campaign_status
 from labctl.store import Store, holder_of, open_store
@@ -30,6 +30,10 @@ class LocalActs:
     def fit(self, serial: str, request: FitRequest) -> FitAnswer:
         """Fit a model and keep it as the unit's next version."""
         return calibrations.fit_unit(self._store, serial, request, self._clock.utc())
+
+    def improve(self, serial: str, request: ImproveRequest) -> FitAnswer:
+        """Change a version's effects and keep the fit as the unit's next version."""
+        return criticism.improve_unit(self._store, serial, request, self._clock.utc())
 
     def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:
         """Make a version the unit's current one."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 import numpy as np
 
 from labctl.errors import BadRecording, NotFound
-from labctl.recording import read_recording, write_recording
+from labctl.recording import RecordingInfo, read_recording, write_recording
 from labctl.services.answers import Imported
 from labctl.store import Store
 
@@ -30,7 +30,20 @@ def import_folder(store: Store, folder: Path, at: datetime) -> Imported:
     row = store.recordings.get(number)
     readings = row.readings if recording.info.kind == "samples" else len(recording)
     datasets = 0 if recording.info.kind == "coefficients" else row.datasets
-    return Imported(serial=row.serial, recording=number, datasets=datasets, readings=readings)
+    return Imported(
+        serial=row.serial,
+        recording=number,
+        datasets=datasets,
+        readings=readings,
+        suggested_model=suggested_model(recording.info),
+    )
+
+
+def suggested_model(info: RecordingInfo) -> str:
+    """Return the published model that a recording of this kind is usually fitted with."""
+    if info.kind == "coefficients":
+        return "weiss1995"
+    return "yang2018" if len(info.axes) > 1 else "ojeda2000"
 
 
 def import_files(acts: Acts, files: Mapping[str, BinaryIO]) -> Imported:

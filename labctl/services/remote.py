@@ -8,8 +8,8 @@ from typing import Any
 
 import httpx
 
-from labctl.errors import LabctlError, NotCertified, StoreError
-from labctl.services.acts import CertifyRequest, FitRequest
+from labctl.errors import Conflict, LabctlError, NotCertified, StoreError
+from labctl.services.acts import CertifyRequest, FitRequest, ImproveRequest
 from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
 from labctl.services.planning import load_recipe
 from labctl.services.recordings import FILE_NAMES
@@ -56,6 +56,16 @@ class RemoteActs:
         """Ask for a fit."""
         return FitAnswer.model_validate(self._post(f"/api/units/{serial}/calibrations", json=request.model_dump()))
 
+    def improve(self, serial: str, request: ImproveRequest) -> FitAnswer:
+        """Ask for a changed model."""
+        version = request.version or self._newest(serial)
+        path = f"/api/units/{serial}/calibrations/{version}/improve"
+        return FitAnswer.model_validate(self._post(path, json=request.model_dump(exclude={"version"})))
+
+    def _newest(self, serial: str) -> int:
+        rows = self._client.get(f"/api/units/{serial}/calibrations").json()
+        return int(rows[0]["version"]) if isinstance(rows, list) and rows else 1
+
     def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:
         """Ask for a certification."""
         return self._certification(serial, version, "certify", request)
@@ -70,6 +80,12 @@ class RemoteActs:
 
     def start_campaign(self, request: StartRequest) -> CampaignAnswer:
         """Ask for a campaign on the service's bench."""
+        for option, given in (("--bench", request.bench), ("--speed", request.speed), ("--seed", request.seed)):
+            if given is not None:
+                raise Conflict(
+                    f"{option} {given}: the service at {self._client.base_url} holds this database and runs campaigns "
+                    "on its own bench at its own pace; leave the option out, stop it, or name another --database"
+                )
         recipe = request.recipe
         if Path(recipe).is_file():
             load_recipe(recipe)

@@ -36,8 +36,10 @@ class StartRequest(Request):
     recipe: str
     bench: str | None = None
     clip: bool = False
-    speed: float | None = Field(default=None, gt=0, description="Of a simulated bench; absent: as fast as it can.")
-    seed: int | None = Field(default=None, description="Of a simulated bench.")
+    speed: float | None = Field(
+        default=None, gt=0, allow_inf_nan=False, description="Of a simulated bench; absent: as fast as it can."
+    )
+    seed: int | None = Field(default=None, ge=0, description="Of a simulated bench.")
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ The instruments' bytes are left out, so a reading keeps the value that the unit 
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -36,8 +38,8 @@ class SimulateRequest(Request):
     bench: str | None = None
     gyro: str | None = None
     hide: list[str] = Field(default_factory=list)
-    seed: int = 1
-    sample_rate_hz: float | None = Field(default=None, gt=0)
+    seed: int = Field(default=1, ge=0)
+    sample_rate_hz: float | None = Field(default=None, ge=0.1, le=2000, allow_inf_nan=False)
     clip: bool = False
 
 
@@ -56,12 +58,21 @@ def simulate_recording(request: SimulateRequest, out: Path, file_format: Literal
     recipe = load_recipe(request.recipe)
     bench = load_bench(request.bench or bench_for(recipe))
     gyro = _gyro(bench, request.gyro)
-    hidden = hidden_sizes(request.hide)
+    hidden = hidden_sizes([text for text in request.hide if not _is_z(text)])
     rate_hz = request.sample_rate_hz or DEFAULT_RATE_HZ
     gyro = gyro.model_copy(update={"sample_rate_hz": rate_hz})
     simulation = (bench.simulation or SimulationSettings()).model_copy(update={"seed": request.seed, "hidden": hidden})
     bench = bench.model_copy(update={"gyros": (gyro,), "simulation": simulation})
     plan = make_plan(recipe, limits_of(bench), clip=request.clip)
+    if wanted := [text for text in request.hide if _is_z(text)]:
+        from labctl.services.sizing import Sizing  # noqa: PLC0415  it simulates itself
+
+        sizing, known = Sizing(plan, bench, gyro), hidden_sizes([text.partition("=")[0] for text in wanted])
+        for text in wanted:
+            name, _, z = text.partition("=z")
+            hidden[name] = sizing.size_of(name, float(z), known[name])
+        simulation = simulation.model_copy(update={"hidden": hidden})
+        bench = bench.model_copy(update={"simulation": simulation})
     recording = simulate(plan, bench, gyro)
     write_recording(recording, out, file_format)
     return Simulated(
@@ -76,6 +87,11 @@ def _gyro(bench: BenchFile, name: str | None) -> GyroSettings:
     return found[0]
 
 
+def _is_z(text: str) -> bool:
+    """Whether a size is given in noise units: `EFFECT=z10`."""
+    return re.fullmatch(r"[^=]+=z\d+(\.\d+)?", text) is not None
+
+
 def hidden_sizes(texts: list[str]) -> dict[str, float]:
     """Read `EFFECT` or `EFFECT=SIZE`; without a size one that a person would notice. Raises BadInput."""
     from instruments.ports import hidden_defaults  # noqa: PLC0415  simulators are loaded only when something is hidden
@@ -88,8 +104,12 @@ def hidden_sizes(texts: list[str]) -> dict[str, float]:
             raise BadInput(f"effect {name!r} cannot be hidden (there are {', '.join(sorted(known))})")
         try:
             sizes[name] = float(size) if size else known[name]
+            if not math.isfinite(sizes[name]):
+                raise ValueError(size)
         except ValueError:
-            raise BadInput(f"--hide {text}: size {size!r} is not a number (in the effect's coefficient unit)") from None
+            raise BadInput(
+                f"--hide {text}: size {size!r} is not a finite number (in the effect's coefficient unit)"
+            ) from None
     return sizes
 
 

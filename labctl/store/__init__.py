@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from labctl.store.audit import first_broken
 from labctl.store.calibrations import Calibrations, NewCalibration
 from labctl.store.campaigns import Campaigns, NewCampaign
-from labctl.store.database import Database, Holder, holder_of
+from labctl.store.database import Database, Holder, holder_of, is_url
 from labctl.store.journal import StoreJournal
 from labctl.store.recordings import Recordings
 from labctl.store.records import (
@@ -60,6 +60,11 @@ class Store:
     def location(self) -> str:
         """Where the database is."""
         return self._database.location
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a process, perhaps this one, holds the database for writing."""
+        return self._database.writes or is_url(self.location) or holder_of(self.location) is not None
 
     def announce(self, url: str) -> None:
         """Say at which address the holder of this database can be asked to write."""

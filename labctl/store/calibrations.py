@@ -149,6 +149,10 @@ class Calibrations:
                 row = connection.execute(_DOCUMENT, {"serial": serial, "version": version}).first()
         if row is not None:
             return bytes(row[0]), str(row[1])
+        with self._database.reading() as connection:
+            known = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial))
+        if known is None:
+            raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign brings one in")
         if version is None:
             self.certified_version(serial)  # says why there is none
         raise NotFound(f"unit {serial!r} has no calibration version {version}")

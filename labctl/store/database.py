@@ -72,6 +72,7 @@ class Database:
 
     def __init__(self, location: str, *, write: bool, url: str | None = None) -> None:
         self.location = location
+        self.writes = write
         self._guard = threading.RLock()
         self._lock: FileLock | None = None
         self._sqlite = not is_url(location)

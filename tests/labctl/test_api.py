@@ -75,7 +75,8 @@ def test_import_fit_certify_fetch(fog: TestClient) -> None:
 def test_the_fit_is_the_command_lines(fog: TestClient) -> None:
     answer = fog.post("/api/units/OSU-FOG-2024/calibrations", json={"effects": ["bias", "scale_factor"]}).json()
     assert answer["version"] == 2
-    assert answer["model"] == {"name": "custom", "effects": ["bias", "scale_factor"], "argument": "rate"}
+    expected = {"name": "custom", "effects": ["bias", "scale_factor"], "argument": "rate"}
+    assert answer["model"].items() >= expected.items()
     assert set(answer["axes"]["z"]["coefficients"]) == {"bias", "scale_factor"}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -31,6 +32,7 @@ class State:
     mounting: int
     full_scale_dps: float
     north_deg: float
+    own_at: Callable[[Array], Array]  #: times (k,) not long ago -> own rates then, (k, axes)
 
 
 class HiddenEffect:

@@ -159,6 +159,7 @@ class StartTransient(HiddenEffect):
 
     id, unit, default = "start_transient", "1", 1e-3
     tau_s = 4.3
+    LOOK_S = 0.5
 
     def __init__(self, size: float, seed: list[int]) -> None:
         super().__init__(size, seed)
@@ -169,6 +170,7 @@ class StartTransient(HiddenEffect):
         own = state.own_dps
         if self._followed is None:
             self._followed, self._at_s = own[0].copy(), float(state.t_s[0])
+        self._catch_up(state)
         steps = np.diff(np.concatenate([[self._at_s], state.t_s]))
         missing = np.empty_like(own)
         for i, step in enumerate(steps):
@@ -176,6 +178,16 @@ class StartTransient(HiddenEffect):
             missing[i] = own[i] - self._followed
         self._at_s = float(state.t_s[-1])
         return -self.size * missing
+
+    def _catch_up(self, state: State) -> None:
+        """Follow the table through a time in which nobody asked; what is long ago is forgotten anyway."""
+        gap_s = float(state.t_s[0]) - self._at_s
+        if gap_s <= self.LOOK_S or self._followed is None:
+            return
+        times = np.arange(max(self._at_s, float(state.t_s[0]) - 12 * self.tau_s), float(state.t_s[0]), self.LOOK_S)
+        for own in state.own_at(times):
+            self._followed += (own - self._followed) * (1.0 - np.exp(-self.LOOK_S / self.tau_s))
+        self._at_s = float(times[-1])
 
 
 EFFECTS: tuple[type[HiddenEffect], ...] = (

@@ -28,7 +28,8 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
         serials = [triaxial.SERIAL, single_axis.SERIAL, "WEISS-ENV05S", "OSU-FOG-2024"]
         for serial in serials:
             request = CertifyRequest(by="the demo", reason="computed and checked in this run")
-            certify(store, serial, 1, "certify", request, VirtualClock().utc())
+            newest = max(row.version for row in store.calibrations.of_unit(serial))
+            certify(store, serial, newest, "certify", request, VirtualClock().utc())
         served.play(stage, serials)
         stage.title("Where to look")
         stage.say(f"labctl serve --simulate --database {location}     then http://127.0.0.1:8420/docs")

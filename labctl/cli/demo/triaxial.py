@@ -14,7 +14,8 @@ SERIAL = "STIM-0001"
 
 def play(stage: Stage, *, quick: bool) -> None:
     """Measure, fit two models, measure again, and compare."""
-    stage.title("(a) Tri-axial MEMS gyro: 10 temperatures x 21 rates x 3 positions, 1 h soaks")
+    size = "a small campaign, 20 min soaks" if quick else "10 temperatures x 21 rates x 3 positions, 1 h soaks"
+    stage.title(f"(a) Tri-axial MEMS gyro: {size}")
     recipe = "quick-triaxial" if quick else "table1-x-table2"
     first = stage.campaign(recipe, "triaxial-sim")
     versions = {

@@ -8,10 +8,11 @@ from types import MappingProxyType
 from typing import Any
 
 from labctl.errors import BadInput
-from labctl.fitting.effects import alignment, bias, scale_factor, surface
-from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Term
+from labctl.fitting.effects import acceleration, alignment, bias, history, scale_factor, shape, surface, table, thermal
+from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Span, Term
+from labctl.fitting.effects.formula import Formula, formulas
 
-FAMILIES = (bias, scale_factor, surface, alignment)
+FAMILIES = (bias, scale_factor, surface, alignment, shape, acceleration, table, thermal, history)
 
 CATALOGUE: Mapping[str, Effect] = MappingProxyType({kind.id: kind() for family in FAMILIES for kind in family.EFFECTS})
 
@@ -19,11 +20,15 @@ __all__ = [
     "CATALOGUE",
     "Column",
     "Effect",
+    "Formula",
     "Parameter",
     "Reference",
+    "Span",
     "Term",
     "describe_effects",
     "effect",
+    "formulas",
+    "kind_of",
     "parse_term",
 ]
 
@@ -35,6 +40,11 @@ def effect(effect_id: str) -> Effect:
     near = difflib.get_close_matches(effect_id, CATALOGUE, n=3, cutoff=0.4)
     hint = f"did you mean {' or '.join(near)}?" if near else "`labctl effects` lists them"
     raise BadInput(f"effect {effect_id!r} is not in the catalogue; {hint}")
+
+
+def kind_of(term: Term) -> Effect:
+    """Return the effect of a term: of the catalogue, or the formula that it carries."""
+    return Formula(term.effect, term.formula) if term.formula else effect(term.effect)
 
 
 def parse_term(text: str) -> Term:

@@ -5,6 +5,7 @@ An effect is written as one small frozen class; it is added to the catalogue by 
 
 from __future__ import annotations
 
+import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,11 +13,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from labctl.fitting.channels import Array, Channels
+from labctl.fitting.channels import Array, Carrier, Channels
 
 Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
 #: Which output axes an effect shows on: the one that turns, the others, or all alike.
 Rows = Literal["own", "cross", "all"]
+#: How many values of a nonlinear parameter compete.
+GRID_POINTS = 6
 
 
 @dataclass(frozen=True)
@@ -40,12 +43,38 @@ class Parameter:
 class Column:
     """One regressor: what its coefficient is called, the coefficient's unit, and the values (n,).
 
-    values x coefficient is an error in deg/s of the output, gyro minus true rate.
+    values x coefficient is an error in deg/s of the output, gyro minus true rate. With a `carrier`, a wave and how
+    often it comes per turn of the table, the values are its size: it goes round far faster than they change.
     """
 
     name: str
     unit: str
     values: Array
+    carrier: Carrier | None = None
+
+    def mean(self, channels: Channels) -> Array:
+        """Return the regressor as each row of the channels sees it on average, (n,)."""
+        return self.values if self.carrier is None else self.values * channels.harmonic(self.carrier)
+
+
+@dataclass(frozen=True)
+class Span:
+    """What a recording covers: from where the options of an effect are drawn."""
+
+    rate_dps: float  #: the greatest
+    slowest_dps: float  #: the least that is not rest
+    rates_dps: tuple[float, ...]  #: all, without sign, rising
+    channels: frozenset[str]
+
+    def has(self, channel: str) -> bool:
+        """Whether a channel is logged."""
+        return channel in self.channels
+
+    def between_rates(self, low: float, high: float) -> Array:
+        """Return a value between each two rates from `low` to `high` of the greatest."""
+        rates = np.array(self.rates_dps)
+        middles = (rates[:-1] + rates[1:]) / 2
+        return middles[(middles >= low * self.rate_dps) & (middles <= high * self.rate_dps)]
 
 
 @dataclass(frozen=True)
@@ -55,6 +84,8 @@ class Term:
     effect: str
     order: int | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    formula: str = ""  #: what a person wrote, where the effect is not of the catalogue
+    steady: bool = False  #: one coefficient for all temperatures, also in a model that has a table over them
 
 
 @dataclass(frozen=True)
@@ -80,6 +111,7 @@ class Effect(ABC):
     ranges: ClassVar[Mapping[str, tuple[float, float]]] = {}  #: technology -> plausible size of the first coefficient
     aliases: ClassVar[tuple[str, ...]] = ()  #: ids whose columns are the same whatever the schedule
     experiment: ClassVar[str] = ""  #: what would tell it from its likes
+    in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 
     @abstractmethod
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
@@ -89,9 +121,24 @@ class Effect(ABC):
         """Return how many different (rates, temperatures) tell this effect's coefficients apart."""
         return 2, 1
 
+    def options(self, span: Span) -> list[Term]:
+        """Return the shapes in which this effect competes for a recording: orders, and a grid of its parameters."""
+        if self.max_order is not None:
+            return [Term(self.id, order) for order in range(self.min_order, self.max_order + 1)]
+        grids = {p.name: p.grid(GRID_POINTS) for p in self.parameters}
+        return by_parameter(self.id, **grids)
+
     def order(self, term: Term) -> int:
         """Return the polynomial order that a term asks for, or this effect's own."""
         return term.order if term.order is not None else (self.default_order or 1)
+
+
+def by_parameter(effect_id: str, **grids: Array) -> list[Term]:
+    """Return a term for every combination of parameter values."""
+    return [
+        Term(effect_id, None, dict(zip(grids, map(float, values), strict=True)))
+        for values in itertools.product(*grids.values())
+    ]
 
 
 def powers(values: Array, exponents: range) -> dict[int, Array]:

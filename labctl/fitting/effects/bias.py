@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from labctl.fitting.channels import Channels
-from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Term, powers
+from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Span, Term, powers
 
 
 class Bias(Effect):
@@ -50,6 +50,9 @@ class BiasTemperature(Effect):
 
     def least(self, term: Term) -> tuple[int, int]:
         return 1, self.order(term) + 1
+
+    def options(self, span: Span) -> list[Term]:
+        return [Term(self.id, order) for order in (1, 2, 3)]  # a higher one would follow any curve
 
 
 EFFECTS: tuple[type[Effect], ...] = (Bias, BiasTemperature)

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from labctl.fitting.channels import Channels
-from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Term, powers
+from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Span, Term, by_parameter, powers
 
 
 class ScaleFactor(Effect):
@@ -44,6 +44,9 @@ class ScaleFactorTemperature(Effect):
             Column(f"scale_factor_t{k}", f"1/K^{k}" if k > 1 else "1/K", rate * column)
             for k, column in powers(centred, range(1, self.order(term) + 1)).items()
         ]
+
+    def options(self, span: Span) -> list[Term]:
+        return [Term(self.id, order) for order in (1, 2, 3)]  # a higher one would follow any curve
 
     def least(self, term: Term) -> tuple[int, int]:
         return 2, self.order(term) + 1
@@ -137,11 +140,16 @@ class Saturation(Effect):
     parameters = (Parameter("knee_dps", "deg/s", 20.0, 400.0),)
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
     experiment = "rates every 2 to 5 % above 70 % of full scale"
+    softness: ClassVar[float] = 0.02  #: of the knee: what saturates does not break off
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate = channels.rate_dps(axis)
         knee = term.parameters.get("knee_dps", 0.8 * float(np.max(np.abs(rate), initial=1.0)))
-        return [Column("saturation", "1", np.sign(rate) * np.maximum(np.abs(rate) - knee, 0.0))]
+        excess = (np.abs(rate) - knee) / max(self.softness * knee, 1e-9)
+        return [Column("saturation", "1", np.sign(rate) * self.softness * knee * np.logaddexp(0.0, excess))]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, knee_dps=np.arange(0.5, 0.99, 0.05) * span.rate_dps)
 
 
 EFFECTS: tuple[type[Effect], ...] = (

@@ -1,0 +1,192 @@
+"""`labctl criticise`, `improve`, `ladder`: hold the model against the measurements, add what is missing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from labctl.cli.errors import one_clear_line
+from labctl.cli.options import Database, Json, RecordingId, Serial
+from labctl.cli.output import console, figure, print_json, table
+
+if TYPE_CHECKING:
+    from labctl.services.answers import CriticismAnswer, FitAnswer, LadderAnswer
+
+VersionOption = Annotated[int | None, typer.Option("--version", metavar="N", help="Version; default: the newest.")]
+FormulaOption = Annotated[
+    list[str] | None,
+    typer.Option("--formula", metavar="'NAME: EXPR'", help="An effect of your own, or a TOML file of them."),
+]
+#: From dark to bright: residual over floor in the small map.
+SHADES = " ·░▒▓█"
+
+
+def criticise(
+    serial: Serial,
+    version: VersionOption = None,
+    recording: RecordingId = None,
+    formula: FormulaOption = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Hold a version against a recording: what is left, where, and which effect may be missing."""
+    from labctl.services.criticism import criticise_unit
+    from labctl.services.opening import open_reading
+
+    with one_clear_line(), open_reading(database) as store:
+        answer = criticise_unit(store, serial, version, recording, formula or [])
+    if as_json:
+        print_json(answer)
+    else:
+        print_criticism(answer)
+    if answer.verdict == "insufficient_data":
+        raise typer.Exit(1)
+
+
+def print_criticism(answer: CriticismAnswer) -> None:
+    """Print a criticism for a person: the verdict, the errors, a small map, then the table."""
+    for line in answer.text:
+        console.print(line, style="bold" if line is answer.text[0] else None, markup=False)
+    error = answer.error
+    console.print(
+        f"{answer.serial} version {answer.version}, recording {answer.recording}: "
+        f"left {figure(error['rms_dps'])} deg/s, "
+        f"held-out {figure(error['heldout_rms_dps'])}, noise floor {figure(error['noise_floor_dps'])}",
+        style="dim",
+    )
+    for picture in getattr(answer, "maps", []):
+        _print_map(picture)
+    if answer.suspects:
+        rows = table("suspects", "effect", "origin", "log BF", "after", "held-out", "alike", numbers=4)
+        for suspect in answer.suspects:
+            others = [e for e in suspect["alias_group"] if e != suspect["effect"]]
+            rows.add_row(
+                suspect["effect"], suspect["origin"], figure(suspect["log_bayes_factor"], 3),
+                figure(suspect["rms_after_dps"]), figure(suspect["heldout_rms_after_dps"]), ", ".join(others[:3]),
+            )  # fmt: skip
+        console.print(rows)
+    if answer.not_testable:
+        hidden = [f"{line['effect']}" for line in answer.not_testable]
+        console.print(f"this recording cannot say anything about: {', '.join(hidden)}", style="dim", markup=False)
+    if answer.named:
+        console.print(f"next: labctl improve {answer.serial} --add {answer.named[0]}", style="dim", markup=False)
+
+
+def _print_map(picture: dict[str, Any], columns: int = 21) -> None:
+    """Draw residual over floor, rates across and temperatures down."""
+    rates = sorted({round(rate, 2) for rate in picture["table_rate_dps"]})
+    warm = sorted({round(value) for value in picture["temperature_c"]}, reverse=True)
+    if len(rates) < 2 or len(warm) < 2 or len(warm) > 40:
+        return
+    cells: dict[tuple[int, int], list[float]] = {}
+    step = max(-(-len(rates) // columns), 1)
+    for rate, value, score in zip(
+        picture["table_rate_dps"], picture["temperature_c"], picture["over_floor"], strict=True
+    ):
+        cells.setdefault((rates.index(round(rate, 2)) // step, warm.index(round(value))), []).append(abs(score))
+    console.print(
+        f"residual over floor, axis {picture['axis']}, {picture['position']} up  (' ' < 1, █ >= 5)", style="dim"
+    )
+    for row, value in enumerate(warm):
+        line = ""
+        for column in range(-(-len(rates) // step)):
+            scores = cells.get((column, row))
+            line += "  " if scores is None else 2 * SHADES[min(int(max(scores)), len(SHADES) - 1)]
+        console.print(f"{value:5d} deg C |{line}|", markup=False, highlight=False)
+    console.print(f"            {rates[0]:g} to {rates[-1]:g} deg/s", style="dim", markup=False)
+
+
+def improve(
+    serial: Serial,
+    add: Annotated[list[str] | None, typer.Option("--add", metavar="EFFECT", help="Effect to add.")] = None,
+    remove: Annotated[list[str] | None, typer.Option("--remove", metavar="EFFECT", help="Effect to take out.")] = None,
+    formula: FormulaOption = None,
+    version: VersionOption = None,
+    recording: RecordingId = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Change a version's effects and fit again: a new version, with the error before and after."""
+    from labctl.services.acts import ImproveRequest
+    from labctl.services.criticism import as_lines
+    from labctl.services.opening import open_acts
+
+    def names(given: list[str] | None) -> list[str]:
+        return [name.strip() for text in given or [] for name in text.split(",") if name.strip()]
+
+    with one_clear_line(), open_acts(database) as acts:
+        request = ImproveRequest(
+            add=names(add), remove=names(remove), formula=as_lines(formula or []), version=version, recording=recording
+        )
+        answer = acts.improve(serial, request)
+    if as_json:
+        print_json(answer)
+    else:
+        print_improvement(answer)
+
+
+def print_improvement(answer: FitAnswer) -> None:
+    """Print what a change brought."""
+    extra: dict[str, Any] = answer.model_extra or {}
+    before = extra["before"]
+    console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {extra['parent']}: {answer.model.name}")
+    rows = table("", "deg/s", "before", "after", numbers=2)
+    rows.add_row("RMS", figure(before["rms_dps"]), figure(answer.error.rms_dps))
+    rows.add_row("held-out", figure(before["heldout_rms_dps"]), figure(answer.error.heldout_rms_dps))
+    rows.add_row("noise floor", figure(before["noise_floor_dps"]), figure(answer.error.noise_floor_dps))
+    console.print(rows)
+    for effect_id, span in extra["plausible"].items():
+        if not span["inside"]:
+            console.print(
+                f"  {effect_id}: larger than is usual ({span['from']:g} to {span['to']:g}); look again at its rivals",
+                style="yellow",
+            )
+    for left in extra["left_out"]:
+        console.print(f"  {left['effect']} stays on the bench ({left['origin']}); a calibration file leaves it out")
+    console.print(f"next: labctl criticise {answer.serial}", style="dim")
+
+
+def ladder(serial: Serial, as_json: Json = False, database: Database = None) -> None:
+    """Show the error, version by version, down to the noise floor."""
+    from labctl.services.criticism import ladder as ladder_of
+    from labctl.services.opening import open_reading
+
+    with one_clear_line(), open_reading(database) as store:
+        answer = ladder_of(store, serial)
+    if as_json:
+        print_json(answer)
+    else:
+        print_ladder(answer)
+
+
+def print_ladder(answer: LadderAnswer, width: int = 40) -> None:
+    """Draw the fall on a logarithmic scale, the floor as a line."""
+    from math import log10
+
+    known = [e for s in answer.steps for e in (s.rms_dps, s.heldout_rms_dps, s.raw_rms_dps) if e]
+    if not known:
+        console.print(f"{answer.serial}: no version has an error figure")
+        return
+    lowest = min([*known, answer.noise_floor_dps or known[0]]) * 0.7
+    highest = max(known)
+
+    def place(value: float) -> int:
+        share = (log10(value) - log10(lowest)) / max(log10(highest) - log10(lowest), 1e-9)
+        return max(round(share * width), 1)
+
+    floor = place(answer.noise_floor_dps) if answer.noise_floor_dps else None
+    console.print(f"[bold]{answer.serial}[/]: error by version, deg/s (bar: fitted data; o: held-out; |: noise floor)")
+    for step in answer.steps:
+        bar = list(("█" * place(step.rms_dps) if step.rms_dps else "").ljust(width + 2))
+        if step.heldout_rms_dps:
+            bar[place(step.heldout_rms_dps)] = "o"
+        if floor is not None:
+            bar[floor] = "|"
+        line = "".join(bar)
+        console.print(
+            f"{step.version:3d} {line} {figure(step.rms_dps)}  held-out {figure(step.heldout_rms_dps)}  {step.model}",
+            markup=False, highlight=False, soft_wrap=True,
+        )  # fmt: skip
+    if answer.noise_floor_dps:
+        console.print(f"    noise floor {figure(answer.noise_floor_dps)} deg/s", style="dim")

@@ -1,0 +1,141 @@
+"""What competes to explain a residual: every effect in every shape, and smooth functions of every logged channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.channels import Array
+from labctl.fitting.criticism.compress import Compressed
+from labctl.fitting.earth import turning_size_dps
+from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
+from labctl.fitting.model import ErrorModel, expand
+
+#: Knots of a smooth function of a channel.
+KNOTS = 6
+#: What is no channel of the world: numbers of things, what the gyro says, and what belongs to the place in a data set.
+NO_CHANNELS = frozenset(
+    {
+        "dataset", "run", "mounting", "n", "valid", "duration_s", "since_begin_s", "previous_rate_dps", "status",
+        "table_angle_deg", "chamber_setpoint_c", "temperature_x_c", "temperature_y_c", "temperature_z_c",
+    }
+)  # fmt: skip
+#: These hold everything that others name, so they are what a model starts from and never what is missing.
+ONLY_BASE = frozenset({"rate_temperature_surface"})
+TIMES = frozenset({"t_s", "power_s"})
+
+
+@dataclass(frozen=True)
+class Option:
+    """One shape of one candidate on one axis: its coordinates (R, m, k) and the coefficients' names and units."""
+
+    candidate: str  #: effect id, or a channel's name with `smooth`
+    term: Term | None
+    rows: NDArray[np.float64]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+    @property
+    def smooth(self) -> bool:
+        """Whether this is a smooth function of a channel."""
+        return self.term is None
+
+
+def span_of(data: Compressed) -> Span:
+    """Return what a recording covers."""
+    rates = np.unique(np.round(np.abs(data.at_sets(data.nodes.table_rate_dps())), 3))
+    moving = rates[rates > 0]
+    fastest = float(moving.max()) if len(moving) else 1.0
+    return Span(
+        fastest,
+        float(moving.min()) if len(moving) else 0.1,
+        tuple(rates.tolist()),
+        frozenset(data.nodes.columns) | {"table_rate_dps"},
+    )
+
+
+def untestable_channels(data: Compressed, catalogue: Mapping[str, Effect] = CATALOGUE) -> dict[str, list[str]]:
+    """Return effects whose channels are not logged, with the channels."""
+    found = {}
+    for kind in catalogue.values():
+        absent = [name for name in kind.needs if name not in data.nodes and name != "run"]
+        if absent:
+            found[kind.id] = absent
+    return found
+
+
+def base_rows(data: Compressed, model: ErrorModel, axis: str) -> tuple[NDArray[np.float64], list[str], Array]:
+    """Return the base's coordinates (R, m, k), its columns' names, and the prior precision of each (k,).
+
+    The base is the model in its forward form, and the Earth's rate that goes round where the latitude is known.
+    """
+    found = [c for _, c in model.forward().columns(data.nodes, axis) if np.any(c.values)]
+    values = np.column_stack([c.values for c in found]) if found else np.zeros((len(data.nodes), 0))
+    basis = model.temperature.basis(data.nodes.temperature_c(axis))
+    rows = [data.rows_of(expand(values, basis))]
+    names = [f"{c.name}@{k}" for c in found for k in range(basis.shape[1])]
+    precision = [np.zeros(len(names))]
+    turning = _turning(data, axis)
+    if turning:
+        rows.append(np.stack([data.rows(column) for column in turning], axis=2))
+        names += [column.name for column in turning]
+        precision.append(np.full(len(turning), 2.0 / turning_size_dps(data.info) ** 2))
+    return np.concatenate(rows, axis=2), names, np.concatenate(precision)
+
+
+def _turning(data: Compressed, axis: str) -> list[Column]:
+    if data.info.latitude_deg is None or "table_angle_deg" not in data.nodes:
+        return []
+    return [
+        Column(f"earth_{wave}_{there}", "deg/s", here.astype(np.float64), (wave, 1))
+        for there, here in data.nodes.positions()
+        if there.lstrip("-") != axis
+        for wave in ("cos", "sin")
+    ]
+
+
+def options_of(
+    data: Compressed, axis: str, reference: Reference, catalogue: Mapping[str, Effect] = CATALOGUE
+) -> list[Option]:
+    """Return every shape of every testable effect on one axis, and a smooth function of every channel."""
+    span, absent = span_of(data), untestable_channels(data, catalogue)
+    found = []
+    for kind in catalogue.values():
+        if kind.id in absent or kind.id in ONLY_BASE:
+            continue
+        for term in kind.options(span):
+            columns = [c for c in kind.columns(data.nodes, axis, term, reference) if np.any(c.values)]
+            if columns:
+                rows = np.stack([data.rows(column) for column in columns], axis=2)
+                found.append(
+                    Option(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
+                )
+    return found + _smooth_options(data, axis)
+
+
+def smooth_channels(data: Compressed, axis: str) -> dict[str, Array]:
+    """Return the channels that may be held against the residual, at the nodes; constant ones are left out."""
+    channels = {
+        name: np.asarray(values, dtype=np.float64)
+        for name, values in data.nodes.columns.items()
+        if name not in NO_CHANNELS and values.dtype.kind in "fiu" and not name.startswith("gyro_")
+    }
+    channels["table_rate_dps"] = data.nodes.rate_dps(axis)
+    return {name: v for name, v in channels.items() if np.all(np.isfinite(v)) and np.ptp(v) > 1e-9 * (1 + abs(v[0]))}
+
+
+def _smooth_options(data: Compressed, axis: str) -> list[Option]:
+    found = []
+    for name, values in smooth_channels(data, axis).items():
+        knots = np.unique(np.quantile(np.unique(np.round(values, 9)), np.linspace(0, 1, KNOTS)))
+        if len(knots) < 3:
+            continue
+        hats = np.column_stack([np.interp(values, knots, np.eye(len(knots))[k]) for k in range(1, len(knots))])
+        rows = data.rows_of(hats)
+        found.append(
+            Option(name, None, rows, tuple(f"{name}@{k:.6g}" for k in knots[1:]), ("deg/s",) * (len(knots) - 1))
+        )
+    return found

@@ -1,0 +1,252 @@
+"""A model held against a recording: what is left, where, what may be missing, and what this recording cannot say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from labctl.errors import LabctlError
+from labctl.fitting.context import Context, context_of
+from labctl.fitting.criticism.candidates import untestable_channels
+from labctl.fitting.criticism.compress import Compressed, compress
+from labctl.fitting.criticism.evidence import visible_share
+from labctl.fitting.criticism.refine import refined
+from labctl.fitting.criticism.residuals import Residuals, maps, residuals_of, where_it_fails, worst_data_sets
+from labctl.fitting.criticism.verdict import (
+    ENOUGH,
+    Verdict,
+    alias_group,
+    channels_behind,
+    coefficients_of,
+    judge,
+    probabilities,
+    share_removed,
+)
+from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh
+from labctl.fitting.effects import CATALOGUE, Effect, Term
+from labctl.fitting.fit import FitResult, fit_context
+from labctl.fitting.model import ErrorModel
+from labctl.fitting.presets import changed
+from labctl.recording import Recording
+
+#: Data sets beyond the base's coefficients that a verdict needs.
+LEAST_SPARE = 6
+#: How many effects may be found missing one after the other.
+STEPS = 4
+#: Less of an effect than this beside the base, and the schedule cannot see it.
+LEAST_VISIBLE = 0.15
+#: How many suspects are fitted in full.
+SHOWN = 6
+#: The drift is larger than the data sheet says from this factor on.
+LARGE_DRIFT = 2.0
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An effect that may be missing."""
+
+    candidate: Candidate
+    probability: float
+    p_value: float
+    coefficients: Mapping[str, Any]
+    share_removed: float
+    after: FitResult | None
+    group: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Criticism:
+    """The whole answer."""
+
+    verdict: Verdict
+    data: Compressed
+    base: FitResult | None
+    direct_rms_dps: float | None
+    weighed: Weighed | None
+    residuals: Mapping[str, Residuals] = field(default_factory=dict)
+    suspects: tuple[Suspect, ...] = ()
+    not_testable: tuple[Mapping[str, Any], ...] = ()
+    explained: float | None = None
+
+    @property
+    def drift_over_datasheet(self) -> float | None:
+        """The drift found, over half the data sheet's bias stability; None without a data sheet."""
+        stability = self.data.info.datasheet.get("bias_stability_dps")
+        if not stability or not self.residuals:
+            return None
+        return float(np.max([r.drift_dps for r in self.residuals.values()]) / (stability / 2))
+
+
+def criticise(
+    recording: Recording,
+    model: ErrorModel,
+    catalogue: Mapping[str, Effect] = CATALOGUE,
+    *,
+    points: Recording | None = None,
+    full: bool = True,
+    shape_only: bool = False,
+) -> Criticism:
+    """Hold a model against a recording. Without `full` only the verdict is sought, as long studies do.
+
+    `points` are the recording's means, where they are already known; `shape_only` seeks the best shape of each effect
+    of the catalogue, whatever speaks for it.
+
+    Raises NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict.
+    """
+    data = compress(recording)
+    context = context_of(points or recording)
+    if shape_only:
+        return Criticism(_shapes(data, changed(model).build(context)[0], catalogue), data, None, None, None)
+    base = fit_context(context, changed(model)) if full else None
+    forward, _ = changed(model).build(context)
+    if (short := _too_little(data, forward)) is not None:
+        return Criticism(Verdict("insufficient_data", (), reason=short), data, base, None, None)
+    weighed = weigh(data, forward, catalogue)
+    verdict, explained = _ask(data, forward, weighed, catalogue)
+    if not full:
+        return Criticism(verdict, data, None, None, weighed)
+    assert base is not None
+    left = residuals_of(weighed)
+    direct = fit_context(context, _direct(model)).error.rms_dps if model.argument == "output" else None
+    return Criticism(
+        verdict, data, base, direct, weighed, left,
+        tuple(_suspects(weighed, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)), explained,
+    )  # fmt: skip
+
+
+def _shapes(data: Compressed, model: ErrorModel, catalogue: Mapping[str, Effect]) -> Verdict:
+    weighed = weigh(data, model, catalogue)
+    terms = {c.id: refined(weighed, c) for c in weighed.candidates if not c.smooth and c.term is not None}
+    return Verdict("adequate", (), terms=terms)
+
+
+def _direct(model: ErrorModel) -> Any:
+    from labctl.fitting.presets import Preset  # noqa: PLC0415
+
+    return Preset(model.name, lambda context: (model, np.ones(len(context), dtype=bool)))
+
+
+def _too_little(data: Compressed, model: ErrorModel) -> str | None:
+    """Say what is missing for a verdict, or None."""
+    axis = data.info.axes[0]
+    columns = sum(1 for _, c in model.columns(data.nodes, axis) if np.any(c.values))
+    needed = columns * (len(getattr(model.temperature, "nodes_c", ())) or 1) + LEAST_SPARE
+    rows = int(data.present.sum())
+    if len(data) < needed and rows < 4 * needed:
+        return (
+            f"{len(data)} data sets, and the model has {needed - LEAST_SPARE} coefficients per axis: "
+            f"measure at least {needed - len(data)} more data sets, at other rates and temperatures"
+        )
+    return None
+
+
+def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> tuple[Verdict, float]:
+    """Ask, add what is named, and ask again, until nothing more is."""
+    named: list[str] = []
+    terms: dict[str, Term] = {}
+    weighed, depends = first, channels_behind(first)
+    step = judge(first)
+    verdict = Verdict(step.form, step.group, step.depends_on or depends)
+    for _ in range(STEPS):
+        if step.form != "missing" or step.leader is None or step.leader.term is None:
+            break
+        term = refined(weighed, step.leader)
+        named.append(step.leader.id)
+        terms[step.leader.id] = term
+        model = model.with_terms((*model.terms, replace(term, steady=True)))
+        rest = {key: kind for key, kind in catalogue.items() if key not in named}
+        weighed = weigh(data, model, rest)
+        step = judge(weighed, first=False)
+        verdict = Verdict("missing", tuple(named), depends, terms=dict(terms))
+    if verdict.form == "ambiguous" and step.leader is not None and step.leader.term is not None:
+        verdict = replace(verdict, terms={step.leader.id: refined(weighed, step.leader)})
+    return replace(verdict, depends_on=depends if verdict.form != "adequate" else ()), _explained(first, weighed)
+
+
+def _explained(first: Weighed, last: Weighed) -> float:
+    """Return which share of the raw excess the base explains, 0 to 1."""
+    del last
+    excess = raw = 0.0
+    for axis, found in first.axes.items():
+        freedom = found.rows - found.base_columns
+        excess += max(found.best.chi2 - freedom, 0.0)
+        data = first.data
+        y = data.output[axis] - data.rows_of(data.nodes.rate_dps(axis)[:, None])[:, :, 0]
+        raw += float(np.sum(y[0] ** 2 / (first.white_var[axis] + found.best.noise.size_dps**2)))
+    return float(np.clip(1.0 - excess / max(raw, 1e-12), 0.0, 1.0))
+
+
+def _suspects(weighed: Weighed, context: Context, model: ErrorModel, verdict: Verdict) -> list[Suspect]:
+    chance = probabilities(weighed.candidates)
+    effects = [c for c in weighed.candidates if not c.smooth][:SHOWN]
+    found = []
+    for candidate in effects:
+        dimensions = sum(int(weighed.axes[a].dimensions[o]) for a, o in candidate.option.items())
+        tried = sum(len(d.options) for d in weighed.designs.values()) / max(len(weighed.designs), 1)
+        single = float(chi2.sf(candidate.gain, max(dimensions, 1)))
+        after = None
+        if candidate.log_bf >= 0 and candidate.term is not None:
+            term = verdict.terms.get(candidate.id, candidate.term)
+            try:
+                after = fit_context(context, changed(model, (term,)))
+            except LabctlError:  # it cannot be fitted beside the base, or not be inverted: there is no figure
+                after = None
+        group = alias_group(weighed, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,)
+        found.append(
+            Suspect(
+                candidate,
+                chance[candidate.id],
+                float(-np.expm1(tried * np.log1p(-min(single, 1 - 1e-16)))),
+                coefficients_of(weighed, candidate),
+                share_removed(weighed, candidate),
+                after,
+                group,
+            )
+        )
+    return found
+
+
+def _not_testable(weighed: Weighed, catalogue: Mapping[str, Effect]) -> list[Mapping[str, Any]]:
+    """Return what this recording cannot say anything about: a channel is missing, or the schedule hides it."""
+    absent = untestable_channels(weighed.data, catalogue)
+    found: list[Mapping[str, Any]] = [
+        {"effect": effect_id, "why": "channel", "needs": needs} for effect_id, needs in absent.items()
+    ]
+    shares = visible_shares(weighed)
+    for kind in catalogue.values():
+        if kind.id in absent or kind.id in weighed.model.effect_ids or kind.id == "rate_temperature_surface":
+            continue
+        if shares.get(kind.id, 0.0) < LEAST_VISIBLE:
+            found.append({"effect": kind.id, "why": "schedule", "needs": [], "visible": shares.get(kind.id, 0.0)})
+    return found
+
+
+def visible_shares(weighed: Weighed) -> dict[str, float]:
+    """Return how much of each effect this schedule lets be seen beside the base, 0 to 1, in its most visible shape."""
+    shares: dict[str, float] = {}
+    for axis, design in weighed.designs.items():
+        found = weighed.axes[axis]
+        for option, where in zip(design.options, found.slices, strict=True):
+            if not option.smooth:
+                share = visible_share(found.best, where)
+                shares[option.candidate] = max(shares.get(option.candidate, 0.0), share)
+    return shares
+
+
+def worst(criticism: Criticism) -> list[dict[str, Any]]:
+    """Return the data sets furthest from the model."""
+    return worst_data_sets(criticism.data, criticism.residuals)
+
+
+def failing(criticism: Criticism) -> list[dict[str, Any]]:
+    """Return where the residual is far from 0."""
+    return where_it_fails(criticism.data, criticism.residuals)
+
+
+def pictures(criticism: Criticism) -> list[dict[str, Any]]:
+    """Return the maps of residual over floor."""
+    return maps(criticism.data, criticism.residuals)

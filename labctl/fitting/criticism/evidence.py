@@ -1,0 +1,169 @@
+"""How much the data speak for each option on one axis: Bayes factors against the base, averaged over the noise.
+
+Everything is done in Gram matrices of whitened coordinates: the base is eliminated once for each noise, and each option
+costs a small eigenproblem. Evidence has a unit-information g-prior (g = number of data sets).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import logsumexp
+
+from labctl.fitting.channels import Array
+from labctl.fitting.criticism.candidates import Option
+from labctl.fitting.criticism.noise_grid import Noise, factors
+
+#: Directions of an option that the base leaves less of than this (squared share) are taken as the base's.
+LEAST_LEFT = 1e-4
+
+
+@dataclass(frozen=True)
+class Design:
+    """One axis before any data: base (R, m, kb) with prior precisions (kb,), and options."""
+
+    base: NDArray[np.float64]
+    precision: Array
+    options: list[Option]
+    present: NDArray[np.bool_]
+    t_s: Array
+    run: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Schur:
+    """What the base leaves: Gram matrix of all option columns and the data, at one noise."""
+
+    noise: Noise
+    log_p: float  #: restricted log likelihood of the base, with the noise's prior
+    gram: NDArray[np.float64]  #: (K, K), base eliminated
+    whole: Array  #: (K,) squared norms before
+    with_data: Array  #: (K,)
+    chi2: float
+
+
+@dataclass(frozen=True)
+class AxisEvidence:
+    """The evidence on one axis."""
+
+    log_bf: Array  #: (options,), averaged over the noise
+    best: Schur  #: at the noise that the base finds likeliest
+    gain: Array  #: (options,) chi2 that each option takes off, at that noise
+    dimensions: NDArray[np.int64]  #: (options,) directions that each has beyond the base
+    slices: list[slice]
+    weights: Array  #: of the noise points
+    noises: list[Noise]
+    rows: int
+    base_columns: int
+
+
+def stack(rows: NDArray[np.float64], scale: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the coordinates besides the means, (rows, k), scaled: each present coordinate is one row."""
+    kept = present[1:]
+    return (rows[1:] / scale[1:, :, None])[kept]
+
+
+def schur(
+    design: Design, y: NDArray[np.float64], white_var: Array, scale: NDArray[np.float64], noises: list[Noise]
+) -> list[Schur]:
+    """Eliminate the base from options and data (R, m), for every noise. `scale` (R, m): of coordinates but the mean."""
+    kb = design.base.shape[2]
+    everything = np.concatenate([design.base, *(o.rows for o in design.options), y[:, :, None]], axis=2)
+    other = stack(everything, scale, design.present)
+    gram_other = other.T @ other
+    gram_other[np.arange(kb), np.arange(kb)] += design.precision
+    return [_eliminate(everything[0], gram_other, kb, n, white_var, design) for n in noises]
+
+
+def _eliminate(
+    means: NDArray[np.float64], gram_other: NDArray[np.float64], kb: int, noise: Noise, white_var: Array, design: Design
+) -> Schur:
+    blocks, log_det = factors(noise, white_var, design.t_s, design.run)
+    whitened = np.empty_like(means)
+    for rows, factor in blocks:
+        whitened[rows] = solve_triangular(factor, means[rows], lower=True, check_finite=False)
+    gram = whitened.T @ whitened + gram_other
+    size = np.sqrt(np.maximum(np.diag(gram)[:kb], 1e-300))
+    scaled = gram[:kb, :kb] / np.outer(size, size)
+    factor = cholesky(scaled + 1e-10 * np.eye(kb), lower=True, check_finite=False) if kb else np.zeros((0, 0))
+    cross = (
+        solve_triangular(factor, gram[:kb, kb:] / size[:, None], lower=True, check_finite=False)
+        if kb
+        else gram[:0, kb:]
+    )
+    left = gram[kb:, kb:] - cross.T @ cross
+    log_det_base = 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum()) if kb else 0.0
+    chi2 = float(left[-1, -1])
+    log_p = -0.5 * (log_det + log_det_base + chi2) + noise.log_prior
+    return Schur(noise, log_p, left[:-1, :-1], np.diag(gram)[kb:-1], left[:-1, -1], chi2)
+
+
+def evidence(design: Design, found: list[Schur], rows: int) -> AxisEvidence:
+    """Weigh every option by every noise."""
+    slices, at = [], 0
+    for option in design.options:
+        k = option.rows.shape[2]
+        slices.append(slice(at, at + k))
+        at += k
+    g = float(len(design.t_s))
+    log_p = np.array([s.log_p for s in found])
+    gains, dimensions = zip(*(gains_of(s, slices) for s in found), strict=True)
+    gain, k = np.array(gains), np.array(dimensions)
+    log_bf = 0.5 * gain * g / (1 + g) - 0.5 * k * np.log1p(g)
+    total = logsumexp(log_p[:, None] + log_bf, axis=0) - logsumexp(log_p)
+    best = int(np.argmax(log_p))
+    weights = np.exp(log_p - logsumexp(log_p))
+    return AxisEvidence(
+        np.where(k[best] > 0, total, -np.inf), found[best], gain[best], k[best], slices, weights,
+        [s.noise for s in found], rows, design.base.shape[2],
+    )  # fmt: skip
+
+
+def gains_of(left: Schur, slices: list[slice]) -> tuple[Array, NDArray[np.int64]]:
+    """Return the chi2 that each option takes off and how many directions it has, all of one width together."""
+    gain, dimensions = np.zeros(len(slices)), np.zeros(len(slices), dtype=np.int64)
+    size = np.sqrt(np.maximum(left.whole, 1e-300))
+    gram, data = left.gram / np.outer(size, size), left.with_data / size
+    order = sorted(range(len(slices)), key=lambda i: slices[i].stop - slices[i].start)
+    for width, members in groupby(order, key=lambda i: slices[i].stop - slices[i].start):
+        which = list(members)
+        index = np.array([np.arange(slices[i].start, slices[i].stop) for i in which])
+        values, vectors = np.linalg.eigh(gram[index[:, :, None], index[:, None, :]])
+        inner = np.einsum("oij,oi->oj", vectors, data[index])
+        kept = values > LEAST_LEFT
+        gain[which] = np.where(kept, inner**2 / np.where(kept, values, 1.0), 0.0).sum(axis=1)
+        dimensions[which] = kept.sum(axis=1)
+        del width
+    return gain, dimensions
+
+
+def solve_option(left: Schur, where: slice) -> tuple[Array, NDArray[np.float64]]:
+    """Return the coefficients (k,) of an option beside the base, and their covariance (k, k)."""
+    size = np.sqrt(np.maximum(left.whole[where], 1e-300))
+    values, vectors = np.linalg.eigh(left.gram[where, where] / np.outer(size, size))
+    kept = values > LEAST_LEFT
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    coefficients = inverse @ (left.with_data[where] / size) / size
+    return coefficients, inverse / np.outer(size, size)
+
+
+def visible_share(left: Schur, where: slice) -> float:
+    """Return the largest share of an option's columns that the base does not absorb, 0 to 1, in whitened size."""
+    shares = np.diag(left.gram)[where] / np.maximum(left.whole[where], 1e-300)
+    return float(np.sqrt(np.clip(shares.max(initial=0.0), 0.0, 1.0)))
+
+
+def reproduced(left: Schur, signal: slice, by: slice) -> tuple[float, float]:
+    """Return (how much of the leader's signal another option reproduces, the signal's size), both in chi2."""
+    a, _ = solve_option(left, signal)
+    size = float(a @ left.gram[signal, signal] @ a)
+    inner = left.gram[by, signal] @ a
+    scale = np.sqrt(np.maximum(left.whole[by], 1e-300))
+    values, vectors = np.linalg.eigh(left.gram[by, by] / np.outer(scale, scale))
+    kept = values > LEAST_LEFT
+    projected = vectors[:, kept].T @ (inner / scale)
+    return float((projected**2 / values[kept]).sum()), size

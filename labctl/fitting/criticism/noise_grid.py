@@ -1,0 +1,67 @@
+"""What the noise between data sets may be: a small grid, with a prior from the data sheet, weighed by the data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky
+
+from labctl.fitting.channels import Array
+
+#: Drift time constants, s; 0 stands for three of them in equal parts, as bias instability has.
+TAUS_S = (0.0, 120.0, 900.0, 4000.0)
+#: Drift sizes, over half the data sheet's bias stability.
+SIZES = (0.2, 0.45, 0.7, 1.0, 1.5, 2.3, 3.6, 6.0, 12.0)
+WHITE_FACTORS = (1.0,)
+#: Width of the prior, a factor.
+PRIOR_FACTOR = 2.5
+MIXTURE_S = (120.0, 700.0, 3600.0)
+#: Half of the usual bias stability, deg/s, where no data sheet says it.
+USUAL_DPS = {"fog": 0.001, "mems": 0.0015, "piezo": 0.01, "": 0.002}
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One point of the grid."""
+
+    size_dps: float
+    tau_s: float
+    log_prior: float
+
+
+def noise_grid(technology: str, stability_dps: float | None, white_dps: float) -> list[Noise]:
+    """Return the noise to weigh, for a white noise of a mean."""
+    centre = stability_dps / 2 if stability_dps else USUAL_DPS.get(technology, USUAL_DPS[""])
+    width = np.log(PRIOR_FACTOR)
+    points = []
+    for factor in SIZES:
+        size = factor * centre
+        if size < 0.05 * white_dps and factor != SIZES[-1]:
+            continue
+        points += [Noise(size, tau, -0.5 * (np.log(factor) / width) ** 2) for tau in TAUS_S]
+    return points
+
+
+def correlation(t_s: Array, tau_s: float) -> NDArray[np.float64]:
+    """Return the correlation (m, m) of drift between times (m,)."""
+    lag = np.abs(t_s[:, None] - t_s[None, :])
+    if tau_s > 0:
+        return np.asarray(np.exp(-lag / tau_s))
+    return np.asarray(np.mean([np.exp(-lag / tau) for tau in MIXTURE_S], axis=0))
+
+
+def factors(
+    noise: Noise, white_var: Array, t_s: Array, run: NDArray[np.int64]
+) -> tuple[list[tuple[NDArray[np.int64], NDArray[np.float64]]], float]:
+    """Return each run's rows with the lower Cholesky factor of their covariance, and the log determinant of all."""
+    blocks, log_determinant = [], 0.0
+    for number in np.unique(run):
+        rows = np.flatnonzero(run == number)
+        covariance = noise.size_dps**2 * correlation(t_s[rows], noise.tau_s)
+        covariance[np.diag_indices(len(rows))] += white_var[rows]
+        factor = cholesky(covariance, lower=True, check_finite=False)
+        blocks.append((rows, factor))
+        log_determinant += 2.0 * float(np.log(np.diag(factor)).sum())
+    return blocks, log_determinant

@@ -1,0 +1,146 @@
+"""What the base leaves of a recording, data set by data set, and where that is more than noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from labctl.fitting.channels import Array
+from labctl.fitting.criticism.candidates import smooth_channels
+from labctl.fitting.criticism.compress import KINDS, Compressed
+from labctl.fitting.criticism.evidence import stack
+from labctl.fitting.criticism.noise_grid import factors
+from labctl.fitting.criticism.weigh import Weighed
+
+#: Bins of a channel in which a residual is looked at.
+BINS = 8
+#: A bin is worth a line from here on.
+WORTH = 3.0
+LINES = 12
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """One axis: coordinates (R, m) in deg/s, the floor of the means (m,), and the noise that goes with it."""
+
+    rows: NDArray[np.float64]
+    floor_dps: Array
+    white_dps: float
+    drift_dps: float
+    drift_tau_s: float | None
+
+    @property
+    def means(self) -> Array:
+        """The residual of each data set's mean, (m,) deg/s."""
+        return self.rows[0]
+
+    @property
+    def score(self) -> Array:
+        """Residual over floor, (m,)."""
+        return self.means / self.floor_dps
+
+
+def residuals_of(weighed: Weighed) -> dict[str, Residuals]:
+    """Return what the base leaves on each axis, at the noise that the base finds likeliest."""
+    return {axis: _axis(weighed, axis) for axis in weighed.axes}
+
+
+def _axis(weighed: Weighed, axis: str) -> Residuals:
+    data, design, found = weighed.data, weighed.designs[axis], weighed.axes[axis]
+    y = data.output[axis] - data.rows_of(data.nodes.rate_dps(axis)[:, None])[:, :, 0]
+    noise, white = found.best.noise, weighed.white_var[axis]
+    blocks, _ = factors(noise, white, design.t_s, design.run)
+    together = np.concatenate([design.base, y[:, :, None]], axis=2)
+    means = np.empty_like(together[0])
+    for rows, factor in blocks:
+        means[rows] = solve_triangular(factor, together[0][rows], lower=True, check_finite=False)
+    other = stack(together, weighed.scales[axis], design.present)
+    prior = np.diag(np.sqrt(design.precision))[design.precision > 0]
+    prior = np.column_stack([prior, np.zeros(len(prior))]) if len(prior) else np.zeros((0, means.shape[1]))
+    whole = np.vstack([means, other, prior])
+    size = np.maximum(np.linalg.norm(whole[:, :-1], axis=0), 1e-300)
+    solution, *_ = np.linalg.lstsq(whole[:, :-1] / size, whole[:, -1], rcond=1e-10)
+    drift = float(np.sqrt(sum(w * n.size_dps**2 for w, n in zip(found.weights, found.noises, strict=True))))
+    return Residuals(
+        y - design.base @ (solution / size),
+        np.sqrt(white + noise.size_dps**2),
+        float(np.sqrt(np.mean(white))),
+        drift,
+        noise.tau_s or None,
+    )
+
+
+def where_it_fails(data: Compressed, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
+    """Return the ranges of channels in which the mean residual is far from 0, worst first."""
+    found: list[dict[str, Any]] = []
+    for axis, residuals in left.items():
+        for name, nodes in smooth_channels(data, axis).items():
+            values = data.at_sets(nodes)
+            for low, high, rows in _bins(values):
+                score = residuals.score[rows]
+                z = float(abs(score.mean()) * np.sqrt(len(score)))
+                if z >= WORTH:
+                    rms = float(np.sqrt(np.mean(residuals.means[rows] ** 2)))
+                    found.append({"axis": axis, "channel": name, "from": low, "to": high, "rms_dps": rms, "z": z})
+    return sorted(found, key=lambda line: -line["z"])[:LINES]
+
+
+def _bins(values: Array) -> list[tuple[float, float, NDArray[np.int64]]]:
+    distinct = np.unique(np.round(values, 6))
+    edges = np.quantile(distinct, np.linspace(0, 1, min(BINS, len(distinct)) + 1))
+    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    return [
+        (float(values[rows].min()), float(values[rows].max()), rows)
+        for k in range(len(edges) - 1)
+        if len(rows := np.flatnonzero(which == k)) >= 4
+    ]
+
+
+def maps(data: Compressed, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
+    """Return residual over floor in rate x temperature, one map per axis and position: lists of equal length."""
+    rate = data.at_sets(data.nodes.table_rate_dps())
+    position = np.asarray(data.nodes["position"]).reshape(len(data), -1)[:, 0]
+    found = []
+    for axis, residuals in left.items():
+        warm = data.at_sets(data.nodes.temperature_c(axis))
+        for there in np.unique(position):
+            rows = np.flatnonzero(position == there)
+            found.append(
+                {
+                    "axis": axis,
+                    "position": str(there),
+                    "dataset": data.dataset[rows].tolist(),
+                    "table_rate_dps": rate[rows].tolist(),
+                    "temperature_c": warm[rows].tolist(),
+                    "residual_dps": residuals.means[rows].tolist(),
+                    "over_floor": residuals.score[rows].tolist(),
+                }
+            )
+    return found
+
+
+def worst_data_sets(data: Compressed, left: Mapping[str, Residuals], most: int = 10) -> list[dict[str, Any]]:
+    """Return the data sets furthest from the model, with the coordinate in which they are."""
+    found: list[dict[str, Any]] = []
+    for axis, residuals in left.items():
+        order = np.argsort(-np.abs(residuals.score))[:most]
+        found += [
+            {
+                "axis": axis,
+                "dataset": int(data.dataset[i]),
+                "residual_dps": float(residuals.means[i]),
+                "over_floor": float(residuals.score[i]),
+            }
+            for i in order
+        ]
+    return sorted(found, key=lambda line: -abs(line["over_floor"]))[:most]
+
+
+def kinds_of(data: Compressed) -> tuple[str, ...]:
+    """Return what the coordinates of this recording are called."""
+    return KINDS[: data.present.shape[0]]

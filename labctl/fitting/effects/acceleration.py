@@ -1,0 +1,100 @@
+"""What gravity and turning off the axis do: specific force is felt as rate."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from labctl.fitting.channels import BODY_AXES, Array, Channels
+from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Rows, Span, Term, by_parameter
+
+GRAVITY = 9.80665
+
+
+class _Acceleration(Effect):
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+
+
+def force_g(channels: Channels, axis: str) -> Array:
+    """Return the specific force along a body axis, (n,) g: logged, or what gravity gives in each position."""
+    name = f"accel_{axis}_g"
+    return np.asarray(channels[name], dtype=np.float64) if name in channels else channels.up(axis)
+
+
+class GSensitivity(_Acceleration):
+    """Linear g-sensitivity."""
+
+    id = "g_sensitivity"
+    term = "Acceleration-sensitive drift (g-sensitivity)"
+    sentence = "The bias changes with gravity along the gyro's own axis: it differs between up and down."
+    ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
+    experiment = "each axis up and down within the same powered run"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        return [Column("g_own", "deg/s/g", force_g(channels, axis))]
+
+
+class CrossGSensitivity(_Acceleration):
+    """Cross-axis g-sensitivity."""
+
+    id = "cross_g_sensitivity"
+    term = "Acceleration-sensitive drift, cross-axis"
+    sentence = "The bias changes with gravity along the other axes."
+    ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
+    experiment = "a tumble over six faces within the same powered run"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        return [
+            Column(f"g_{other}", "deg/s/g", force_g(channels, other))
+            for other in BODY_AXES
+            if other != axis and np.any(force_g(channels, other))
+        ]
+
+
+class GSquaredSensitivity(_Acceleration):
+    """g-squared-sensitivity."""
+
+    id = "g_squared_sensitivity"
+    term = "Acceleration-squared-sensitive drift"
+    sentence = "The bias changes with the square of gravity along an axis, alike for up and down."
+    ranges: ClassVar = {"fog": (0.0, 1e-4), "mems": (1e-4, 1e-2), "piezo": (0.0, 1e-2)}
+    experiment = "up and down positions within one run, or a centrifuge"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        return [Column("g_own_squared", "deg/s/g^2", force_g(channels, axis) ** 2)]
+
+
+class CentripetalAcceleration(_Acceleration):
+    """Centripetal acceleration on a g-sensitive gyro."""
+
+    id = "centripetal_acceleration"
+    term = "Centripetal acceleration with g-sensitivity (eccentric mounting)"
+    sentence = "The unit sits off the table's axis, and feels the pull of turning as rate."
+    origin: ClassVar[Origin] = "fixture"
+    ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
+    aliases = ("scale_factor_even",)
+    parameters = (Parameter("by_position", "1", 0, 1),)
+    experiment = "another radius, or the unit turned by 180 deg on the table"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        """At a radius of 0.1 m; which way the pull points in the body may be another one in every position."""
+        pull_g = np.deg2rad(channels.table_rate_dps()) ** 2 * 0.1 / GRAVITY
+        if not term.parameters.get("by_position", 1.0):
+            return [Column("centripetal", "deg/s/g", pull_g)]
+        return [
+            Column(f"centripetal_{there}_up", "deg/s/g", np.where(here, pull_g, 0.0))
+            for there, here in channels.positions()
+        ]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, by_position=np.array([0.0, 1.0]))
+
+
+EFFECTS: tuple[type[Effect], ...] = (
+    GSensitivity,
+    CrossGSensitivity,
+    GSquaredSensitivity,
+    CentripetalAcceleration,
+)

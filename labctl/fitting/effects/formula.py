@@ -1,0 +1,148 @@
+"""An effect that a person writes as a formula over logged channels: `name: supply_v * table_rate_dps`.
+
+A formula is read as a tree of a few kinds of nodes and computed by numpy; nothing else of Python can be reached.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from labctl.errors import BadInput
+from labctl.fitting.channels import Array, Channels
+from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Span, Term
+
+OPERATORS: Mapping[type, Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
+    name: getattr(np, name) for name in ("exp", "log", "sqrt", "abs", "sin", "cos", "tanh", "sign")
+}
+#: What a formula may call the rate along the gyro's own axis, besides the names of logged columns.
+OWN_RATE = "rate_dps"
+LONGEST = 500
+NAME = re.compile(r"[a-z][a-z0-9_]{1,39}")
+
+
+class Formula(Effect):
+    """An effect given by a formula; its coefficient multiplies the formula's value."""
+
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    term: ClassVar[str] = "Formula"
+
+    def __init__(self, name: str, text: str, sentence: str = "") -> None:
+        self.name, self.text = name, text
+        self.id = name  # type: ignore[misc]  # of this one, not of the class
+        self.sentence = sentence or f"The error follows {text}."  # type: ignore[misc]
+        self._tree = _parsed(name, text)
+        self.needs = tuple(sorted(_names(self._tree) - {OWN_RATE, "table_rate_dps", "temperature_c"}))  # type: ignore[misc]
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        """Return the formula's value; raises BadInput when it is not finite everywhere."""
+        values = np.broadcast_to(
+            np.asarray(self._value(self._tree.body, channels, axis), dtype=np.float64), len(channels)
+        )
+        if not np.all(np.isfinite(values)):
+            row = int(np.argmin(np.isfinite(values)))
+            raise BadInput(f"formula {self.name!r}: {self.text} is {values[row]} at row {row + 1}; keep it finite")
+        return [Column(self.name, "deg/s per unit of the formula", np.array(values))]
+
+    def options(self, span: Span) -> list[Term]:
+        return [Term(self.id, formula=self.text)]
+
+    def _value(self, node: ast.AST, channels: Channels, axis: str) -> Any:
+        if isinstance(node, ast.Constant):
+            return node.value
+        if isinstance(node, ast.Name):
+            return self._channel(node.id, channels, axis)
+        if isinstance(node, ast.UnaryOp):
+            return OPERATORS[type(node.op)](self._value(node.operand, channels, axis))
+        if isinstance(node, ast.BinOp):
+            sides = self._value(node.left, channels, axis), self._value(node.right, channels, axis)
+            with np.errstate(all="ignore"):
+                return OPERATORS[type(node.op)](*sides)
+        assert isinstance(node, ast.Call)
+        assert isinstance(node.func, ast.Name)
+        with np.errstate(all="ignore"):
+            return FUNCTIONS[node.func.id](self._value(node.args[0], channels, axis))
+
+    def _channel(self, name: str, channels: Channels, axis: str) -> Array:
+        if name == OWN_RATE:
+            return channels.rate_dps(axis)
+        if name == "temperature_c":
+            return channels.temperature_c(axis)
+        return np.asarray(channels[name], dtype=np.float64)
+
+
+def _parsed(name: str, text: str) -> ast.Expression:
+    if len(text) > LONGEST:
+        raise BadInput(f"formula {name!r}: {len(text)} characters; at most {LONGEST}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError) as error:
+        raise BadInput(f"formula {name!r}: {text!r} cannot be read ({error.args[0]})") from None
+    for node in ast.walk(tree):
+        _check(name, node)
+    return tree
+
+
+def _check(name: str, node: ast.AST) -> None:
+    if isinstance(node, ast.Call):
+        known = isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS
+        if not known or len(node.args) != 1 or node.keywords:
+            raise BadInput(f"formula {name!r}: only {', '.join(FUNCTIONS)} of one value may be called")
+    elif isinstance(node, ast.Constant):
+        if not isinstance(node.value, int | float) or isinstance(node.value, bool):
+            raise BadInput(f"formula {name!r}: {node.value!r} is not a number")
+    elif isinstance(node, ast.BinOp | ast.UnaryOp):
+        if type(node.op) not in OPERATORS:
+            raise BadInput(f"formula {name!r}: only + - * / ** may be used")
+    elif not isinstance(node, ast.Expression | ast.Name | ast.Load | ast.operator | ast.unaryop):
+        raise BadInput(
+            f"formula {name!r}: {type(node).__name__} may not be used; write channels, numbers and + - * / **"
+        )
+
+
+def _names(tree: ast.Expression) -> set[str]:
+    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in called}
+
+
+def formulas(source: str) -> list[Formula]:
+    """Read `name: formula`, or a TOML file with [[effects]] of `id`, `formula`, perhaps `sentence`. Raises BadInput."""
+    if source.endswith(".toml"):
+        return _from_file(Path(source))
+    name, separator, text = source.partition(":")
+    if not separator:
+        raise BadInput(f"formula {source!r}: write it as 'name: formula', or name a .toml file")
+    return [_made(name.strip(), text.strip(), "")]
+
+
+def _from_file(path: Path) -> list[Formula]:
+    try:
+        records = tomllib.loads(path.read_text(encoding="utf-8"))["effects"]
+        return [_made(str(r["id"]), str(r["formula"]), str(r.get("sentence", ""))) for r in records]
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise BadInput(f"formulas {path}: {error}") from error
+    except (KeyError, TypeError) as error:
+        raise BadInput(f"formulas {path}: each [[effects]] needs id and formula ({error} is missing)") from error
+
+
+def _made(name: str, text: str, sentence: str) -> Formula:
+    if not NAME.fullmatch(name):
+        raise BadInput(f"formula name {name!r}: small letters, digits and _ only, beginning with a letter")
+    return Formula(name, text, sentence)

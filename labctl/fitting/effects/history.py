@@ -1,0 +1,141 @@
+"""What came before: time, power-ons, re-mountings, the rate before this one, the supply."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from labctl.fitting.channels import Channels
+from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Rows, Span, Term, by_parameter
+
+
+class BiasDrift(Effect):
+    """Ramp of the bias with time."""
+
+    id = "bias_drift"
+    in_use = False
+    term = "Bias ramp (drift, aging)"
+    sentence = "The bias creeps in one direction through the whole campaign."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    needs = ("t_s",)
+    ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.5)}
+    experiment = "the first temperature again at the end; a long record at rest"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        return [Column("bias_drift", "deg/s/h", np.asarray(channels["t_s"], dtype=np.float64) / 3600.0)]
+
+
+class _Shift(Effect):
+    counted: ClassVar[str]
+    rows: ClassVar[Rows] = "all"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        numbers = np.asarray(channels[self.counted])
+        return [
+            Column(f"{self.counted}_{int(number)}", "deg/s", (numbers == number).astype(np.float64))
+            for number in channels.past.numbers(self.counted)[1:]
+        ]
+
+
+class RunShift(_Shift):
+    """Turn-on to turn-on bias repeatability."""
+
+    id = "run_shift"
+    term = "Turn-on to turn-on bias repeatability"
+    sentence = "After every switching-on the bias is a little different."
+    origin: ClassVar[Origin] = "environment"
+    needs = ("run",)
+    counted = "run"
+    ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.1), "piezo": (0.0, 0.5)}
+    experiment = "at least two power cycles in each mounting"
+
+
+class MountingShift(_Shift):
+    """Change with re-mounting."""
+
+    id = "mounting_shift"
+    term = "Mounting repeatability"
+    sentence = "After every re-mounting the output at rest is a little different."
+    origin: ClassVar[Origin] = "fixture"
+    needs = ("mounting",)
+    counted = "mounting"
+    ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.1), "piezo": (0.0, 0.5)}
+    experiment = "both mountings in one powered run"
+
+
+class RateHysteresis(Effect):
+    """Memory of the previous rate."""
+
+    id = "rate_hysteresis"
+    in_use = False
+    term = "Rate hysteresis"
+    sentence = "The output still remembers the rate before this one."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    needs = ("t_s",)
+    parameters = (Parameter("by_sign", "1", 0, 1),)
+    ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.05), "piezo": (0.0, 0.2)}
+    experiment = "rates in random order, each approached from both sides"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        before = np.asarray(channels["previous_rate_dps"], dtype=np.float64)
+        soft = term.parameters.get("by_sign", 0.0)
+        shape = before / channels.past.rate_dps if not soft else np.tanh(soft * before / channels.past.rate_dps)
+        return [Column("previous_rate", "deg/s", shape)]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, by_sign=np.array([0.0, 3.0, 20.0]))
+
+
+class StartTransient(Effect):
+    """Start transient."""
+
+    id = "start_transient"
+    in_use = False
+    term = "Start transient (bandwidth, latency, spin-up)"
+    sentence = "At a new rate the output creeps the last bit over seconds."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    needs = ("t_s",)
+    parameters = (Parameter("tau_s", "s", 0.5, 20.0, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.2)}
+    experiment = "a longer wait before each data set; look at the first seconds of all of them"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        decay = channels.decayed(term.parameters.get("tau_s", 4.0))
+        before = np.asarray(channels["previous_rate_dps"], dtype=np.float64) * channels.up(axis)
+        return [
+            Column("start_of_rate", "1", -channels.rate_dps(axis) * decay),
+            Column("start_from_rate", "1", before * decay),
+        ]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, tau_s=np.geomspace(1.5, 15.0, 4))
+
+
+class SupplySensitivity(Effect):
+    """Supply sensitivity."""
+
+    id = "supply_sensitivity"
+    term = "Supply voltage sensitivity"
+    sentence = "The bias follows the supply voltage."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    needs = ("supply_v",)
+    ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.2), "piezo": (0.0, 50.0)}
+    experiment = "steps of 5 % in the supply, at rest and at one rate"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        return [Column("supply", "deg/s/V", np.asarray(channels["supply_v"], dtype=np.float64))]
+
+
+EFFECTS: tuple[type[Effect], ...] = (
+    BiasDrift,
+    RunShift,
+    MountingShift,
+    RateHysteresis,
+    StartTransient,
+    SupplySensitivity,
+)

@@ -1,0 +1,98 @@
+"""What bends, steps or resonates with the rate, beside the powers of it."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from labctl.fitting.channels import BODY_AXES, Channels
+from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Rows, Span, Term, by_parameter
+
+
+class CrossAxisNonlinearity(Effect):
+    """Cross-axis nonlinearity."""
+
+    id = "cross_axis_nonlinearity"
+    term = "Cross-axis nonlinearity"
+    sentence = "Turning about another axis gives an error that grows like the square of that rate."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "cross"
+    ranges: ClassVar = {"fog": (0.0, 1e-7), "mems": (0.0, 1e-6), "piezo": (0.0, 1e-5)}
+    experiment = "a second table axis, so that two rates can be given at once"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        return [
+            Column(f"cross_{other}_squared", "(deg/s)^-1", channels.rates[other] ** 2)
+            for other in BODY_AXES
+            if other != axis and other in channels.rates
+        ]
+
+
+class VibrationRectification(Effect):
+    """Vibration rectification at a resonance of the table."""
+
+    id = "vibration_rectification"
+    in_use = False
+    term = "Vibration rectification"
+    sentence = "Near one table rate the steps shake something in resonance, and the shaking looks like a rate."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    parameters = (
+        Parameter("centre_dps", "deg/s", 1.0, 400.0, logarithmic=True),
+        Parameter("width", "1", 0.15, 0.8, logarithmic=True),
+    )
+    ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.05), "piezo": (0.0, 0.5)}
+    experiment = "the same rates at another microstep setting or motor current, with an accelerometer logged"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        centre, width = term.parameters.get("centre_dps", 100.0), term.parameters.get("width", 0.4)
+        speed = np.maximum(np.abs(channels.table_rate_dps()), 1e-3)
+        return [Column("vibration", "deg/s", np.exp(-((np.log(speed / centre) / width) ** 2)))]
+
+    def options(self, span: Span) -> list[Term]:
+        centres = np.geomspace(max(0.04 * span.rate_dps, span.slowest_dps), 0.9 * span.rate_dps, 9)
+        return by_parameter(self.id, centre_dps=centres, width=np.array([0.2, 0.4, 0.7]))
+
+
+class DeadBand(Effect):
+    """Dead band, lock-in, threshold."""
+
+    id = "dead_band"
+    term = "Dead band (threshold, lock-in)"
+    sentence = "Below a small rate there is no output, and a little above it too little."
+    origin: ClassVar[Origin] = "sensor"
+    parameters = (Parameter("band_dps", "deg/s", 0.005, 20.0, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}
+    experiment = "rates from 0.01 to 1 deg/s of both signs, evenly spaced on a logarithmic scale"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        rate, band = channels.rate_dps(axis), term.parameters.get("band_dps", 0.05)
+        passed = np.sign(rate) * np.sqrt(np.maximum(rate * rate - band * band, 0.0))
+        return [Column("dead_band", "1", passed - rate)]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, band_dps=np.geomspace(0.005, 0.1 * span.rate_dps, 9))
+
+
+class Quantization(Effect):
+    """Quantization of the output."""
+
+    id = "quantization"
+    term = "Quantization"
+    sentence = "The output comes in coarse steps, so its error is a sawtooth over the output."
+    origin: ClassVar[Origin] = "sensor"
+    parameters = (Parameter("step_dps", "deg/s", 0.003, 1.0, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}
+    needs = ("raw_code",)
+    experiment = "a histogram of raw codes at rest"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        step, rate = term.parameters.get("step_dps", 0.05), channels.rate_dps(axis)
+        return [Column("quantization", "1", step * np.floor(rate / step + 0.5) - rate)]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, step_dps=np.geomspace(0.003, 1.0, 6))
+
+
+EFFECTS: tuple[type[Effect], ...] = (CrossAxisNonlinearity, VibrationRectification, DeadBand, Quantization)

@@ -1,0 +1,146 @@
+"""What is the bench's or the Earth's and not the gyro's: the table's rate and level, north, the hall's field."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from labctl.fitting.channels import Channels
+from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Rows, Span, Term, by_parameter
+
+
+class EarthRate(Effect):
+    """Earth rate along the table axis."""
+
+    id = "earth_rate"
+    term = "Earth rate"
+    sentence = "The bench turns with the Earth; along the table axis that is a constant rate."
+    origin: ClassVar[Origin] = "environment"
+    rows: ClassVar[Rows] = "own"
+    ranges: ClassVar = {"fog": (0.0, 0.0042), "mems": (0.0, 0.0042), "piezo": (0.0, 0.0042)}
+    experiment = "axis up and axis down; and state the bench's latitude, which fixes it"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        return [Column("earth_up", "deg/s", channels.up(axis))]
+
+
+class _OncePerTurn(Effect):
+    needs = ("table_angle_deg",)
+    rows: ClassVar[Rows] = "all"
+    harmonics: ClassVar[tuple[int, ...]] = (1,)
+    mark: ClassVar[str]
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        ones = np.ones(len(channels))
+        return [
+            Column(f"{self.mark}_{wave}{n}", "deg/s", ones, (wave, n))
+            for n in self.harmonics
+            for wave in ("cos", "sin")
+        ]
+
+
+class EarthRateTilt(_OncePerTurn):
+    """Horizontal Earth rate on an axis that is not quite upright."""
+
+    id = "earth_rate_tilt"
+    term = "Earth rate on a tilted or horizontal axis"
+    sentence = "The level part of the Earth's rate goes round once per turn; its phase points north."
+    origin: ClassVar[Origin] = "environment"
+    ranges: ClassVar = {"fog": (0.0, 0.0042), "mems": (0.0, 0.0042), "piezo": (0.0, 0.0042)}
+    aliases = ("magnetic_sensitivity", "table_tilt")
+    mark = "earth"
+    experiment = "turn the table's base by 90 deg: what comes from north stays with north"
+
+
+class MagneticSensitivity(_OncePerTurn):
+    """Magnetic sensitivity."""
+
+    id = "magnetic_sensitivity"
+    term = "Magnetic sensitivity"
+    sentence = "The magnetic field of the place changes the bias once per turn."
+    origin: ClassVar[Origin] = "environment"
+    ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.005), "piezo": (0.0, 0.05)}
+    aliases = ("earth_rate_tilt", "table_tilt")
+    mark = "field"
+    experiment = "a coil around the fixture, a shield, or a magnetometer logged"
+
+
+class TableTilt(_OncePerTurn):
+    """Tilt and wobble of the table."""
+
+    id = "table_tilt"
+    term = "Table tilt and wobble with g-sensitivity"
+    sentence = "The table is out of level or its bearing wobbles, so gravity goes round once and twice per turn."
+    origin: ClassVar[Origin] = "bench"
+    harmonics = (1, 2)
+    ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.01), "piezo": (0.0, 0.05)}
+    mark = "tilt"
+    experiment = "level the table; then repeat with a deliberate tilt of 2 deg"
+
+
+class TableRateRatio(Effect):
+    """Ratio and clock of the table."""
+
+    id = "table_rate_ratio"
+    term = "Table rate error (gear ratio, step clock)"
+    sentence = "The table turns faster or slower than its steps say; the gyro cannot tell this from its scale factor."
+    origin: ClassVar[Origin] = "bench"
+    ranges: ClassVar = {"fog": (0.0, 2e-4), "mems": (0.0, 2e-4), "piezo": (0.0, 2e-4)}
+    aliases = ("scale_factor",)
+    experiment = "count whole turns against an index pulse"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        return [Column("table_rate", "1", channels.rate_dps(axis))]
+
+
+class TableRateRipple(Effect):
+    """Periodic rate error of the table."""
+
+    id = "table_rate_ripple"
+    term = "Table rate error, periodic (gear eccentricity, microsteps)"
+    sentence = "The table speeds up and slows down within a turn, in proportion to its rate."
+    origin: ClassVar[Origin] = "bench"
+    needs = ("table_angle_deg",)
+    parameters = (Parameter("per_turn", "1", 1, 200),)
+    ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.01), "piezo": (0.0, 0.01)}
+    experiment = "data sets over whole turns that start and stop at the same angle; does the line follow angle or time?"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        n, rate = int(term.parameters.get("per_turn", 4)), channels.rate_dps(axis)
+        return [Column(f"ripple_{wave}{n}", "1", rate, (wave, n)) for wave in ("cos", "sin")]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, per_turn=np.array([1.0, 4.0]))
+
+
+class MissedSteps(Effect):
+    """Missed steps."""
+
+    id = "missed_steps"
+    term = "Missed steps (stall)"
+    sentence = "Above a certain rate the motor loses steps, so the table is slower than it is told."
+    origin: ClassVar[Origin] = "bench"
+    parameters = (Parameter("stall_dps", "deg/s", 20.0, 400.0),)
+    ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
+    experiment = "count index pulses"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        rate, stall = channels.rate_dps(axis), term.parameters.get("stall_dps", 100.0)
+        lost = 0.5 * (1.0 + np.tanh((np.abs(rate) - stall) / (0.01 * stall)))
+        return [Column("missed_steps", "1", rate * lost)]
+
+    def options(self, span: Span) -> list[Term]:
+        rates = np.array([rate for rate in span.rates_dps if 0.5 * span.rate_dps <= rate <= span.rate_dps])
+        return by_parameter(self.id, stall_dps=np.sort(np.concatenate([rates, span.between_rates(0.5, 1.0)])))
+
+
+EFFECTS: tuple[type[Effect], ...] = (
+    EarthRate,
+    EarthRateTilt,
+    MagneticSensitivity,
+    TableTilt,
+    TableRateRatio,
+    TableRateRipple,
+    MissedSteps,
+)

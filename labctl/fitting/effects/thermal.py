@@ -1,0 +1,161 @@
+"""What temperature does besides its value: how fast it changes, where it is felt, from which side it came."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from labctl.fitting.channels import Channels
+from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Rows, Span, Term, by_parameter
+
+
+class TemperatureRate(Effect):
+    """Thermal transient of Shupe's kind."""
+
+    id = "temperature_rate"
+    in_use = False
+    term = "Temperature rate sensitivity (Shupe effect)"
+    sentence = "The bias shifts while the temperature changes, in proportion to how fast."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    needs = ("t_s",)
+    parameters = (Parameter("of_gradient", "1", 0, 1),)
+    ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.5)}
+    experiment = "two ramp speeds at one constant rate; measure during and after the soak"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        """Against the change of the gyro's thermometer, or (of_gradient) the air's lead over it."""
+        if term.parameters.get("of_gradient", 0.0) and "chamber_c" in channels:
+            lead = np.asarray(channels["chamber_c"], dtype=np.float64) - channels.temperature_c(axis)
+            return [Column("chamber_lead", "deg/s/K", lead)]
+        return [Column("temperature_rate", "deg/s/(K/min)", channels.past.rate_k_min(channels))]
+
+    def options(self, span: Span) -> list[Term]:
+        gradient = [1.0] if span.has("chamber_c") else []
+        return by_parameter(self.id, of_gradient=np.array([0.0, *gradient]))
+
+
+class ThermalLag(Effect):
+    """Thermal lag between the sensing part and the thermometer."""
+
+    id = "thermal_lag"
+    in_use = False
+    term = "Thermal lag (sensing element behind the thermometer)"
+    sentence = "The part that matters follows the thermometer late, so the correction comes for another temperature."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    needs = ("t_s",)
+    parameters = (Parameter("tau_s", "s", 60.0, 3600.0, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.1), "piezo": (0.0, 0.6)}
+    experiment = "two ramp speeds: an error by lag grows with the speed, one by hysteresis does not"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        return [Column("thermal_lag", "deg/s/K", channels.past.lag_k(channels, term.parameters.get("tau_s", 600.0)))]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, tau_s=np.geomspace(90.0, 3600.0, 7))
+
+
+class ThermalHysteresis(Effect):
+    """Thermal hysteresis."""
+
+    id = "thermal_hysteresis"
+    in_use = False
+    term = "Thermal hysteresis"
+    sentence = "The bias depends on whether the temperature was reached from below or from above."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    needs = ("t_s",)
+    parameters = (Parameter("bowed", "1", 0, 1),)
+    ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.2), "piezo": (0.0, 0.2)}
+    experiment = "temperatures on the way up and on the way down, then a smaller loop"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        leg = channels.past.leg(channels)
+        if term.parameters.get("bowed", 0.0):
+            warm = channels.temperature_c(axis)
+            low, high = channels.past.span_c
+            share = np.clip((warm - low) / max(high - low, 1e-9), 0.0, 1.0)
+            leg = leg * 4 * share * (1 - share)
+        return [Column("leg", "deg/s", leg)]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, bowed=np.array([0.0, 1.0]))
+
+
+class WarmUp(Effect):
+    """Turn-on transient."""
+
+    id = "warm_up"
+    term = "Warm-up (turn-on transient)"
+    sentence = "After power-on the bias settles over minutes to an hour."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    needs = ("power_s",)
+    parameters = (Parameter("tau_s", "s", 100.0, 7200.0, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 0.1), "mems": (0.0, 0.5), "piezo": (0.0, 2.0)}
+    experiment = "a power cycle at constant temperature, and a wait of five time constants"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        on_s = np.asarray(channels["power_s"], dtype=np.float64)
+        return [Column("warm_up", "deg/s", np.exp(-np.maximum(on_s, 0.0) / term.parameters.get("tau_s", 1800.0)))]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, tau_s=np.geomspace(300.0, 5400.0, 6))
+
+
+class SelfHeating(Effect):
+    """Self-heating."""
+
+    id = "self_heating"
+    term = "Self-heating"
+    sentence = "The unit's own power warms the sensing part above its thermometer, more and more after power-on."
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "all"
+    needs = ("power_s",)
+    parameters = (Parameter("tau_s", "s", 300.0, 3600.0, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.5), "piezo": (0.0, 5.0)}
+    experiment = "compare the gyro's thermometer with the chamber's at rest, long after power-on"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        """What is not yet there of the heating, times the rate: its part at rest is the warm-up's."""
+        on_s = np.asarray(channels["power_s"], dtype=np.float64)
+        missing = np.exp(-np.maximum(on_s, 0.0) / term.parameters.get("tau_s", 1200.0))
+        return [
+            Column("self_heating", "deg/s", missing),
+            Column("self_heating_rate", "1", missing * channels.rate_dps(axis)),
+        ]
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, tau_s=np.geomspace(300.0, 3600.0, 4))
+
+
+class ThermometerError(Effect):
+    """Thermometer error."""
+
+    id = "thermometer_error"
+    term = "Thermometer error"
+    sentence = "The thermometer is off; while calibrating this hides in the temperature terms, in use it does not."
+    origin: ClassVar[Origin] = "bench"
+    rows: ClassVar[Rows] = "all"
+    ranges: ClassVar = {"fog": (-2.0, 2.0), "mems": (-2.0, 2.0), "piezo": (-2.0, 2.0)}
+    experiment = "calibrate and use with the same thermometer; try a ramp that was not calibrated"
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        """A bend of the temperature scale across the range, in the bias and in the scale factor."""
+        centred = channels.temperature_c(axis) - reference.temperature_c
+        return [
+            Column("thermometer", "deg/s/K", centred),
+            Column("thermometer_rate", "1/K", centred * channels.rate_dps(axis)),
+        ]
+
+
+EFFECTS: tuple[type[Effect], ...] = (
+    TemperatureRate,
+    ThermalLag,
+    ThermalHysteresis,
+    WarmUp,
+    SelfHeating,
+    ThermometerError,
+)
