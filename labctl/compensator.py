@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -22,7 +22,7 @@ Outside = Literal["clamp", "refuse"]
 #: Beyond the calibrated range by less than this counts as inside: a thermometer's last digits.
 MARGIN_C = 0.5
 MARGIN_SHARE = 0.02
-Correct = Callable[[Array, Array], Array]
+Correct = Callable[[Array, Array, Mapping[str, Array]], Array]
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,8 @@ class Compensator:
         self._offset = np.array([unit.offset for unit in units])
         self._scale = np.array([unit.scale for unit in units])
         self._correct = correction(calibration.fitted, self.axes)
+        #: Channels beside output and temperature that the model's effects need, such as power_s or supply_v.
+        self.needs = calibration.fitted.model.needs
 
     @classmethod
     def from_file(cls, path: Path | str, outside: Outside = "clamp") -> Compensator:
@@ -66,17 +68,26 @@ class Compensator:
         """Load a calibration from the bytes that the service gives; raises BadCalibrationFile."""
         return cls(read_calibration(content), outside)
 
-    def compensate_output(self, output: Array, temperature_c: Array) -> Compensated:
+    def compensate_output(
+        self, output: Array, temperature_c: Array, channels: Mapping[str, Array] | None = None
+    ) -> Compensated:
         """Correct what the device gives in its own unit, (n, axes) or (n,); see `compensate`."""
         values = np.asarray(output, dtype=np.float64)
         offset, scale = (self._offset, self._scale) if values.ndim == 2 else (self._offset[0], self._scale[0])
-        return self.compensate((values - offset) / scale, temperature_c)
+        return self.compensate((values - offset) / scale, temperature_c, channels)
 
-    def compensate(self, raw_dps: Array, temperature_c: Array | float) -> Compensated:
+    def compensate(
+        self, raw_dps: Array, temperature_c: Array | float, channels: Mapping[str, Array] | None = None
+    ) -> Compensated:
         """Correct rates, (n, axes) deg/s, or (n,) for one axis, at temperatures (n,), (n, axes) or one for all.
 
-        Raises BadInput for a shape that does not fit, or outside the calibrated range when that is refused.
+        `channels` hold what the model `needs` besides, (n,) each. Raises BadInput where one is missing, for a shape
+        that does not fit, or outside the calibrated range when that is refused.
         """
+        known = channels or {}
+        for name in self.needs:
+            if name not in known:
+                raise BadInput(f"{self.calibration.serial}: its model needs channel {name!r}; give it with `channels`")
         given = np.asarray(raw_dps, dtype=np.float64)
         raw = given.reshape(len(given), -1) if given.size and given.ndim else given.reshape(-1, 1)
         if raw.size == 0:
@@ -93,8 +104,8 @@ class Compensator:
             flags = self._judge(raw, warm)
             warm = np.clip(warm, self._low_c, self._high_c)
             held = np.clip(raw, self._slow, self._fast)
-            return Compensated((self._correct(held, warm) + (raw - held)).reshape(given.shape), flags)
-        corrected = self._correct(raw, warm)
+            return Compensated((self._correct(held, warm, known) + (raw - held)).reshape(given.shape), flags)
+        corrected = self._correct(raw, warm, known)
         return Compensated(corrected.reshape(given.shape), flags)
 
     def _judge(self, raw: Array, warm: Array) -> NDArray[np.bool_]:
@@ -126,15 +137,15 @@ def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
     """Return the fastest exact way to apply a model: (rates (n, axes), temperatures) -> rates (n, axes)."""
     surface: Surface | None = surface_of(fitted, axes)
     if surface is not None:
-        return surface.correct
+        return lambda raw, warm, _: surface.correct(raw, warm)
     linear: Linear | None = linear_of(fitted, axes)
     if linear is not None:
-        return linear.correct
+        return lambda raw, warm, _: linear.correct(raw, warm)
 
-    def general(raw: Array, temperature_c: Array) -> Array:
+    def general(raw: Array, temperature_c: Array, channels: Mapping[str, Array]) -> Array:
         n = len(raw)
         warm = np.broadcast_to(temperature_c, (n,)) if temperature_c.ndim < 2 else temperature_c.mean(axis=1)
-        columns: dict[str, Any] = {"temperature_c": warm}
+        columns: dict[str, Any] = {"temperature_c": warm, **channels}
         if temperature_c.ndim == 2:
             columns |= {f"temperature_{axis}_c": temperature_c[:, i] for i, axis in enumerate(axes)}
         outputs = {axis: raw[:, i] for i, axis in enumerate(axes)}

@@ -32,7 +32,7 @@ OUTSIDE = {"outside_etalon": "temperature_c"}
 #: What a mean of many noisy readings hides whatever its size, or what changes the thermometer and so everything.
 NOT_DRAWN = frozenset({"quantization", "self_heating", "thermometer_error", "bias", "scale_factor", "table_rate_ratio"})
 #: On one axis a tilt of the gyro is only seen by the Earth, and is then called so.
-ONE_AXIS_NOT = frozenset({"misalignment", "non_orthogonality"})
+ONE_AXIS_NOT = frozenset({"misalignment", "non_orthogonality", "cross_axis_nonlinearity"})
 
 
 @dataclass(frozen=True)

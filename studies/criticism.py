@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from labctl.fitting.context import context_of
-from labctl.fitting.criticism import criticise
+from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.presets import preset_for
 from studies.campaigns import MODELS, OUTSIDE, PROTOCOLS, campaign, sizes
 
@@ -27,8 +27,16 @@ def one(task: dict[str, Any]) -> dict[str, Any]:
     model, _ = preset_for(MODELS[task["protocol"]], []).build(context_of(recording))
     found = criticise(recording, model, full=False)
     top = [(c.id, c.smooth, round(c.log_bf, 2)) for c in found.weighed.candidates[:4]] if found.weighed else []
-    return {**task, "verdict": found.verdict.form, "named": list(found.verdict.named),
+    return {**task, "verdict": found.verdict.form, "named": list(found.verdict.named), "nodes": nodes(found),
             "depends_on": list(found.verdict.depends_on)[:3], "top": top}  # fmt: skip
+
+
+def nodes(found: Criticism) -> int:
+    """Return how many different things were named; effects with the same columns are one with several names."""
+    if found.verdict.form == "missing":
+        return len(found.verdict.named)
+    known = {c.id: round(c.log_bf, 6) for c in found.weighed.candidates if not c.smooth} if found.weighed else {}
+    return len({known.get(effect) for effect in found.verdict.named})
 
 
 def tasks() -> Iterator[dict[str, Any]]:
@@ -76,8 +84,9 @@ def rates(answers: list[dict[str, Any]]) -> dict[str, float]:
         cell = [a for a in answers if a["kind"] == "effect" and a["z"] == z]
         truth = [next(iter(a["hidden"])) for a in cell]
         found[f"right_or_group_z{z:g}"] = float(np.mean([t in a["named"] for t, a in zip(truth, cell, strict=True)]))
-        found[f"right_alone_z{z:g}"] = float(np.mean([a["named"] == [t] for t, a in zip(truth, cell, strict=True)]))
-        wrong = [len(a["named"]) == 1 and t not in a["named"] for t, a in zip(truth, cell, strict=True)]
+        alone = [t in a["named"] and a["nodes"] == 1 for t, a in zip(truth, cell, strict=True)]
+        found[f"right_alone_z{z:g}"] = float(np.mean(alone))
+        wrong = [a["nodes"] == 1 and t not in a["named"] for t, a in zip(truth, cell, strict=True)]
         found[f"wrong_single_z{z:g}"] = float(np.mean(wrong))
         outside = [a for a in answers if a["kind"] == "outside" and a["z"] == z]
         if outside:

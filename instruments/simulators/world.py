@@ -179,6 +179,7 @@ class SimulatedGyro:
             sensor_c=sensor,
             deep_c=world.heat.deep_c(self.settings.name, t_s),
             air_c=world.heat.airs_c(t_s),
+            sensor_k_min=(sensor - world.heat.sensor_c(self.settings.name, np.maximum(t_s - 60.0, 0.0))),
             run=world.run,
             mounting=world.mounting,
             full_scale_dps=self.settings.max_rate_dps,

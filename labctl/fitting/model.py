@@ -43,6 +43,11 @@ class ErrorModel:
         return [term.effect for term in self.terms]
 
     @property
+    def needs(self) -> tuple[str, ...]:
+        """The channels that its effects need beside rate and temperature."""
+        return tuple(sorted({name for term in self.terms for name in kind_of(term).needs}))
+
+    @property
     def steady(self) -> frozenset[str]:
         """The ids of the effects that have one coefficient for all temperatures."""
         return frozenset(term.effect for term in self.terms if term.steady)

@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 SPACING_S = 10.0
 #: Its slope is taken over this.
 SLOPE_OVER_S = 300.0
-#: A turn of the temperature counts from here on.
-TURN_K = 1.5
 
 
 @dataclass(frozen=True)
@@ -58,9 +56,9 @@ class Past:
         """Return how far a part with a time constant is behind the thermometer, (n,) K."""
         return self._ask(channels, lambda course: _behind(course.temperature_c, tau_s))
 
-    def leg(self, channels: Channels) -> Array:
-        """Return from which side the temperature came, (n,): 1 from below, -1 from above."""
-        return self._ask(channels, lambda course: _legs(course.temperature_c))
+    def leg(self, channels: Channels, width_k: float) -> Array:
+        """Return from which side the temperature came, (n,), 1 from below to -1; it turns over within a width."""
+        return self._ask(channels, lambda course: _play(course.temperature_c, width_k))
 
     def _ask(self, channels: Channels, question: Any) -> Array:
         if not self.courses:
@@ -92,21 +90,15 @@ def _behind(temperature_c: Array, tau_s: float) -> Array:
     return np.asarray(followed - temperature_c)
 
 
-def _legs(temperature_c: Array) -> Array:
-    """Return 1 or -1: which way the temperature last went by more than a turn."""
-    legs = np.zeros(len(temperature_c))
-    low = high = temperature_c[0] if len(temperature_c) else 0.0
-    way = 0.0
-    for index, now in enumerate(temperature_c):
-        low, high = min(low, now), max(high, now)
-        if now - low > TURN_K:
-            way, high = 1.0, now
-            low = max(low, now - TURN_K)
-        elif high - now > TURN_K:
-            way, low = -1.0, now
-            high = min(high, now + TURN_K)
-        legs[index] = way
-    return legs
+def _play(temperature_c: Array, width_k: float) -> Array:
+    """Return how far a follower with play is behind the temperature, over half of the play: -1 to 1."""
+    half = width_k / 2
+    behind = np.empty(len(temperature_c))
+    follower = temperature_c[0]
+    for index, now in enumerate(temperature_c.tolist()):
+        follower = min(max(follower, now - half), now + half)
+        behind[index] = now - follower
+    return behind / half
 
 
 def past_of(recording: Recording) -> Past:

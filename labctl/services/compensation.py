@@ -26,11 +26,15 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
     if not source.is_file():
         raise BadInput(f"{source}: no such file")
     columns = read_table(source)
-    for name in (*(f"gyro_{axis}" for axis in compensator.axes), "temperature_c"):
+    if target.suffix not in {".csv", ".parquet"} or target.resolve() == source.resolve():
+        raise BadInput(f"{target}: the result needs a file of its own, ending in .csv or .parquet")
+    for name in (*(f"gyro_{axis}" for axis in compensator.axes), "temperature_c", *compensator.needs):
         if name not in columns:
             raise BadInput(f"{source}: column {name!r} is missing (the calibration is of axes {compensator.axes})")
     raw = np.column_stack([columns[f"gyro_{axis}"] for axis in compensator.axes])
-    corrected = compensator.compensate_output(raw, columns["temperature_c"])
+    corrected = compensator.compensate_output(
+        raw, columns["temperature_c"], {name: columns[name] for name in compensator.needs}
+    )
     for index, axis in enumerate(compensator.axes):
         columns[f"rate_{axis}_dps"] = corrected.rate_dps[:, index]
     columns["outside"] = corrected.outside.astype(np.int64)

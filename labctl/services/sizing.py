@@ -1,4 +1,7 @@
-"""How large a hidden effect is on a plan, in noise units: z is the whitened size of what the model cannot absorb."""
+"""How large a hidden effect is on a plan, in noise units.
+
+z is the whitened size of what the model cannot absorb, on the axis that shows it best.
+"""
 
 from __future__ import annotations
 
@@ -58,12 +61,13 @@ class Sizing:
         """Return (z, the share of the effect that the model cannot absorb) of a hidden effect of this size."""
         recording = hidden_recording(self._plan, self._bench, self._gyro, SEED, {effect: size})
         other = compress(recording, outliers=False)
-        left = whole = 0.0
+        best = (0.0, 0.0)
         for axis, design in self._designs.items():
             difference = other.output[axis] - self._data.output[axis]
-            left += self._norm(design.base, design.precision, difference, axis)
-            whole += self._norm(design.base[:, :, :0], design.precision[:0], difference, axis)
-        return float(np.sqrt(left)), float(np.sqrt(left / whole)) if whole > 0 else 0.0
+            left = self._norm(design.base, design.precision, difference, axis)
+            whole = self._norm(design.base[:, :, :0], design.precision[:0], difference, axis)
+            best = max(best, (float(np.sqrt(left)), float(np.sqrt(left / whole)) if whole > 0 else 0.0))
+        return best
 
     def _norm(self, base: np.ndarray, precision: np.ndarray, difference: np.ndarray, axis: str) -> float:
         data: Compressed = self._data

@@ -27,6 +27,7 @@ class State:
     g: Array  #: (n, 3)
     sensor_c: Array
     deep_c: Array
+    sensor_k_min: Array  #: how fast the sensor's temperature changes
     air_c: Array
     run: int
     mounting: int

@@ -26,13 +26,13 @@ class ScaleFactorTemperature(HiddenEffect):
 
 
 class TemperatureRate(HiddenEffect):
-    """A Shupe-type error: while the coil's inside and outside differ. Size per K/min of the sensor."""
+    """A Shupe-type error: while the coil warms or cools, and less than in proportion when it does so fast."""
 
     id, unit, default = "temperature_rate", "deg/s/(K/min)", 0.02
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
-        # The sensor lags its deeper part by the rate of change times that part's time constant (7 min).
-        return (self.size * (state.sensor_c - state.deep_c) / 7.0)[:, None]
+        rate = state.sensor_k_min
+        return (self.size * rate / np.sqrt(1.0 + (rate / 5.0) ** 2))[:, None]
 
 
 class ThermalLag(HiddenEffect):

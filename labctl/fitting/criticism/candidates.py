@@ -14,8 +14,8 @@ from labctl.fitting.earth import turning_size_dps
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
 from labctl.fitting.model import ErrorModel, expand
 
-#: Knots of a smooth function of a channel.
-KNOTS = 6
+#: Knots of a smooth function of a channel: a coarse and a fine one compete.
+KNOTS = (5, 9)
 #: What is no channel of the world: numbers of things, what the gyro says, and what belongs to the place in a data set.
 NO_CHANNELS = frozenset(
     {
@@ -130,12 +130,15 @@ def smooth_channels(data: Compressed, axis: str) -> dict[str, Array]:
 def _smooth_options(data: Compressed, axis: str) -> list[Option]:
     found = []
     for name, values in smooth_channels(data, axis).items():
-        knots = np.unique(np.quantile(np.unique(np.round(values, 9)), np.linspace(0, 1, KNOTS)))
-        if len(knots) < 3:
-            continue
-        hats = np.column_stack([np.interp(values, knots, np.eye(len(knots))[k]) for k in range(1, len(knots))])
-        rows = data.rows_of(hats)
-        found.append(
-            Option(name, None, rows, tuple(f"{name}@{k:.6g}" for k in knots[1:]), ("deg/s",) * (len(knots) - 1))
-        )
+        distinct = np.unique(np.round(values, 9))
+        for number in KNOTS:
+            found += _smooth(data, name, values, np.unique(np.quantile(distinct, np.linspace(0, 1, number))))
     return found
+
+
+def _smooth(data: Compressed, name: str, values: Array, knots: Array) -> list[Option]:
+    if len(knots) < 3:
+        return []
+    hats = np.column_stack([np.interp(values, knots, np.eye(len(knots))[k]) for k in range(1, len(knots))])
+    names = tuple(f"{name}@{knot:.6g}" for knot in knots[1:])
+    return [Option(name, None, data.rows_of(hats), names, ("deg/s",) * len(names))]

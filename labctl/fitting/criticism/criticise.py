@@ -18,6 +18,8 @@ from labctl.fitting.criticism.refine import refined
 from labctl.fitting.criticism.residuals import Residuals, maps, residuals_of, where_it_fails, worst_data_sets
 from labctl.fitting.criticism.verdict import (
     ENOUGH,
+    LEAD,
+    NEXT_SHARE,
     Verdict,
     alias_group,
     channels_behind,
@@ -150,6 +152,8 @@ def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping
     terms: dict[str, Term] = {}
     weighed, depends = first, channels_behind(first)
     step = judge(first)
+    if step.form == "unexplained" and (pair := _pair(data, model, first, catalogue)) is not None:
+        return replace(pair, depends_on=depends), _explained(first, first)
     verdict = Verdict(step.form, step.group, step.depends_on or depends)
     for _ in range(STEPS):
         if step.form != "missing" or step.leader is None or step.leader.term is None:
@@ -160,11 +164,37 @@ def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping
         model = model.with_terms((*model.terms, replace(term, steady=True)))
         rest = {key: kind for key, kind in catalogue.items() if key not in named}
         weighed = weigh(data, model, rest)
+        before = step.leader.gain
         step = judge(weighed, first=False)
+        if step.leader is not None and step.leader.gain < NEXT_SHARE * before:
+            step = replace(step, form="adequate")
         verdict = Verdict("missing", tuple(named), depends, terms=dict(terms))
     if verdict.form == "ambiguous" and step.leader is not None and step.leader.term is not None:
         verdict = replace(verdict, terms={step.leader.id: refined(weighed, step.leader)})
     return replace(verdict, depends_on=depends if verdict.form != "adequate" else ()), _explained(first, weighed)
+
+
+def _pair(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> Verdict | None:
+    """Return two effects that explain together what looked like something else, and leave nothing; or None."""
+    leader, smooth = first.leader(smooth=False), first.leader(smooth=True)
+    if leader is None or smooth is None or leader.term is None or leader.log_bf < ENOUGH:
+        return None
+    terms = {leader.id: refined(first, leader)}
+    beside = model.with_terms((*model.terms, replace(terms[leader.id], steady=True)))
+    rest = {key: kind for key, kind in catalogue.items() if key != leader.id}
+    weighed = weigh(data, beside, rest)
+    step = judge(weighed, first=False)
+    second = step.leader
+    if step.form != "missing" or second is None or second.term is None:
+        return None
+    if leader.log_bf + second.log_bf < smooth.log_bf + LEAD:
+        return None
+    terms[second.id] = refined(weighed, second)
+    both = beside.with_terms((*beside.terms, replace(terms[second.id], steady=True)))
+    left = {key: kind for key, kind in rest.items() if key != second.id}
+    if judge(weigh(data, both, left), first=False).form != "adequate":
+        return None
+    return Verdict("missing", tuple(terms), terms=terms)
 
 
 def _explained(first: Weighed, last: Weighed) -> float:

@@ -23,12 +23,16 @@ Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_
 ENOUGH = 4.5
 #: A lead of less than this over another candidate leaves both.
 LEAD = 3.0
-#: A rival that reproduces this share of the leader's signal is not told apart from it, whatever its evidence.
-ALIKE = 0.98
+#: A rival that leaves less of the leader's signal than this (chi2), or a smaller share than that, is not told apart.
+UNTOLD_CHI2 = 7.0
+ALIKE = 0.995
 #: A smooth function of a channel is only then unexplained when no effect explains this share of it.
 EXPLAINED = 0.90
 #: The same for time, which is never a cause.
 EXPLAINED_TIME = 0.75
+SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
+#: The next effect is only named when it takes off at least this share of what the first did: less is shape error.
+NEXT_SHARE = 0.04
 #: An effect that takes off less than this share of the excess chi2 is not named alone at the first step.
 LEAST_SHARE = 0.3
 #: At most this many effects beside exact aliases in an ambiguous answer.
@@ -89,11 +93,16 @@ def alias_group(weighed: Weighed, leader: Candidate) -> tuple[str, ...]:
         if rival.smooth or rival.id == leader.id:
             continue
         close = rival.log_bf > leader.log_bf - LEAD
-        if close or (rival.log_bf >= ENOUGH and overlap(weighed, leader, rival) > ALIKE):
+        if close or (rival.log_bf > 0 and _is_untold(weighed, leader, rival)):
             near.append(rival)
     exact = [r for r in near if abs(r.log_bf - leader.log_bf) < 1e-6]
     others = [r for r in near if r not in exact][:MOST]
     return (leader.id, *(r.id for r in exact), *(r.id for r in others))
+
+
+def _is_untold(weighed: Weighed, leader: Candidate, rival: Candidate) -> bool:
+    share = overlap(weighed, leader, rival)
+    return share > ALIKE or (1.0 - share) * leader.gain < UNTOLD_CHI2
 
 
 def overlap(weighed: Weighed, leader: Candidate, rival: Candidate) -> float:
@@ -123,7 +132,13 @@ def share_removed(weighed: Weighed, candidate: Candidate) -> float:
 
 def channels_behind(weighed: Weighed) -> tuple[str, ...]:
     """Return the channels that the residual hangs on, strongest first."""
-    return tuple(c.id for c in weighed.candidates if c.smooth and c.log_bf >= ENOUGH)
+    found = [c for c in weighed.candidates if c.smooth and c.log_bf >= ENOUGH]
+    temperature = next((c for c in found if c.id == "temperature_c"), None)
+    # on one rising leg time and the chamber's temperature are the same variable as the gyro's temperature
+    same = temperature is not None and found[0].id in SAME_AS_TEMPERATURE
+    if temperature is not None and same and overlap(weighed, found[0], temperature) > EXPLAINED_TIME:
+        found = [temperature, *(c for c in found if c is not temperature)]
+    return tuple(c.id for c in found)
 
 
 def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:

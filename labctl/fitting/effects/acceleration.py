@@ -14,6 +14,7 @@ GRAVITY = 9.80665
 
 class _Acceleration(Effect):
     origin: ClassVar[Origin] = "sensor"
+    in_use = False  # on the bench gravity is known from the position; a robot would need an accelerometer
     rows: ClassVar[Rows] = "all"
 
 

@@ -34,7 +34,7 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
 #: What a formula may call the rate along the gyro's own axis, besides the names of logged columns.
 OWN_RATE = "rate_dps"
 LONGEST = 500
-NAME = re.compile(r"[a-z][a-z0-9_]{1,39}")
+NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 
 class Formula(Effect):

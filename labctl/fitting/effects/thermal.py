@@ -67,12 +67,12 @@ class ThermalHysteresis(Effect):
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     needs = ("t_s",)
-    parameters = (Parameter("bowed", "1", 0, 1),)
+    parameters = (Parameter("width_k", "K", 1.0, 15.0, logarithmic=True), Parameter("bowed", "1", 0, 1))
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.2), "piezo": (0.0, 0.2)}
     experiment = "temperatures on the way up and on the way down, then a smaller loop"
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        leg = channels.past.leg(channels)
+        leg = channels.past.leg(channels, term.parameters.get("width_k", 3.0))
         if term.parameters.get("bowed", 0.0):
             warm = channels.temperature_c(axis)
             low, high = channels.past.span_c
@@ -81,7 +81,8 @@ class ThermalHysteresis(Effect):
         return [Column("leg", "deg/s", leg)]
 
     def options(self, span: Span) -> list[Term]:
-        return by_parameter(self.id, bowed=np.array([0.0, 1.0]))
+        plain = by_parameter(self.id, width_k=np.array([1.5, 4.0, 8.0]), bowed=np.array([0.0]))
+        return plain + by_parameter(self.id, width_k=np.array([1.5]), bowed=np.array([1.0]))
 
 
 class WarmUp(Effect):
