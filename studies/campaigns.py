@@ -29,8 +29,11 @@ MODELS = {"O": "ojeda2000", "O+": "ojeda2000", "Y": "yang2018", "Y+": "yang2018"
 LEAST_VISIBLE = 0.15
 #: No effect of the catalogue.
 OUTSIDE = {"outside_etalon": "temperature_c"}
-#: What a mean of many noisy readings hides whatever its size, or what changes the thermometer and so everything.
-NOT_DRAWN = frozenset({"quantization", "self_heating", "thermometer_error", "bias", "scale_factor", "table_rate_ratio"})
+#: What is known and taken off (the Earth), what a mean of many noisy readings hides whatever its size, or what changes
+#: the thermometer and so everything.
+NOT_DRAWN = frozenset(
+    {"earth_rate", "quantization", "self_heating", "thermometer_error", "bias", "scale_factor", "table_rate_ratio"}
+)
 #: On one axis a tilt of the gyro is only seen by the Earth, and is then called so.
 ONE_AXIS_NOT = frozenset({"misalignment", "non_orthogonality", "cross_axis_nonlinearity"})
 

@@ -26,14 +26,18 @@ def plan(
     recipe: Recipe,
     bench: BenchName = None,
     clip: Clip = False,
+    visibility: Annotated[
+        bool, typer.Option("--visibility", help="Also say what the plan could and could not find, from which size on.")
+    ] = False,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
     """Say what a campaign would do and how long it takes. Nothing moves."""
     from labctl.services.planning import describe_plan
+    from labctl.services.schedules import visibility as look
 
     with one_clear_line():
-        answer = describe_plan(recipe, bench, clip=clip)
+        answer = describe_plan(recipe, bench, clip=clip, look=look if visibility else None)
     if as_json:
         print_json(answer)
     else:
@@ -46,6 +50,19 @@ def print_plan(answer: PlanAnswer) -> None:
     console.print(f"  {answer.datasets} data sets in {answer.steps} steps, about {hours(answer.expected_s)}")
     for left_out in answer.clipped:
         console.print(f"  left out: {left_out}", style="yellow", markup=False)
+    if answer.visibility is None:
+        return
+    rows = table("\nwhat this plan could find", "effect", "visible share", "from size", "unit", numbers=3)
+    for line in answer.visibility:
+        if line.visible:
+            rows.add_row(line.effect, figure(line.share, 2), figure(line.smallest_size, 2), line.unit)
+    console.print(rows)
+    hidden = table("\nand what not", "effect", "because of", "what would show it")
+    for line in answer.visibility:
+        if not line.visible:
+            why = f"no channel {', '.join(line.needs)}" if line.why == "channel" else "the schedule"
+            hidden.add_row(line.effect, why, line.experiment)
+    console.print(hidden)
 
 
 def hours(seconds: float) -> str:

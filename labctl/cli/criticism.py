@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -27,15 +28,20 @@ def criticise(
     version: VersionOption = None,
     recording: RecordingId = None,
     formula: FormulaOption = None,
+    next_recipe: Annotated[
+        Path | None, typer.Option("--next", metavar="FILE", help="Write the best next experiment as a recipe.")
+    ] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
     """Hold a version against a recording: what is left, where, and which effect may be missing."""
-    from labctl.services.criticism import criticise_unit
+    from labctl.services.criticism import criticise_unit, write_next
     from labctl.services.opening import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         answer = criticise_unit(store, serial, version, recording, formula or [])
+        if next_recipe is not None:
+            write_next(answer, next_recipe)
     if as_json:
         print_json(answer)
     else:
@@ -66,6 +72,12 @@ def print_criticism(answer: CriticismAnswer) -> None:
                 figure(suspect["rms_after_dps"]), figure(suspect["heldout_rms_after_dps"]), ", ".join(others[:3]),
             )  # fmt: skip
         console.print(rows)
+    for experiment in answer.experiments:
+        console.print(
+            f"to tell {', '.join(experiment['separates'])} apart: {experiment['do']} "
+            f"({experiment['hours']:.0f} h, {100 * experiment['power']:.0f} % sure to)",
+            markup=False,
+        )
     if answer.not_testable:
         hidden = [f"{line['effect']}" for line in answer.not_testable]
         console.print(f"this recording cannot say anything about: {', '.join(hidden)}", style="dim", markup=False)

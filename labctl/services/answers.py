@@ -138,6 +138,19 @@ class UnitAnswer(Answer):
     certified_version: int | None
 
 
+class Visibility(Answer):
+    """Whether a schedule could show an effect, and from which size on."""
+
+    effect: str
+    visible: bool
+    share: float = Field(description="How much of the effect the model beside it does not absorb, 0 to 1.")
+    smallest_size: float | None = Field(default=None, description="Just detectable, in the effect's unit.")
+    unit: str = ""
+    why: Literal["channel", "schedule"] | None = None
+    needs: list[str] = Field(default_factory=list)
+    experiment: str = ""
+
+
 class PlanAnswer(Answer):
     """What a campaign would do, before anything moves."""
 
@@ -148,6 +161,7 @@ class PlanAnswer(Answer):
     expected_s: float
     clipped: list[str] = Field(description="Points left out because the bench or the unit cannot do them.")
     schedule_hash: str
+    visibility: list[Visibility] | None = Field(default=None, description="What the plan could and could not find.")
 
 
 class CampaignAnswer(Answer):

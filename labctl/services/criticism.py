@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
@@ -23,6 +25,7 @@ from labctl.recording import Recording
 from labctl.services.acts import ImproveRequest
 from labctl.services.answers import CriticismAnswer, FitAnswer, LadderAnswer, LadderRow
 from labctl.services.criticism_text import answer_of
+from labctl.services.experiments import experiments_for
 from labctl.services.recordings import newest_recording
 from labctl.store import CalibrationRecord, NewCalibration, Store
 
@@ -36,7 +39,7 @@ def criticise_unit(
     row = _version(store, serial, version)
     number = newest_recording(store, serial, recording)
     found = _criticise(store, number, model_of(row), _catalogue(formula))
-    return answer_of(serial, row.version, number, found)
+    return answer_of(serial, row.version, number, found, experiments_for(store, number, found))
 
 
 def _criticise(store: Store, recording: int, model: ErrorModel, catalogue: Mapping[str, Effect]) -> Criticism:
@@ -169,3 +172,10 @@ def _catalogue(sources: list[str]) -> dict[str, Effect]:
 def as_lines(sources: list[str]) -> list[str]:
     """Return formulas as lines `name: expression`, with those of files read here; raises BadInput."""
     return [f"{formula.id}: {formula.text}" for source in sources for formula in formulas(source)]
+
+
+def write_next(answer: CriticismAnswer, path: Path) -> None:
+    """Write the best next experiment as a recipe that a campaign can be started from. Raises BadInput without one."""
+    if not answer.experiments:
+        raise BadInput(f"{path}: there is no experiment to write; the verdict is {answer.verdict!r}")
+    path.write_text(tomli_w.dumps(answer.experiments[0]["recipe"]), encoding="utf-8")

@@ -13,7 +13,9 @@ from labctl.fitting.effects import CATALOGUE, kind_of
 from labctl.services.answers import CriticismAnswer
 
 
-def answer_of(serial: str, version: int, recording: int, found: Criticism) -> CriticismAnswer:
+def answer_of(
+    serial: str, version: int, recording: int, found: Criticism, experiments: list[dict[str, Any]]
+) -> CriticismAnswer:
     """Return the answer of a criticism."""
     verdict, base = found.verdict, found.base
     return CriticismAnswer(
@@ -37,7 +39,7 @@ def answer_of(serial: str, version: int, recording: int, found: Criticism) -> Cr
         named=list(verdict.named),
         depends_on=list(verdict.depends_on),
         not_testable=[dict(line) for line in found.not_testable],
-        experiments=[],
+        experiments=experiments,
         worst=worst(found) if found.weighed else [],
         maps=pictures(found) if found.weighed else [],
         readings_left_out=found.data.left_out,
@@ -96,7 +98,7 @@ def sentences(found: Criticism) -> list[str]:
     if verdict.form == "ambiguous":
         said += [f"To tell: {CATALOGUE[e].experiment}." for e in verdict.named[:3] if e in CATALOGUE]
     factor = found.drift_over_datasheet
-    if factor is not None and factor >= LARGE_DRIFT:
+    if verdict.form == "adequate" and factor is not None and factor >= LARGE_DRIFT:
         said.append(f"The drift is larger than specified: {factor:.1f} times what the data sheet lets expect.")
     if found.data.left_out:
         said.append(f"{found.data.left_out} readings far outside their data set were left out.")

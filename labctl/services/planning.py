@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -13,7 +14,7 @@ from instruments.gyro import GyroLimits
 from instruments.open import check_options
 from instruments.table import TableLimits
 from labctl.errors import BadBench
-from labctl.services.answers import PlanAnswer
+from labctl.services.answers import PlanAnswer, Visibility
 from procedures.errors import PlanRefused
 from procedures.limits import BenchLimits
 from procedures.plan import Plan, make_plan
@@ -21,6 +22,9 @@ from procedures.recipe import Recipe, parse_recipe, read_recipe, shipped_recipes
 
 #: Of a chamber's set point, until its controller has been asked.
 USUAL_RESOLUTION_C = 0.1
+
+
+Look = Callable[[Plan, BenchFile], list[Visibility]]
 
 
 def load_recipe(source: str) -> Recipe:
@@ -93,8 +97,8 @@ def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tup
     return make_plan(recipe, limits_of(bench), clip=clip), bench
 
 
-def describe_plan(recipe: str, bench: str | None, *, clip: bool) -> PlanAnswer:
-    """Say what a campaign would do and how long it takes."""
+def describe_plan(recipe: str, bench: str | None, *, clip: bool, look: Look | None = None) -> PlanAnswer:
+    """Say what a campaign would do and how long it takes; `look` also says what it could find."""
     plan, bench_file = plan_for(recipe, bench, clip=clip)
     return PlanAnswer(
         recipe=plan.recipe.name,
@@ -104,6 +108,7 @@ def describe_plan(recipe: str, bench: str | None, *, clip: bool) -> PlanAnswer:
         expected_s=plan.expected_s,
         clipped=list(plan.clipped),
         schedule_hash=plan.schedule_hash,
+        visibility=look(plan, bench_file) if look else None,
     )
 
 

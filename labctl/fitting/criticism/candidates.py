@@ -59,7 +59,7 @@ def span_of(data: Compressed) -> Span:
 
 def untestable_channels(data: Compressed, catalogue: Mapping[str, Effect] = CATALOGUE) -> dict[str, list[str]]:
     """Return effects whose channels are not logged, with the channels."""
-    found = {}
+    found: dict[str, list[str]] = {}
     for kind in catalogue.values():
         absent = [name for name in kind.needs if name not in data.nodes and name != "run"]
         if absent:
@@ -104,7 +104,7 @@ def options_of(
     span, absent = span_of(data), untestable_channels(data, catalogue)
     found = []
     for kind in catalogue.values():
-        if kind.id in absent or kind.id in ONLY_BASE:
+        if kind.id in absent or kind.id in ONLY_BASE or _is_known(data, kind.id):
             continue
         for term in kind.options(span):
             columns = [c for c in kind.columns(data.nodes, axis, term, reference) if np.any(c.values)]
@@ -114,6 +114,11 @@ def options_of(
                     Option(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
                 )
     return found + _smooth_options(data, axis)
+
+
+def _is_known(data: Compressed, effect_id: str) -> bool:
+    """Whether an effect is taken off already: the Earth's rate where the latitude is known."""
+    return effect_id == "earth_rate" and data.info.latitude_deg is not None
 
 
 def smooth_channels(data: Compressed, axis: str) -> dict[str, Array]:

@@ -25,6 +25,8 @@ ENOUGH = 4.5
 LEAD = 3.0
 #: A rival that leaves less of the leader's signal than this (chi2), or a smaller share than that, is not told apart.
 UNTOLD_CHI2 = 7.0
+#: A lead from which on the evidence alone decides against a rival with more coefficients.
+FAR = 12.0
 ALIKE = 0.995
 #: A smooth function of a channel is only then unexplained when no effect explains this share of it.
 EXPLAINED = 0.90
@@ -101,8 +103,19 @@ def alias_group(weighed: Weighed, leader: Candidate) -> tuple[str, ...]:
 
 
 def _is_untold(weighed: Weighed, leader: Candidate, rival: Candidate) -> bool:
+    """Whether a rival would leave hardly anything of the leader's signal, without having bought that dearly.
+
+    A rival with more coefficients follows anything; far less evidence counts against it, and it only stays while little
+    does.
+    """
     share = overlap(weighed, leader, rival)
-    return share > ALIKE or (1.0 - share) * leader.gain < UNTOLD_CHI2
+    if share > ALIKE and _directions(weighed, rival) <= _directions(weighed, leader):
+        return True
+    return rival.log_bf > leader.log_bf - FAR and (1.0 - share) * leader.gain < UNTOLD_CHI2
+
+
+def _directions(weighed: Weighed, candidate: Candidate) -> int:
+    return sum(int(weighed.axes[axis].dimensions[option]) for axis, option in candidate.option.items())
 
 
 def overlap(weighed: Weighed, leader: Candidate, rival: Candidate) -> float:

@@ -1,0 +1,170 @@
+"""The next experiment: which changed recipe would tell two suspects apart, for its hours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from instruments.bench import BenchFile
+from labctl.errors import LabctlError
+from labctl.fitting.criticism import Criticism
+from labctl.fitting.criticism.evidence import LEAST_LEFT, Schur, solve_option
+from labctl.fitting.criticism.verdict import LEAD
+from labctl.fitting.effects import Term
+from labctl.services.planning import bench_for, limits_of, load_bench
+from labctl.services.schedules import Schedule, walk
+from labctl.store import Store
+from procedures.errors import ProcedureError
+from procedures.plan import make_plan
+from procedures.recipe import Recipe
+
+#: At most this many rivals are held against the leader, and this many experiments shown.
+PAIRS, SHOWN = 6, 4
+
+
+def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict[str, Any]]:
+    """Return changed recipes that would separate what a verdict could not, best separation per hour first."""
+    if found.verdict.form != "ambiguous" or found.weighed is None or len(found.verdict.named) < 2:
+        return []
+    base = _recipe_of(store, recording, found)
+    if base is None:
+        return []
+    recipe, bench = base
+    signal = _signal(found)
+    rivals = [name for name in found.verdict.named[1 : 1 + PAIRS] if name in signal.others]
+    ranked: list[dict[str, Any]] = []
+    for text, changes in menu(recipe):
+        try:
+            changed = Recipe.model_validate({**recipe.model_dump(), **changes})
+            plan = make_plan(changed, limits_of(bench), clip=True)
+            schedule = walk(plan, bench, found.weighed.model)
+        except (LabctlError, ProcedureError, ValueError):
+            continue
+        deltas = {rival: separation(schedule, signal.leader, signal.coefficients, rival) for rival in rivals}
+        told = [rival for rival, delta in deltas.items() if delta > LEAD]
+        if not told:
+            continue
+        delta = max(deltas.values())
+        hours = plan.expected_s / 3600
+        ranked.append(
+            {
+                "separates": [signal.leader.effect, *told],
+                "do": text,
+                "recipe": changed.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+                | {"format": "labctl-recipe/1", "name": f"{recipe.name}-next"},
+                "power": float(norm.cdf((delta / 2 - LEAD) / np.sqrt(delta))),
+                "hours": hours,
+                "per_hour": delta / hours,
+            }
+        )
+    return sorted(ranked, key=lambda e: -e["per_hour"])[:SHOWN]
+
+
+def menu(recipe: Recipe) -> list[tuple[str, dict[str, Any]]]:
+    """Return the changes that may tell effects apart, each with what a person would say."""
+    temperatures = sorted(recipe.temperatures_c)
+    middle = temperatures[len(temperatures) // 2]
+    few = sorted({0.0, *(s * abs(r) for r in _spread(recipe.rates_dps) for s in (1, -1))})
+    short: dict[str, Any] = {"temperatures_c": [middle], "rates_dps": few}
+    inside = {"mounting": {**recipe.mounting.model_dump(), "repower_each": False}}
+    up_and_down = {"inverted": {"temperatures_c": [middle], "rates_dps": [0.0, *few[:2], *few[-2:]]}, **inside}
+    return [
+        ("each position also upside down, in one powered run, at one temperature", {**short, **up_and_down}),
+        ("each position also upside down, in one powered run", up_and_down),
+        ("a power cycle at constant temperature", {**short, "power_cycle": {"off_s": 600.0, "rates_dps": few}}),
+        ("the temperatures up and down", {"temperature_order": "up_down"}),
+        ("the rates in random order", {"rate_order": "random"}),
+        ("random rates, temperatures up and down", {"rate_order": "random", "temperature_order": "up_down"}),
+        ("the first temperature again at the end", {"replicates": {"first_temperature_again": True}}),
+        ("more rates in the top third", {"rates_dps": _top(recipe.rates_dps), "temperatures_c": [middle]}),
+    ]
+
+
+def _spread(rates: tuple[float, ...]) -> list[float]:
+    sizes = sorted({abs(rate) for rate in rates if rate})
+    return [sizes[len(sizes) // 2], sizes[-1]] if sizes else []
+
+
+def _top(rates: tuple[float, ...]) -> list[float]:
+    most = max(abs(rate) for rate in rates)
+    sizes = [round(float(share) * most, 3) for share in (0.3, 0.5, *np.arange(0.66, 1.001, 0.04))]
+    return [0.0, *(sign * size for size in sizes for sign in (1, -1))]
+
+
+class _Signal:
+    """What the leading suspect was found to do."""
+
+    def __init__(self, leader: Term, coefficients: Mapping[str, np.ndarray], others: set[str]) -> None:
+        self.leader, self.coefficients, self.others = leader, coefficients, others
+
+
+def _signal(found: Criticism) -> _Signal:
+    weighed = found.weighed
+    assert weighed is not None
+    leader = next(c for c in weighed.candidates if c.id == found.verdict.named[0] and not c.smooth)
+    assert leader.term is not None
+    values = {}
+    for axis, index in leader.option.items():
+        values[axis] = solve_option(weighed.axes[axis].best, weighed.axes[axis].slices[index])[0]
+    return _Signal(leader.term, values, {c.id for c in weighed.candidates if not c.smooth})
+
+
+def separation(schedule: Schedule, leader: Term, coefficients: Mapping[str, np.ndarray], rival: str) -> float:
+    """Return the chi2 by which a rival would fail to explain the leader's signal on another schedule."""
+    total = 0.0
+    for axis, values in coefficients.items():
+        if axis not in schedule.designs:
+            continue
+        options = schedule.options(axis)
+        own = [where for option, where in options if option.candidate == leader.effect and option.term is not None
+               and option.term.parameters == leader.parameters and option.term.order == leader.order]  # fmt: skip
+        if not own or own[0].stop - own[0].start != len(values):
+            continue
+        left = schedule.left[axis]
+        size = float(values @ left.gram[own[0], own[0]] @ values)
+        shared = max(
+            (_shared(left, own[0], values, where) for o, where in options if o.candidate == rival), default=0.0
+        )
+        total += max(size - shared, 0.0)
+    return total
+
+
+def _shared(left: Schur, signal: slice, values: np.ndarray, by: slice) -> float:
+    inner = left.gram[by, signal] @ values
+    scale = np.sqrt(np.maximum(left.whole[by], 1e-300))
+    sizes, vectors = np.linalg.eigh(left.gram[by, by] / np.outer(scale, scale))
+    kept = sizes > LEAST_LEFT
+    return float(((vectors[:, kept].T @ (inner / scale)) ** 2 / sizes[kept]).sum())
+
+
+def _recipe_of(store: Store, recording: int, found: Criticism) -> tuple[Recipe, BenchFile] | None:
+    """Return the recipe that a recording was made by, or one like it, and a bench to walk through changed ones."""
+    campaign = store.recordings.get(recording).campaign
+    try:
+        if campaign is not None:
+            row = store.campaigns.get(campaign)
+            return Recipe.model_validate(dict(row.recipe)), BenchFile.model_validate(dict(row.bench))
+        recipe = _like(found)
+        return recipe, load_bench(bench_for(recipe))
+    except (LabctlError, ProcedureError, ValueError):
+        return None
+
+
+def _like(found: Criticism) -> Recipe:
+    data = found.data
+    warm = data.nodes["chamber_setpoint_c"] if "chamber_setpoint_c" in data.nodes else data.nodes.temperature_c("")
+    levels = np.unique(np.round(data.at_sets(np.asarray(warm, dtype=np.float64))))
+    rates = np.unique(np.round(data.at_sets(data.nodes.table_rate_dps()), 1))
+    lasted = data.nodes.durations_s().reshape(len(data), -1).sum(axis=1)
+    return Recipe.model_validate(
+        {
+            "name": data.info.serial,
+            "temperatures_c": levels[:: max(len(levels) // 12, 1)].tolist(),
+            "rates_dps": rates[:: max(len(rates) // 25, 1)].tolist(),
+            "positions": sorted(there for there, _ in data.nodes.positions()),
+            "acquire": {"duration_s": float(np.clip(np.median(lasted), 1.0, 120.0))},
+        }
+    )
