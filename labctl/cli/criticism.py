@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -172,33 +173,32 @@ def ladder(serial: Serial, as_json: Json = False, database: Database = None) -> 
         print_ladder(answer)
 
 
-def print_ladder(answer: LadderAnswer, width: int = 40) -> None:
-    """Draw the fall on a logarithmic scale, the floor as a line."""
-    from math import log10
+def print_ladder(answer: LadderAnswer) -> None:
+    """Draw the fall."""
+    for line in ladder_lines(answer):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
 
-    known = [e for s in answer.steps for e in (s.rms_dps, s.heldout_rms_dps, s.raw_rms_dps) if e]
+
+def ladder_lines(answer: LadderAnswer, width: int = 40) -> list[str]:
+    """Return the fall on a logarithmic scale, a line per version, the floor as a line down."""
+    known = [e for s in answer.steps for e in (s.rms_dps, s.heldout_rms_dps) if e]
     if not known:
-        console.print(f"{answer.serial}: no version has an error figure")
-        return
-    lowest = min([*known, answer.noise_floor_dps or known[0]]) * 0.7
-    highest = max(known)
+        return [f"{answer.serial}: no version has an error figure"]
+    lowest = 0.7 * min([*known, answer.noise_floor_dps or known[0]])
+    span = max(log10(max(known) / lowest), 1e-9)
 
     def place(value: float) -> int:
-        share = (log10(value) - log10(lowest)) / max(log10(highest) - log10(lowest), 1e-9)
-        return max(round(share * width), 1)
+        return max(round(log10(value / lowest) / span * width), 1)
 
-    floor = place(answer.noise_floor_dps) if answer.noise_floor_dps else None
-    console.print(f"[bold]{answer.serial}[/]: error by version, deg/s (bar: fitted data; o: held-out; |: noise floor)")
+    lines = [f"{answer.serial}: error by version, deg/s, logarithmic (bar: fitted data; o: held-out; |: noise floor)"]
     for step in answer.steps:
         bar = list(("█" * place(step.rms_dps) if step.rms_dps else "").ljust(width + 2))
         if step.heldout_rms_dps:
             bar[place(step.heldout_rms_dps)] = "o"
-        if floor is not None:
-            bar[floor] = "|"
-        line = "".join(bar)
-        console.print(
-            f"{step.version:3d} {line} {figure(step.rms_dps)}  held-out {figure(step.heldout_rms_dps)}  {step.model}",
-            markup=False, highlight=False, soft_wrap=True,
-        )  # fmt: skip
+        if answer.noise_floor_dps:
+            bar[place(answer.noise_floor_dps)] = "|"
+        figures = f"{figure(step.rms_dps)}  held-out {figure(step.heldout_rms_dps)}"
+        lines.append(f"{step.version:3d} {''.join(bar)} {figures}  {step.model}")
     if answer.noise_floor_dps:
-        console.print(f"    noise floor {figure(answer.noise_floor_dps)} deg/s", style="dim")
+        lines.append(f"    noise floor {figure(answer.noise_floor_dps)} deg/s")
+    return lines

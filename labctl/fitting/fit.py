@@ -154,20 +154,29 @@ def design(context: Context, model: ErrorModel, axis: str) -> AxisDesign:
     found = [(owner, column) for owner, column in model.columns(channels, axis) if np.any(column.values)]
     basis = model.temperature.basis(context.channels.temperature_c(axis))
     nodes = basis.shape[1]
-    columns, spread = [np.zeros((len(context), 0))], [np.zeros((0, 0))]
+    columns, spread, names = [np.zeros((len(context), 0))], [], []
     for owner, column in found:
-        if owner in steady:
-            columns.append(column.values[:, None])
-            spread.append(np.ones((nodes, 1)))
-        else:
-            columns.append(column.values[:, None] * basis)
-            spread.append(np.eye(nodes))
+        added = column.values[:, None] if owner in steady else column.values[:, None] * basis
+        if owner in steady and _is_there(np.concatenate(columns, axis=1), added):
+            continue  # an added polynomial brings the powers that the model has already
+        columns.append(added)
+        spread.append(np.ones((nodes, 1)) if owner in steady else np.eye(nodes))
+        names.append((owner, column.name, column.unit))
     return AxisDesign(
         np.concatenate(columns, axis=1),
-        block_diag(*spread[1:]) if found else np.zeros((0, 0)),
-        [(owner, column.name, column.unit) for owner, column in found],
+        block_diag(*spread) if spread else np.zeros((0, 0)),
+        names,
         turning_columns(context.info, context.channels, axis),
     )
+
+
+def _is_there(columns: NDArray[np.float64], added: NDArray[np.float64]) -> bool:
+    """Whether a column (m, 1) is a combination of others (m, c)."""
+    if columns.shape[1] == 0:
+        return False
+    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    solution, *_ = np.linalg.lstsq(scaled, added, rcond=1e-12)
+    return float(np.linalg.norm(added - scaled @ solution)) < 1e-9 * float(np.linalg.norm(added))
 
 
 def _solve_axes(

@@ -80,9 +80,9 @@ def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetim
 
 
 def _shaped(store: Store, recording: int, points: Recording, base: ErrorModel, term: Term) -> Term:
-    """Return a term with the nonlinear parameters that fit the recording best."""
+    """Return a term with the order and the nonlinear parameters that fit the recording best."""
     kind = kind_of(term)
-    if term.order is not None or not kind.parameters:
+    if term.order is not None or not (kind.parameters or kind.max_order):
         return term
     found = criticise(readings_of(store, recording), base, {kind.id: kind}, points=points, shape_only=True)
     shape = found.verdict.terms.get(kind.id)

@@ -42,11 +42,22 @@ class Stage:
         """Tell something."""
         self.console.print(text, markup=False)
 
-    def campaign(self, recipe: str, bench: str, *, noise_seed: int = 0) -> CampaignAnswer:
+    def campaign(
+        self,
+        recipe: str,
+        bench: str,
+        *,
+        noise_seed: int = 0,
+        hidden: dict[str, float] | None = None,
+        serial: str | None = None,
+    ) -> CampaignAnswer:
         """Run a recipe on a simulated bench in virtual time, with progress and time left."""
         settings = load_bench(bench)
-        simulation = (settings.simulation or SimulationSettings()).model_copy(update={"noise_seed": noise_seed})
-        settings = settings.model_copy(update={"simulation": simulation})
+        simulation = (settings.simulation or SimulationSettings()).model_copy(
+            update={"noise_seed": noise_seed, "hidden": hidden or {}}
+        )
+        gyros = settings.gyros if serial is None else (settings.gyros[0].model_copy(update={"serial": serial}),)
+        settings = settings.model_copy(update={"simulation": simulation, "gyros": gyros})
         prepared = prepare(self.store, recipe, settings, VirtualClock(), clip=False)
         row = self.store.campaigns.get(prepared.id)
         with CampaignProgress(quiet=self.quiet, title=f"campaign {prepared.id}") as bar:

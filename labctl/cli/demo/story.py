@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from instruments.clock import VirtualClock
-from labctl.cli.demo import published, served, single_axis, triaxial
+from labctl.cli.demo import missing, published, served, single_axis, triaxial
 from labctl.cli.demo.stage import Stage, maybe_silent
 from labctl.errors import BadInput
 from labctl.services.acts import CertifyRequest
@@ -25,6 +25,7 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
         triaxial.play(stage, quick=quick)
         single_axis.play(stage)
         published.play(stage)
+        missing.play(stage, "OSU-FOG-2024")
         serials = [triaxial.SERIAL, single_axis.SERIAL, "WEISS-ENV05S", "OSU-FOG-2024"]
         for serial in serials:
             request = CertifyRequest(by="the demo", reason="computed and checked in this run")
