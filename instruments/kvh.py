@@ -14,7 +14,7 @@ from instruments.clock import Clock, sleep_until
 from instruments.errors import LimitError, LinkError, NoReply
 from instruments.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.ports import Ports
-from instruments.stream_time import StreamTime
+from instruments.stream_time import FRESH_PERIODS, StreamTime
 
 SILENCE_S = 2.0
 EMPTY_EVERY_S = 1.0
@@ -112,6 +112,7 @@ class KvhLines:
                 self._port.write(self.format.start_command.encode() * 3)  # there is no read-back: sent three times
         except (serial.SerialException, OSError) as error:
             self._lose(error)
+        self._time = None
         self._drop()
         self._last_line_s = self._clock.now_s()
 
@@ -120,7 +121,9 @@ class KvhLines:
             self._opened().reset_input_buffer()
         except (serial.SerialException, OSError) as error:
             self._lose(error)
-        self._rest, self._in_line, self._time = b"", False, None
+        self._rest, self._in_line = b"", False
+        if self._time is not None:
+            self._time.drop()
 
     def _opened(self) -> serial.SerialBase:
         if self._port is None:
@@ -163,7 +166,7 @@ class KvhLines:
         self._drop()
         deadline = self._clock.now_s() + SILENCE_S
         while self._clock.now_s() < deadline:
-            self._clock.sleep(1.2 / self.sample_rate_hz)
+            self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
             found = self._decode(self._take())
             if len(found):
                 self._last_line_s = self._clock.now_s()

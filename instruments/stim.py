@@ -15,7 +15,7 @@ from instruments.errors import LinkError, NoReply
 from instruments.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.ports import Ports
 from instruments.stim_frames import LAYOUTS, Layout, int16, int24, scan
-from instruments.stream_time import StreamTime
+from instruments.stream_time import FRESH_PERIODS, StreamTime
 
 AXES = ("x", "y", "z")
 RATE_PER_LSB = 2.0**-14
@@ -85,6 +85,7 @@ class Stim300:
             self._port = self._ports.serial(
                 self.settings.port or "", device=self.name, baudrate=self.options.baudrate, timeout_s=SILENCE_S
             )
+        self._time = None
         self._drop()
         self._last_frame_s = self._clock.now_s()
 
@@ -93,7 +94,9 @@ class Stim300:
             self._opened().reset_input_buffer()
         except (serial.SerialException, OSError) as error:
             self._lose(error)
-        self._rest, self._counter, self._time = b"", None, None
+        self._rest, self._counter = b"", None
+        if self._time is not None:
+            self._time.drop()
 
     def _opened(self) -> serial.SerialBase:
         if self._port is None:
@@ -132,11 +135,9 @@ class Stim300:
         """Get one fresh reading and drop everything older."""
         self._drop()
         deadline = self._clock.now_s() + START_WITHIN_S
-        data = b""
         while self._clock.now_s() < deadline:
-            self._clock.sleep(1.5 / self.sample_rate_hz)
-            data += self._take()
-            found = self._decode(data)
+            self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
+            found = self._decode(self._take())
             if len(found):
                 self._last_frame_s = self._clock.now_s()
                 newest = slice(len(found) - 1, len(found))

@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 FOLLOW = 0.02
 #: A stream further behind than this many periods has lost readings that nothing else showed.
 LOST_PERIODS = 12.0
+#: A stream whose readings are awaited one by one is looked at this often, in periods: then they are known to be fresh.
+FRESH_PERIODS = 0.125
+#: After readings were dropped a stream is found again by its phase, unless that is off by more than this many periods.
+SAME_PHASE = 0.25
 
 
 class StreamTime:
@@ -19,7 +23,16 @@ class StreamTime:
         self._anchor_s = now_s
         self._index = -1
         self._begun = False
+        self._dropped = False
         self._last_s = -np.inf
+
+    def drop(self) -> None:
+        """Expect any number of readings to be missing before the next ones, which are told as soon as they come.
+
+        The device has gone on at its own even spacing meanwhile: what is known of its phase stays known, so that times
+        do not jump when a stream that was looked at now and then is read on.
+        """
+        self._dropped = True
 
     def times(self, advance: NDArray[np.int64], now_s: float, wrap: int = 0) -> tuple[NDArray[np.float64], int]:
         """Return the clock times (n,) of readings that follow each other by `advance` (n,) periods, and the losses.
@@ -28,6 +41,9 @@ class StreamTime:
         the stream falls behind the Clock by whole wraps, they are counted as lost (0: any number of readings).
         """
         index = self._index + np.cumsum(advance)
+        if self._dropped and self._begun:
+            index += self._found_again(now_s) - index[-1]
+        self._dropped = False
         newest = int(index[-1])
         if not self._begun:
             self._anchor_s, self._begun = now_s - newest * self._period_s, True
@@ -46,3 +62,11 @@ class StreamTime:
             times = self._last_s + share * (max(float(times[-1]), now_s) - self._last_s)
         self._index, self._last_s = int(index[-1]), float(times[-1])
         return np.asarray(times, dtype=np.float64), lost
+
+    def _found_again(self, now_s: float) -> int:
+        """Return the index of a reading that has just come."""
+        newest = max(round((now_s - self._anchor_s) / self._period_s), self._index + 1)
+        behind_s = now_s - (self._anchor_s + newest * self._period_s)
+        if abs(behind_s) > SAME_PHASE * self._period_s:
+            self._anchor_s += behind_s
+        return newest

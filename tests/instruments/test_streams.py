@@ -227,3 +227,30 @@ def test_stream_times_follow_a_device_whose_clock_is_fast() -> None:
     joined = np.concatenate(times)
     assert np.all(np.diff(joined) > 0)
     assert joined[-1] == pytest.approx(599, abs=0.05)
+
+
+def test_a_glance_leaves_the_times_without_a_step(streaming: Any) -> None:
+    """A step of a few ms within a data set would turn a line of the table's steps into noise."""
+    period = 1 / streaming.gyro.sample_rate_hz
+    phases = []
+    for pause_s in (3.1, 7.77, 0.013, 61.3, 12.345):
+        streaming.clock.sleep(pause_s)
+        streaming.gyro.glance()
+        parts = [streaming.gyro.read(1.003) for _ in range(3)]
+        times = np.concatenate([part.t_s for part in parts])
+        assert np.allclose(np.diff(times), period, rtol=0.02)
+        assert sum(part.lost for part in parts) == 0
+        phases.append(times[0] / period % 1)
+    turns = np.exp(2j * np.pi * np.array(phases[1:]))
+    assert abs(turns.mean()) > 0.99  # one even spacing through all of it
+
+
+def test_a_stream_is_found_again_by_its_phase_or_anchored_anew() -> None:
+    stream = StreamTime(0.1, 0.0)
+    stream.times(np.ones(3, dtype=np.int64), 0.305)
+    stream.drop()
+    found, lost = stream.times(np.ones(1, dtype=np.int64), 50.312)  # 7 ms later than its phase: the wire
+    assert (found[0], lost) == (pytest.approx(50.305), 0)
+    stream.drop()
+    found, lost = stream.times(np.ones(1, dtype=np.int64), 99.95)  # half a period off: its clock is another
+    assert (found[0], lost) == (pytest.approx(99.95), 0)
