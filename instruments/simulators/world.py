@@ -51,7 +51,7 @@ class World:
         self.position, self.mounting, self.run = "z", 0, 0
         self.powered_on_s: float | None = None
         truths = {gyro.name: self._make(gyro, settings) for gyro in bench.gyros}
-        start_c = float(settings.chamber.get("start_c", 25.0))
+        self.start_c = start_c = float(settings.chamber.get("start_c", 25.0))
         bodies = {
             name: Body(t.sensor_tau_s, t.self_heating_c, t.heating_tau_s, t.deep_tau_s, start_c, start_c)
             for name, t in truths.items()
@@ -177,9 +177,10 @@ class SimulatedGyro:
             rows=self._rows,
             g=world.gravity(len(t_s)),
             sensor_c=sensor,
+            start_c=world.start_c,
             deep_c=world.heat.deep_c(self.settings.name, t_s),
             air_c=world.heat.airs_c(t_s),
-            sensor_k_min=(sensor - world.heat.sensor_c(self.settings.name, np.maximum(t_s - 60.0, 0.0))),
+            sensor_k_min=6.0 * (sensor - world.heat.sensor_c(self.settings.name, np.maximum(t_s - 10.0, 0.0))),
             run=world.run,
             mounting=world.mounting,
             full_scale_dps=self.settings.max_rate_dps,

@@ -21,6 +21,7 @@ from labctl.fitting.levels import folds
 from labctl.fitting.model import AxisFit, ErrorModel, FittedModel
 from labctl.fitting.presets import Preset, preset_for
 from labctl.fitting.temperature import LagrangeTable
+from labctl.fitting.threads import single_threaded
 from labctl.recording import Recording
 
 #: A polynomial of order q in temperature wants at least this span per order.
@@ -86,6 +87,7 @@ def fit(recording: Recording, model: str | None = None, effects: list[str] | Non
     return fit_context(context_of(recording), preset)
 
 
+@single_threaded
 def fit_context(context: Context, preset: Preset) -> FitResult:
     """Fit a preset to data sets and judge it, also on temperatures that it has not seen."""
     error_model, rows = preset.build(context)

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 #: The temperature's course is brought to this spacing.
 SPACING_S = 10.0
-#: Its slope is taken over this.
-SLOPE_OVER_S = 300.0
 
 
 @dataclass(frozen=True)
@@ -48,9 +46,9 @@ class Past:
         """Return which runs or mountings there are."""
         return self.counted.get(name, (1,))
 
-    def rate_k_min(self, channels: Channels) -> Array:
-        """Return how fast the temperature changes, (n,) K/min."""
-        return self._ask(channels, lambda course: _slope(course.temperature_c))
+    def rate_k_min(self, channels: Channels, over_s: float) -> Array:
+        """Return how fast the temperature changes, (n,) K/min, as the slope of a line over so many seconds."""
+        return self._ask(channels, lambda course: _slope(course.temperature_c, over_s))
 
     def lag_k(self, channels: Channels, tau_s: float) -> Array:
         """Return how far a part with a time constant is behind the thermometer, (n,) K."""
@@ -73,8 +71,8 @@ class Past:
         return found
 
 
-def _slope(temperature_c: Array) -> Array:
-    half = max(round(SLOPE_OVER_S / SPACING_S / 2), 1)
+def _slope(temperature_c: Array, over_s: float) -> Array:
+    half = max(round(over_s / SPACING_S / 2), 1)
     if len(temperature_c) < 3:
         return np.zeros(len(temperature_c))
     padded = np.pad(temperature_c, half, mode="edge")

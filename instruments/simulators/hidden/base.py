@@ -26,6 +26,7 @@ class State:
     rows: list[int]  #: body axis of each recorded axis
     g: Array  #: (n, 3)
     sensor_c: Array
+    start_c: float  #: what everything was at in the beginning
     deep_c: Array
     sensor_k_min: Array  #: how fast the sensor's temperature changes
     air_c: Array

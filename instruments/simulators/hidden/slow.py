@@ -57,7 +57,7 @@ class ThermalHysteresis(HiddenEffect):
         width = 4.0
         side = np.empty(len(state.t_s))
         for i, temperature in enumerate(state.sensor_c):
-            play = temperature if self._play_c is None else self._play_c
+            play = state.start_c if self._play_c is None else self._play_c
             self._play_c = min(max(play, temperature - width), temperature + width)
             side[i] = (temperature - self._play_c) / width
         return (self.size * side)[:, None]

@@ -106,14 +106,18 @@ def options_of(
     for kind in catalogue.values():
         if kind.id in absent or kind.id in ONLY_BASE or _is_known(data, kind.id):
             continue
-        for term in kind.options(span):
-            columns = [c for c in kind.columns(data.nodes, axis, term, reference) if np.any(c.values)]
-            if columns:
-                rows = np.stack([data.rows(column) for column in columns], axis=2)
-                found.append(
-                    Option(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
-                )
+        options = (option_of(data, axis, reference, kind, term) for term in kind.options(span))
+        found += [option for option in options if option is not None]
     return found + _smooth_options(data, axis)
+
+
+def option_of(data: Compressed, axis: str, reference: Reference, kind: Effect, term: Term) -> Option | None:
+    """Return one shape of an effect on one axis, or None where it does not touch the axis."""
+    columns = [c for c in kind.columns(data.nodes, axis, term, reference) if np.any(c.values)]
+    if not columns:
+        return None
+    rows = np.stack([data.rows(column) for column in columns], axis=2)
+    return Option(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
 
 
 def _is_known(data: Compressed, effect_id: str) -> bool:

@@ -14,12 +14,13 @@ from labctl.fitting.context import Context, context_of
 from labctl.fitting.criticism.candidates import untestable_channels
 from labctl.fitting.criticism.compress import Compressed, compress
 from labctl.fitting.criticism.evidence import visible_share
-from labctl.fitting.criticism.refine import refined
+from labctl.fitting.criticism.refine import refined, sharpened
 from labctl.fitting.criticism.residuals import Residuals, maps, residuals_of, where_it_fails, worst_data_sets
 from labctl.fitting.criticism.verdict import (
     ENOUGH,
     LEAD,
     NEXT_SHARE,
+    Step,
     Verdict,
     alias_group,
     channels_behind,
@@ -33,6 +34,7 @@ from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.fit import FitResult, fit_context
 from labctl.fitting.model import ErrorModel
 from labctl.fitting.presets import changed
+from labctl.fitting.threads import single_threaded
 from labctl.recording import Recording
 
 #: Data sets beyond the base's coefficients that a verdict needs.
@@ -83,6 +85,7 @@ class Criticism:
         return float(np.max([r.drift_dps for r in self.residuals.values()]) / (stability / 2))
 
 
+@single_threaded
 def criticise(
     recording: Recording,
     model: ErrorModel,
@@ -151,7 +154,8 @@ def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping
     named: list[str] = []
     terms: dict[str, Term] = {}
     weighed, depends = first, channels_behind(first)
-    step = judge(first)
+    weighed, step = _judged(first, catalogue)
+    first = weighed
     if step.form == "unexplained" and (pair := _pair(data, model, first, catalogue)) is not None:
         return replace(pair, depends_on=depends), _explained(first, first)
     verdict = Verdict(step.form, step.group, step.depends_on or depends)
@@ -162,16 +166,23 @@ def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping
         named.append(step.leader.id)
         terms[step.leader.id] = term
         model = model.with_terms((*model.terms, replace(term, steady=True)))
-        rest = {key: kind for key, kind in catalogue.items() if key not in named}
-        weighed = weigh(data, model, rest)
         before = step.leader.gain
-        step = judge(weighed, first=False)
-        if step.leader is not None and step.leader.gain < NEXT_SHARE * before:
-            step = replace(step, form="adequate")
+        weighed, step = _judged(weigh(data, model, catalogue), catalogue, first=False)
+        if step.leader is not None and (step.leader.gain < NEXT_SHARE * before or set(named) & set(step.group)):
+            step = replace(step, form="adequate")  # what is left of a named effect is its shape, not another cause
         verdict = Verdict("missing", tuple(named), depends, terms=dict(terms))
     if verdict.form == "ambiguous" and step.leader is not None and step.leader.term is not None:
         verdict = replace(verdict, terms={step.leader.id: refined(weighed, step.leader)})
     return replace(verdict, depends_on=depends if verdict.form != "adequate" else ()), _explained(first, weighed)
+
+
+def _judged(weighed: Weighed, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Weighed, Step]:
+    """Judge, and where the answer is no single name judge again with the leaders' shapes refined."""
+    step = judge(weighed, first=first)
+    if step.form not in {"unexplained", "ambiguous"}:
+        return weighed, step
+    weighed = sharpened(weighed, catalogue, ENOUGH)
+    return weighed, judge(weighed, first=first)
 
 
 def _pair(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> Verdict | None:
@@ -181,18 +192,15 @@ def _pair(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mappin
         return None
     terms = {leader.id: refined(first, leader)}
     beside = model.with_terms((*model.terms, replace(terms[leader.id], steady=True)))
-    rest = {key: kind for key, kind in catalogue.items() if key != leader.id}
-    weighed = weigh(data, beside, rest)
-    step = judge(weighed, first=False)
+    weighed, step = _judged(weigh(data, beside, catalogue), catalogue, first=False)
     second = step.leader
-    if step.form != "missing" or second is None or second.term is None:
+    if step.form != "missing" or second is None or second.term is None or second.id == leader.id:
         return None
     if leader.log_bf + second.log_bf < smooth.log_bf + LEAD:
         return None
     terms[second.id] = refined(weighed, second)
     both = beside.with_terms((*beside.terms, replace(terms[second.id], steady=True)))
-    left = {key: kind for key, kind in rest.items() if key != second.id}
-    if judge(weigh(data, both, left), first=False).form != "adequate":
+    if _judged(weigh(data, both, catalogue), catalogue, first=False)[1].form != "adequate":
         return None
     return Verdict("missing", tuple(terms), terms=terms)
 

@@ -67,39 +67,61 @@ def stack(rows: NDArray[np.float64], scale: NDArray[np.float64], present: NDArra
     return (rows[1:] / scale[1:, :, None])[kept]
 
 
+@dataclass(frozen=True)
+class Others:
+    """Inner products over the coordinates besides the means, which no drift joins: the same for every noise."""
+
+    of_base: NDArray[np.float64]  #: (kb, kb), with the base's prior
+    crossed: NDArray[np.float64]  #: (kb, k)
+    own: NDArray[np.float64]  #: (k, k)
+
+
+def others_of(design: Design, rows: NDArray[np.float64], scale: NDArray[np.float64]) -> Others:
+    """Return the inner products of the base and of rows (R, m, k), scaled by (R, m)."""
+    base, own = stack(design.base, scale, design.present), stack(rows, scale, design.present)
+    return Others(base.T @ base + np.diag(design.precision), base.T @ own, own.T @ own)
+
+
+class Base:
+    """The means of one axis' base whitened by one noise, ready to be taken out of anything else."""
+
+    def __init__(self, design: Design, white_var: Array, noise: Noise) -> None:
+        self.noise = noise
+        self._blocks, self._log_det = factors(noise, white_var, design.t_s, design.run)
+        self._means = self._whitened(design.base[0])
+
+    def _whitened(self, means: NDArray[np.float64]) -> NDArray[np.float64]:
+        found = np.empty_like(means)
+        for which, factor in self._blocks:
+            found[which] = solve_triangular(factor, means[which], lower=True, check_finite=False)
+        return found
+
+    def taken_out_of(self, means: NDArray[np.float64], others: Others) -> Schur:
+        """Return what is left of means (m, k), the last of which are the data, beside the base."""
+        whitened = self._whitened(means)
+        gram, crossed = whitened.T @ whitened + others.own, self._means.T @ whitened + others.crossed
+        of_base = self._means.T @ self._means + others.of_base
+        size = np.sqrt(np.maximum(np.diag(of_base), 1e-300))
+        kb, log_det = len(size), self._log_det
+        left = gram
+        if kb:
+            scaled = of_base / np.outer(size, size) + 1e-10 * np.eye(kb)
+            factor = cholesky(scaled, lower=True, check_finite=False)
+            crossed = solve_triangular(factor, crossed / size[:, None], lower=True, check_finite=False)
+            left = gram - crossed.T @ crossed
+            log_det += 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum())
+        chi2 = float(left[-1, -1])
+        log_p = -0.5 * (log_det + chi2) + self.noise.log_prior
+        return Schur(self.noise, log_p, left[:-1, :-1], np.diag(gram)[:-1], left[:-1, -1], chi2)
+
+
 def schur(
     design: Design, y: NDArray[np.float64], white_var: Array, scale: NDArray[np.float64], noises: list[Noise]
 ) -> list[Schur]:
     """Eliminate the base from options and data (R, m), for every noise. `scale` (R, m): of coordinates but the mean."""
-    kb = design.base.shape[2]
-    everything = np.concatenate([design.base, *(o.rows for o in design.options), y[:, :, None]], axis=2)
-    other = stack(everything, scale, design.present)
-    gram_other = other.T @ other
-    gram_other[np.arange(kb), np.arange(kb)] += design.precision
-    return [_eliminate(everything[0], gram_other, kb, n, white_var, design) for n in noises]
-
-
-def _eliminate(
-    means: NDArray[np.float64], gram_other: NDArray[np.float64], kb: int, noise: Noise, white_var: Array, design: Design
-) -> Schur:
-    blocks, log_det = factors(noise, white_var, design.t_s, design.run)
-    whitened = np.empty_like(means)
-    for rows, factor in blocks:
-        whitened[rows] = solve_triangular(factor, means[rows], lower=True, check_finite=False)
-    gram = whitened.T @ whitened + gram_other
-    size = np.sqrt(np.maximum(np.diag(gram)[:kb], 1e-300))
-    scaled = gram[:kb, :kb] / np.outer(size, size)
-    factor = cholesky(scaled + 1e-10 * np.eye(kb), lower=True, check_finite=False) if kb else np.zeros((0, 0))
-    cross = (
-        solve_triangular(factor, gram[:kb, kb:] / size[:, None], lower=True, check_finite=False)
-        if kb
-        else gram[:0, kb:]
-    )
-    left = gram[kb:, kb:] - cross.T @ cross
-    log_det_base = 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum()) if kb else 0.0
-    chi2 = float(left[-1, -1])
-    log_p = -0.5 * (log_det + log_det_base + chi2) + noise.log_prior
-    return Schur(noise, log_p, left[:-1, :-1], np.diag(gram)[kb:-1], left[:-1, -1], chi2)
+    everything = np.concatenate([*(o.rows for o in design.options), y[:, :, None]], axis=2)
+    others = others_of(design, everything, scale)
+    return [Base(design, white_var, noise).taken_out_of(everything[0], others) for noise in noises]
 
 
 def evidence(design: Design, found: list[Schur], rows: int) -> AxisEvidence:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,8 +60,26 @@ def design_of(data: Compressed, model: ErrorModel, axis: str, catalogue: Mapping
     if "t_s" in nodes:
         t_s = data.at_sets(np.asarray(nodes["t_s"], dtype=np.float64))
     run = data.at_sets(np.asarray(nodes["run"] if "run" in nodes else np.ones(len(nodes)), dtype=np.float64))
-    options = options_of(data, axis, model.reference, catalogue)
+    level = level_of(base, data)
+    options = [centred(option, level) for option in options_of(data, axis, model.reference, catalogue)]
     return Design(base, precision, options, data.present, t_s, np.rint(run).astype(np.int64))
+
+
+def level_of(base: NDArray[np.float64], data: Compressed) -> NDArray[np.float64] | None:
+    """Return the coordinates of a constant, (R, m), where the base takes it up whatever it is; None where not."""
+    constant = data.rows_of(np.ones((len(data.nodes), 1)))[:, :, 0]
+    taken, *_ = np.linalg.lstsq(base[0], constant[0], rcond=1e-9)
+    return constant if np.max(np.abs(base[0] @ taken - constant[0]), initial=0.0) < 1e-6 else None
+
+
+def centred(option: Option, level: NDArray[np.float64] | None) -> Option:
+    """Return an option without its constant part, where the base has that anyway.
+
+    A supply of 5 V that wanders by millivolts would otherwise look like nothing but that constant.
+    """
+    if level is None:
+        return option
+    return replace(option, rows=option.rows - level[:, :, None] * option.rows[0].mean(axis=0))
 
 
 def weigh(

@@ -20,7 +20,7 @@ class TemperatureRate(Effect):
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     needs = ("t_s",)
-    parameters = (Parameter("of_gradient", "1", 0, 1),)
+    parameters = (Parameter("of_gradient", "1", 0, 1), Parameter("over_s", "s", 40.0, 600.0, logarithmic=True))
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.5)}
     experiment = "two ramp speeds at one constant rate; measure during and after the soak"
 
@@ -29,11 +29,13 @@ class TemperatureRate(Effect):
         if term.parameters.get("of_gradient", 0.0) and "chamber_c" in channels:
             lead = np.asarray(channels["chamber_c"], dtype=np.float64) - channels.temperature_c(axis)
             return [Column("chamber_lead", "deg/s/K", lead)]
-        return [Column("temperature_rate", "deg/s/(K/min)", channels.past.rate_k_min(channels))]
+        over_s = term.parameters.get("over_s", 300.0)
+        return [Column("temperature_rate", "deg/s/(K/min)", channels.past.rate_k_min(channels, over_s))]
 
     def options(self, span: Span) -> list[Term]:
-        gradient = [1.0] if span.has("chamber_c") else []
-        return by_parameter(self.id, of_gradient=np.array([0.0, *gradient]))
+        """A thermometer's noise asks for a long slope, a quick gyro for a short one."""
+        slopes = by_parameter(self.id, of_gradient=np.array([0.0]), over_s=np.array([60.0, 300.0]))
+        return slopes + ([Term(self.id, None, {"of_gradient": 1.0})] if span.has("chamber_c") else [])
 
 
 class ThermalLag(Effect):
@@ -54,7 +56,7 @@ class ThermalLag(Effect):
         return [Column("thermal_lag", "deg/s/K", channels.past.lag_k(channels, term.parameters.get("tau_s", 600.0)))]
 
     def options(self, span: Span) -> list[Term]:
-        return by_parameter(self.id, tau_s=np.geomspace(90.0, 3600.0, 7))
+        return by_parameter(self.id, tau_s=np.geomspace(150.0, 3600.0, 7))
 
 
 class ThermalHysteresis(Effect):
