@@ -11,6 +11,7 @@ from labctl.services import calibrations as services
 from labctl.services import criticism as criticism_services
 from labctl.services.acts import CertifyRequest, FitRequest, ImproveRequest
 from labctl.services.answers import CalibrationRow, Certified, CriticismAnswer, FitAnswer, LadderAnswer
+from labctl.services.uncertainty import UncertaintyAnswer, uncertainty_at
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 
@@ -62,6 +63,18 @@ def criticism(
 ) -> CriticismAnswer:
     """What the model leaves, where, which effect may be missing, and what this recording cannot say."""
     return criticism_services.criticise_unit(house.store, serial, version, recording, formula or [])
+
+
+@router.get("/calibrations/{version}/uncertainty", summary="How far a corrected rate may be off")
+def uncertainty(
+    serial: str,
+    version: int,
+    house: HouseOf,
+    rate_dps: Annotated[float, Query(description="True rate about each axis in turn, deg/s.")],
+    temperature_c: Annotated[float, Query(description="The gyro's thermometer, deg C.")],
+) -> UncertaintyAnswer:
+    """GUM components of a corrected rate at one rate and temperature, and whether that was calibrated at all."""
+    return uncertainty_at(house.store, serial, version, rate_dps, temperature_c)
 
 
 @router.get("/ladder", summary="The error, version by version")

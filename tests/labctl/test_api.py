@@ -49,6 +49,27 @@ def test_it_is_well(client: TestClient) -> None:
     assert client.get("/openapi.json").json()["info"]["title"] == "labctl"
 
 
+def test_uncertainty_criticism_improve_and_ladder(fog: TestClient) -> None:
+    path = "/api/units/OSU-FOG-2024/calibrations/1"
+    here = fog.get(f"{path}/uncertainty", params={"rate_dps": 50, "temperature_c": 40}).json()
+    assert here["inside"] is True
+    assert 0 < here["axes"]["z"]["combined_dps"] < here["axes"]["z"]["expanded_dps"] < 0.5
+    assert fog.get(f"{path}/uncertainty", params={"rate_dps": 50, "temperature_c": 400}).json()["inside"] is False
+    assert fog.get(f"{path}/uncertainty", params={"rate_dps": "nan", "temperature_c": 40}).status_code == 400
+    criticism = fog.get(f"{path}/criticism").json()
+    assert criticism["verdict"] in {"adequate", "missing", "ambiguous", "unexplained"}
+    assert set(criticism["error"]) >= {"rms_dps", "noise_floor_dps", "explained"}
+    better = fog.post(f"{path}/improve", json={"add": ["scale_factor_asymmetry"]})
+    assert better.status_code == 201
+    assert (better.json()["version"], better.json()["parent"]) == (2, 1)
+    steps = fog.get("/api/units/OSU-FOG-2024/ladder").json()["steps"]
+    assert [step["version"] for step in steps] == [1, 2]
+    assert steps[1]["rms_dps"] <= steps[0]["rms_dps"]
+    formula = fog.get(f"{path}/criticism", params={"formula": "odd: __import__('os')"})
+    assert formula.status_code == 400
+    assert formula.headers["content-type"] == "application/problem+json"
+
+
 def test_import_fit_certify_fetch(fog: TestClient) -> None:
     unit = fog.get("/api/units/OSU-FOG-2024").json()
     assert unit["calibrations"] == [1]
