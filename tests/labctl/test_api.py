@@ -64,7 +64,7 @@ def test_uncertainty_criticism_improve_and_ladder(fog: TestClient) -> None:
     assert (better.json()["version"], better.json()["parent"]) == (2, 1)
     steps = fog.get("/api/units/OSU-FOG-2024/ladder").json()["steps"]
     assert [step["version"] for step in steps] == [1, 2]
-    assert steps[1]["rms_dps"] <= steps[0]["rms_dps"]
+    assert better.json()["error"]["rms_dps"] < better.json()["before"]["rms_dps"]  # both in the forward form
     formula = fog.get(f"{path}/criticism", params={"formula": "odd: __import__('os')"})
     assert formula.status_code == 400
     assert formula.headers["content-type"] == "application/problem+json"
