@@ -18,6 +18,7 @@ from labctl.fitting.channels import Array, Carrier, Channels, body_rates, channe
 from labctl.fitting.earth import up_rate_dps
 from labctl.fitting.effects import Column
 from labctl.fitting.past import past_of
+from labctl.fitting.static import StaticRecord
 from labctl.recording import Recording, RecordingInfo, to_points
 from labctl.recording.points import dataset_starts
 
@@ -56,9 +57,14 @@ class Compressed:
     white_var: Mapping[str, Array] | None  #: axis -> (m,) variance of the mean from white noise
     dataset: NDArray[np.int64]
     left_out: int = 0  #: readings taken for outliers
+    static: StaticRecord | None = None  #: where it is used
 
     def __len__(self) -> int:
         return self.present.shape[1]
+
+    def instability_dps(self, axis: str) -> float | None:
+        """Return the bias instability that a static record shows for an axis, deg/s; None without one."""
+        return self.static.instability_dps(axis) if self.static is not None else None
 
     def at_sets(self, values: Array) -> Array:
         """Return node values (m * B,) averaged over each data set, (m,)."""

@@ -34,6 +34,7 @@ from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.fit import FitResult, fit_context
 from labctl.fitting.model import ErrorModel
 from labctl.fitting.presets import changed
+from labctl.fitting.static import LONG_S, static_record
 from labctl.fitting.threads import single_threaded
 from labctl.recording import Recording
 
@@ -102,7 +103,7 @@ def criticise(
 
     Raises NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict.
     """
-    data = compress(recording)
+    data = replace(compress(recording), static=static_record(recording, 0.0 if full else LONG_S))
     context = context_of(points or recording)
     if shape_only:
         return Criticism(_shapes(data, changed(model).build(context)[0], catalogue), data, None, None, None)

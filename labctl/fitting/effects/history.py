@@ -32,10 +32,10 @@ class _Shift(Effect):
     rows: ClassVar[Rows] = "all"
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        numbers = np.asarray(channels[self.counted])
+        later = channels.past.numbers(self.counted)[1:]
+        numbers = np.asarray(channels[self.counted]) if later else np.zeros(len(channels))
         return [
-            Column(f"{self.counted}_{int(number)}", "deg/s", (numbers == number).astype(np.float64))
-            for number in channels.past.numbers(self.counted)[1:]
+            Column(f"{self.counted}_{int(number)}", "deg/s", (numbers == number).astype(np.float64)) for number in later
         ]
 
 
