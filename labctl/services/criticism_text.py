@@ -43,6 +43,7 @@ def answer_of(
         worst=worst(found) if found.weighed else [],
         maps=pictures(found) if found.weighed else [],
         readings_left_out=found.data.left_out,
+        views=dict(found.views),
     )
 
 

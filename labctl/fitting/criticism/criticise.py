@@ -29,6 +29,7 @@ from labctl.fitting.criticism.verdict import (
     probabilities,
     share_removed,
 )
+from labctl.fitting.criticism.views import views_of
 from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.fit import FitResult, fit_context
@@ -76,6 +77,7 @@ class Criticism:
     suspects: tuple[Suspect, ...] = ()
     not_testable: tuple[Mapping[str, Any], ...] = ()
     explained: float | None = None
+    views: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def drift_over_datasheet(self) -> float | None:
@@ -121,6 +123,7 @@ def criticise(
     return Criticism(
         verdict, data, base, direct, weighed, left,
         tuple(_suspects(weighed, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)), explained,
+        views_of(weighed, left, recording, catalogue),
     )  # fmt: skip
 
 
