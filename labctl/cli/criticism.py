@@ -32,6 +32,9 @@ def criticise(
     next_recipe: Annotated[
         Path | None, typer.Option("--next", metavar="FILE", help="Write the best next experiment as a recipe.")
     ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE", help="Write a page with the pictures: one HTML file.")
+    ] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -43,6 +46,10 @@ def criticise(
         answer = criticise_unit(store, serial, version, recording, formula or [])
         if next_recipe is not None:
             write_next(answer, next_recipe)
+        if report is not None:
+            from labctl.services.report import write_report
+
+            write_report(store, answer, report)
     if as_json:
         print_json(answer)
     else:

@@ -19,7 +19,7 @@ TURNS = 2.0
 #: ... up to this often per turn, where the readings are close enough to follow it ...
 MOST_PER_TURN = 208
 #: ... and where at least this many data sets are.
-LEAST_SETS = 3
+LEAST_SETS = 6
 ANGLE_BINS = 2048
 FREQUENCIES = 200
 PROFILE_POINTS = 40
