@@ -94,7 +94,7 @@ def time(answer: Mapping[str, Any]) -> go.Figure | None:
         **where,
     )
     figure.update_yaxes(title="deg C", **where)
-    figure.update_xaxes(title="time, h", **where)
+    figure.update_xaxes(title=label_of("t_s") if sets["timed"] else "time, h (by the order of rows)", **where)
     return figure
 
 

@@ -34,8 +34,10 @@ def maps(answer: Mapping[str, Any]) -> go.Figure | None:
             "colorscale": SCALE, "cmin": -limit, "cmax": limit, "colorbar": {"title": "over<br>floor"},
         }
     )  # fmt: skip
-    figure.update_xaxes(type="category", title="table rate, deg/s")
-    figure.update_yaxes(type="category", title="deg C")
+    figure.update_xaxes(type="category")
+    figure.update_yaxes(type="category")
+    figure.update_xaxes(title="table rate, deg/s", row=-(-len(drawn) // columns))
+    figure.update_yaxes(title="deg C", col=1)
     return figure
 
 
@@ -57,7 +59,7 @@ def _panel(figure: go.Figure, picture: Mapping[str, Any], where: Mapping[str, in
         [1 if v is not None and abs(v) * sqrt(n) < DIMMED_BELOW else None for v, n in zip(line, number, strict=True)]
         for line, number in zip(mean, counts, strict=True)
     ]
-    x, y = [f"{v:.6g}" for v in columns], [f"{v:.1f}" for v in rows]
+    x, y = _labels(columns), _labels(rows)
     figure.add_trace(
         go.Heatmap(
             x=x, y=y, z=mean, customdata=sets, coloraxis="coloraxis", xgap=1, ygap=1, name=picture["axis"],
@@ -72,6 +74,12 @@ def _panel(figure: go.Figure, picture: Mapping[str, Any], where: Mapping[str, in
         ),
         **where,
     )  # fmt: skip
+
+
+def _labels(values: Sequence[float]) -> list[str]:
+    """Return values as short texts that all differ."""
+    digits = next(d for d in range(3, 18) if d == 17 or len({f"{v:.{d}g}" for v in values}) == len(values))
+    return [f"{value:.{digits}g}" for value in values]
 
 
 def _mean(values: Sequence[float], rows: Sequence[int]) -> float | None:

@@ -54,7 +54,8 @@ def _figures_text(axis: str, line: Mapping[str, Any]) -> str:
 
 def repeats(answer: Mapping[str, Any]) -> go.Figure | None:
     """Return the differences of points measured again against the time between; None where nothing was repeated."""
-    lines = (answer.get("views") or {}).get("repeats") or []
+    views = answer.get("views") or {}
+    lines = views.get("repeats") or []
     if not lines:
         return None
     figure = grid_of([f"{line['axis']}: {line['over_floor']:.2f} of the floor" for line in lines], min(len(lines), 3))
@@ -73,7 +74,7 @@ def repeats(answer: Mapping[str, Any]) -> go.Figure | None:
             figure.add_hline(
                 y=level * 2**0.5 * line["floor_dps"], line={"color": INK, "dash": "dash", "width": 1}, **where
             )
-    figure.update_xaxes(title="apart, min")
+    figure.update_xaxes(title="apart, min" if views["sets"]["timed"] else "apart, min (by the order of rows)")
     figure.update_yaxes(title="difference, deg/s", col=1)
     return figure
 

@@ -54,10 +54,11 @@ KINDS = (
     ),
     _Kind(
         "angle", "Waves in the table angle, within data sets",
-        "Mean power over white noise by cycles per turn; a bar above the dashed limit is a line (about 5 % chance of one "
-        "anywhere in a panel with nothing there). Once per turn: Earth's rate, a magnetic field or a tilt; four per "
-        "turn: the gear. The stepper's own lines (50 and 200 per turn) and, where the latitude is known, the Earth's "
-        "are taken out. A line here that is none in time follows the table.",
+        "Mean power over white noise by cycles per turn; a bar above the dashed limit is a line (about 5 % chance of "
+        "one anywhere in a panel with nothing there). Once per turn: Earth's rate, a magnetic field or a tilt; four "
+        "per turn: the gear. The stepper's own lines (50 and 200 per turn) and, where the latitude is known, the "
+        "Earth's are taken out: bars well below 1 are where sampling had folded them to. A line here that is none in "
+        "time follows the table.",
         spectra.angle,
     ),
     _Kind(

@@ -21,7 +21,7 @@ SCALE_LIMITS = (3.0, 10.0)
 #: Where a residual is less than this many floors from 0 it is dimmed.
 DIMMED_BELOW = 2.0
 ROW_PX = 260
-GAP_PX = 80
+GAP_PX = 100
 
 AXIS = {"gridcolor": GRID, "zerolinecolor": INK, "linecolor": INK, "automargin": True, "exponentformat": "power"}
 TEMPLATE = go.layout.Template(

@@ -16,7 +16,7 @@ from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.compress import compress
 from labctl.fitting.criticism.residuals import residuals_of
 from labctl.fitting.criticism.views import VIEWS, draws_of, views_of
-from labctl.fitting.criticism.views.channels import runs_test
+from labctl.fitting.criticism.views.channels import groups_of, runs_test
 from labctl.fitting.criticism.views.pairs import legs_of
 from labctl.fitting.criticism.weigh import weigh
 from labctl.fitting.effects import CATALOGUE, formulas
@@ -142,6 +142,15 @@ def test_legs_turn_where_the_temperature_does_and_begin_anew_with_power() -> Non
     assert legs_of(warm, run).tolist() == [0, 0, 1, 1, 1, -1, -1, -1, 1, 0, 0]
 
 
+def test_few_levels_are_averaged_one_by_one_and_the_rest_in_windows() -> None:
+    levels = np.repeat([-400.0, -0.5, -0.25, 0.0, 0.25, 0.5, 400.0], 5)
+    assert [len(group) for group in groups_of(levels)] == [5] * 7
+    jittered = np.repeat([20.0, 30.0, 40.0], 10) + np.random.default_rng(1).normal(0, 0.1, 30)
+    assert [len(group) for group in groups_of(jittered)] == [10, 10, 10]
+    assert [len(group) for group in groups_of(np.linspace(0, 1, 120))] == [10] * 24
+    assert [len(group) for group in groups_of(np.zeros(9))] == [9]
+
+
 @pytest.mark.parametrize(("values", "sign"), [(np.sin(np.arange(60) / 8), -1), ((-1.0) ** np.arange(60), 1)])
 def test_runs_tell_drift_from_alternation(values: np.ndarray, sign: int) -> None:
     z, p = runs_test(values)
@@ -171,6 +180,7 @@ def test_three_axes_are_compact_and_plain_json() -> None:
         assert all(numbers(line) <= 1000 for line in found[name]), name
     assert len(found["sets"]["dataset"]) == 300
     assert found["sets"]["of"] == 630
+    assert all(len(line["at"]) == 21 for line in found["channels"] if line["channel"] == "table_rate_dps")
     assert {line["position"] for line in found["channels"] if line["channel"] == "table_rate_dps"} == {"x", "y", "z"}
     assert all(
         len(line["lines"]) <= 1 for line in found["angle"]
@@ -180,7 +190,12 @@ def test_three_axes_are_compact_and_plain_json() -> None:
 def test_a_recording_of_means_without_times_has_the_views_that_it_can() -> None:
     found = views(read_recording(ROOT / "examples" / "osu-fog"))
     assert found["angle"] == found["time_in_set"] == found["frequency_within"] == []
-    assert of(found, "table_rate_dps")["at"]
+    warm = of(found, "temperature_c")["at"]
+    assert len(warm) == 24  # no levels: a running mean all along
+    assert np.max(np.diff(warm)) < 0.2 * np.ptp(warm)
+    assert len(found["time"][0]["t_s"]) == 24
+    assert found["frequency"] == []
+    assert not found["sets"]["timed"]
     assert found["repeats"][0]["pairs"] > 8
     json.dumps(found, allow_nan=False)
 

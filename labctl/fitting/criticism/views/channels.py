@@ -20,6 +20,8 @@ POINTS = 24
 #: A running mean is over this share of the data sets, and over no fewer than this.
 SHARE = 1 / 12
 LEAST = 6
+#: Levels are apart by a gap of this share of the whole, and no wider than their least gap; the finest that will do.
+LEVEL_GAPS = (1e-6, 1e-4, 1e-3, 1e-2)
 #: Data sets that are given one by one; evenly picked when there are more.
 MOST_SETS = 300
 #: Fewer data sets than this have no runs test.
@@ -37,6 +39,7 @@ def data_sets(data: Compressed, axes: Sequence[AxisView]) -> dict[str, Any]:
         names.add("previous_rate_dps")
     return {
         "of": len(first),
+        "timed": "t_s" in data.nodes,  # else the order of rows stands for time
         "dataset": data.dataset[rows].tolist(),
         "position": first.position()[rows].tolist(),
         "run": first.run[rows].tolist(),
@@ -82,11 +85,17 @@ def running_mean(view: AxisView, values: Array, here: NDArray[np.bool_]) -> dict
 
 
 def groups_of(values: Array) -> list[NDArray[np.int64]]:
-    """Return which of values (n,) to average: the few levels that there are, apart by 1 % of the whole, or windows."""
+    """Return which of values (n,) to average: the few levels that there are, or windows that move along."""
     order = np.argsort(values, kind="stable")
-    gaps = np.flatnonzero(np.diff(values[order]) > 0.01 * np.ptp(values)) + 1
-    if len(gaps) < POINTS:
-        return np.split(order, gaps)
+    if not np.ptp(values) > 0:
+        return [order]
+    for share in LEVEL_GAPS:
+        begins = np.flatnonzero(np.diff(values[order]) > share * np.ptp(values)) + 1
+        if 0 < len(begins) < POINTS:
+            groups = np.split(order, begins)
+            widest = max(float(np.ptp(values[group])) for group in groups)
+            if widest <= np.diff(values[order])[begins - 1].min():
+                return groups
     width = min(max(round(SHARE * len(order)), LEAST), len(order))
     begins = np.unique(np.linspace(0, len(order) - width, POINTS).round().astype(np.int64))
     return [order[begin : begin + width] for begin in begins]

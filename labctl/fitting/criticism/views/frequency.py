@@ -15,10 +15,13 @@ LEAST_SETS = 16
 
 
 def between_sets(view: AxisView) -> dict[str, Any] | None:
-    """Return the amplitude of waves in the mean residuals, and what noise alone gives on average, both in deg/s."""
+    """Return the amplitude of waves in the mean residuals, and what noise alone gives on average, both in deg/s.
+
+    None without times, or for few data sets.
+    """
     t_s = view.t_s
     steps = np.diff(np.unique(t_s))
-    if len(view) < LEAST_SETS or len(steps) < LEAST_SETS:
+    if "t_s" not in view.data.nodes or len(view) < LEAST_SETS or len(steps) < LEAST_SETS:
         return None
     lowest, highest = 1.0 / np.ptp(t_s), 0.5 / float(np.median(steps))
     if highest <= 2 * lowest:
