@@ -69,6 +69,8 @@ def print_criticism(answer: CriticismAnswer) -> None:
         f"held-out {figure(error['heldout_rms_dps'])}, noise floor {figure(error['noise_floor_dps'])}",
         style="dim",
     )
+    if answer.noise.get("static"):
+        _print_static(answer.noise["static"])
     for picture in getattr(answer, "maps", []):
         _print_map(picture)
     if answer.suspects:
@@ -91,6 +93,16 @@ def print_criticism(answer: CriticismAnswer) -> None:
         console.print(f"this recording cannot say anything about: {', '.join(hidden)}", style="dim", markup=False)
     if answer.named:
         console.print(f"next: labctl improve {answer.serial} --add {answer.named[0]}", style="dim", markup=False)
+
+
+def _print_static(static: dict[str, Any]) -> None:
+    """Print what the longest stretch at rest shows."""
+    for axis, noise in static["axes"].items():
+        shown = [(letter, noise[letter]) for letter in ("N", "B", "K") if noise[letter]["value"] is not None]
+        said = ", ".join(f"{letter} {figure(f['value'], 3)} +- {figure(f['u'], 2)} {f['unit']}" for letter, f in shown)
+        instead = "; B stands for the data sheet" if noise["replaces_datasheet"] else ""
+        text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {said or 'no slope shows'}{instead}"
+        console.print(text, style="dim", markup=False)
 
 
 def _print_map(picture: dict[str, Any], columns: int = 21) -> None:

@@ -165,6 +165,20 @@ def test_a_long_static_record_replaces_the_data_sheet_and_a_short_one_does_not()
     assert likeliest == pytest.approx([1.35 * measured, 0.005])
 
 
+def test_a_long_record_among_short_data_sets_is_taken_in_pieces_of_their_length() -> None:
+    recording = with_record_at_rest(30, 2e-3)
+    data = compress(recording)
+    assert len(data) == 40 + 18000 // 80
+    assert data.weights.shape[1] == len(data)
+    assert data.dataset[:40].tolist() == list(range(1, 41))
+    assert set(data.dataset[40:]) == {41}
+    rest = np.asarray(recording.columns["dataset"]) == 41
+    assert data.output["z"][0, 40:].mean() == pytest.approx(recording.columns["gyro_z"][rest].mean(), abs=1e-9)
+    assert data.at_sets(np.asarray(data.nodes["t_s"]))[40:] == pytest.approx(
+        recording.columns["t_s"][rest].reshape(-1, 80).mean(axis=1), abs=PERIOD_S
+    )
+
+
 def test_criticism_weighs_with_the_static_record() -> None:
     recording = with_record_at_rest(30, 2e-3)
     recording = replace(recording, info=recording.info.model_copy(update={"datasheet": {"bias_stability_dps": 1e-5}}))

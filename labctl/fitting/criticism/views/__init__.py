@@ -55,7 +55,7 @@ def _within(axes: list[AxisView], recording: Recording) -> dict[str, Any]:
         residual = readings.axis(view.axis)
         found["angle"] += angle_lines(readings, residual, view.axis)
         found["frequency_within"] += frequency_lines(readings, residual, view.axis)
-        found["time_in_set"] += start_profile(readings, residual, view)
+        found["time_in_set"] += start_profile(readings, residual, view.axis)
     return found
 
 

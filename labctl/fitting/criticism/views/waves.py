@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from labctl.fitting.channels import Array
 from labctl.fitting.criticism.compress import STEP_LINES
-from labctl.fitting.criticism.views.axis import BAND, AxisView
+from labctl.fitting.criticism.views.axis import BAND
 from labctl.fitting.criticism.views.within import LEAST_READINGS, Residual, Within
 from labctl.fitting.plain import plain, plain_list
 
@@ -116,13 +116,13 @@ def frequency_lines(within: Within, residual: Residual, axis: str) -> list[dict[
     ]
 
 
-def start_profile(within: Within, residual: Residual, view: AxisView) -> list[dict[str, Any]]:
+def start_profile(within: Within, residual: Residual, axis: str) -> list[dict[str, Any]]:
     """Return the mean course within data sets: plain, and by the step in rate that came before, per deg/s of it."""
     values = (residual.dps + residual.slope[:, None] * within.basis[-1]) * residual.there
     usual = int(np.median(within.there.sum(axis=1)))
     edges = np.unique(np.linspace(0, usual, min(PROFILE_POINTS, usual) + 1).round().astype(np.int64))[:-1]
     seconds = within.since_s[:, :usual]
-    step = (within.rate_dps - within.previous_dps) * _up(view)
+    step = (within.rate_dps - within.previous_dps) * within.up(axis)
     there = residual.there[:, :usual]
     sums, counts = (np.add.reduceat(part[:, :usual], edges, axis=1) for part in (values, residual.there))
     total = np.maximum(counts.sum(axis=0), 1.0)
@@ -131,7 +131,7 @@ def start_profile(within: Within, residual: Residual, view: AxisView) -> list[di
         np.add.reduceat(there.sum(axis=0), edges), 1.0
     )
     found: dict[str, Any] = {
-        "axis": view.axis,
+        "axis": axis,
         "datasets": len(step),
         "since_s": plain_list(time),
         "mean_dps": plain_list(sums.sum(axis=0) / total),
@@ -141,9 +141,3 @@ def start_profile(within: Within, residual: Residual, view: AxisView) -> list[di
         found["per_step"] = plain_list((step[:, None] * sums).sum(axis=0) / size)
         found["per_step_band"] = plain_list(BAND * residual.spread_dps / np.sqrt(size))
     return [found]
-
-
-def _up(view: AxisView) -> Array:
-    """Return how the table's rate is felt along the axis, (m,): 1, -1 or 0."""
-    position = view.position()
-    return (position == view.axis).astype(np.float64) - (position == f"-{view.axis}").astype(np.float64)

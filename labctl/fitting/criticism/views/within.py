@@ -39,6 +39,10 @@ class Within:
         """Return a column of the thinned recording as (m, n)."""
         return np.where(self.there > 0, values[self.index], 0.0)
 
+    def up(self, axis: str) -> Array:
+        """Return how the table's rate is felt along an axis, (m,): 1, -1 or 0."""
+        return (self.position == axis).astype(np.float64) - (self.position == f"-{axis}").astype(np.float64)
+
     def axis(self, axis: str) -> Residual:
         """Return what one axis has besides mean, slope and the stepper's lines."""
         values = self.of(self.recording.gyro_dps(axis))
