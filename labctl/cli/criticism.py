@@ -32,6 +32,9 @@ def criticise(
     next_recipe: Annotated[
         Path | None, typer.Option("--next", metavar="FILE", help="Write the best next experiment as a recipe.")
     ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE", help="Write a page with the pictures: one HTML file.")
+    ] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -43,6 +46,10 @@ def criticise(
         answer = criticise_unit(store, serial, version, recording, formula or [])
         if next_recipe is not None:
             write_next(answer, next_recipe)
+        if report is not None:
+            from labctl.services.report import write_report
+
+            write_report(store, answer, report)
     if as_json:
         print_json(answer)
     else:
@@ -62,6 +69,8 @@ def print_criticism(answer: CriticismAnswer) -> None:
         f"held-out {figure(error['heldout_rms_dps'])}, noise floor {figure(error['noise_floor_dps'])}",
         style="dim",
     )
+    if answer.noise.get("static"):
+        _print_static(answer.noise["static"])
     for picture in getattr(answer, "maps", []):
         _print_map(picture)
     if answer.suspects:
@@ -84,6 +93,16 @@ def print_criticism(answer: CriticismAnswer) -> None:
         console.print(f"this recording cannot say anything about: {', '.join(hidden)}", style="dim", markup=False)
     if answer.named:
         console.print(f"next: labctl improve {answer.serial} --add {answer.named[0]}", style="dim", markup=False)
+
+
+def _print_static(static: dict[str, Any]) -> None:
+    """Print what the longest stretch at rest shows."""
+    for axis, noise in static["axes"].items():
+        shown = [(letter, noise[letter]) for letter in ("N", "B", "K") if noise[letter]["value"] is not None]
+        said = ", ".join(f"{letter} {figure(f['value'], 3)} +- {figure(f['u'], 2)} {f['unit']}" for letter, f in shown)
+        instead = "; B stands for the data sheet" if noise["replaces_datasheet"] else ""
+        text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {said or 'no slope shows'}{instead}"
+        console.print(text, style="dim", markup=False)
 
 
 def _print_map(picture: dict[str, Any], columns: int = 21) -> None:

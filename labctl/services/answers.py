@@ -78,6 +78,9 @@ class CriticismAnswer(Answer):
     depends_on: list[str] = Field(description="Channels that the residual hangs on, strongest first.")
     not_testable: list[dict[str, Any]]
     experiments: list[dict[str, Any]]
+    views: dict[str, Any] = Field(
+        default_factory=dict, description="Where and how the model fails, as numbers for pictures, by view."
+    )
 
 
 class LadderRow(Answer):

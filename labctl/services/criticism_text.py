@@ -43,19 +43,22 @@ def answer_of(
         worst=worst(found) if found.weighed else [],
         maps=pictures(found) if found.weighed else [],
         readings_left_out=found.data.left_out,
+        views=dict(found.views),
     )
 
 
 def _noise(found: Criticism) -> dict[str, Any]:
     parts = list(found.residuals.values())
+    static = found.data.static.to_json() if found.data.static is not None else None
     if not parts:
-        return {"white_dps": None, "drift_dps": None, "drift_tau_s": None, "vs_datasheet": None}
+        return {"white_dps": None, "drift_dps": None, "drift_tau_s": None, "vs_datasheet": None, "static": static}
     largest = max(parts, key=lambda r: r.drift_dps)
     return {
         "white_dps": float(np.sqrt(np.mean([r.white_dps**2 for r in parts]))),
         "drift_dps": largest.drift_dps,
         "drift_tau_s": largest.drift_tau_s,
         "vs_datasheet": found.drift_over_datasheet,
+        "static": static,
     }
 
 

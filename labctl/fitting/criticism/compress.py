@@ -18,6 +18,7 @@ from labctl.fitting.channels import Array, Carrier, Channels, body_rates, channe
 from labctl.fitting.earth import up_rate_dps
 from labctl.fitting.effects import Column
 from labctl.fitting.past import past_of
+from labctl.fitting.static import StaticRecord
 from labctl.recording import Recording, RecordingInfo, to_points
 from labctl.recording.points import dataset_starts
 
@@ -40,6 +41,9 @@ OUTLIER = 6.0
 #: ... unless there are more of them than this share: then it is how the data set is, as with a line of the steps.
 FEW = 0.05
 
+#: A data set longer than this many usual ones is taken in pieces.
+LONGEST = 4
+
 KINDS = ("mean", "slope", "start", *(f"{wave}{n}" for n in WAVES for wave in ("cos", "sin")))
 
 
@@ -56,9 +60,14 @@ class Compressed:
     white_var: Mapping[str, Array] | None  #: axis -> (m,) variance of the mean from white noise
     dataset: NDArray[np.int64]
     left_out: int = 0  #: readings taken for outliers
+    static: StaticRecord | None = None  #: where it is used
 
     def __len__(self) -> int:
         return self.present.shape[1]
+
+    def instability_dps(self, axis: str) -> float | None:
+        """Return the bias instability that a static record shows for an axis, deg/s; None without one."""
+        return self.static.instability_dps(axis) if self.static is not None else None
 
     def at_sets(self, values: Array) -> Array:
         """Return node values (m * B,) averaged over each data set, (m,)."""
@@ -128,6 +137,19 @@ def _pad(dataset: NDArray[np.int64]) -> _Padded:
     return _Padded(there.astype(np.float64), np.where(there, starts[:, None] + offset, 0))
 
 
+def _pieces(dataset: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return labels (n,) that change with the data set, and within one that is far longer than usual: a static record.
+
+    As one of the rows it would need room, and would be a single mean, for what drifts all the while.
+    """
+    starts = dataset_starts(dataset)
+    counts = np.diff(np.append(starts, len(dataset)))
+    parts = -(-counts // max(int(LONGEST * np.median(counts)), 1))
+    ordinal = np.arange(len(dataset)) - np.repeat(starts, counts)
+    first = np.concatenate([[0], np.cumsum(parts)[:-1]])
+    return np.repeat(first, counts) + ordinal * np.repeat(parts, counts) // np.repeat(counts, counts)
+
+
 def _decimated(
     recording: Recording,
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int64], dict[str, NDArray[Any]]]:
@@ -172,7 +194,7 @@ def thin(recording: Recording) -> Recording:
 
 def _from_samples(recording: Recording, outliers: bool) -> Compressed:
     numbers, dataset, texts = _decimated(recording)
-    padded = _pad(dataset)
+    padded = _pad(_pieces(dataset))
     m = len(padded.there)
     begin = padded.index[:, 0]
     t_s = numbers.get("t_s", np.arange(len(dataset), dtype=np.float64) / FASTEST_HZ)

@@ -29,11 +29,13 @@ from labctl.fitting.criticism.verdict import (
     probabilities,
     share_removed,
 )
+from labctl.fitting.criticism.views import views_of
 from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.fit import FitResult, fit_context
 from labctl.fitting.model import ErrorModel
 from labctl.fitting.presets import changed
+from labctl.fitting.static import LONG_S, static_record
 from labctl.fitting.threads import single_threaded
 from labctl.recording import Recording
 
@@ -75,6 +77,7 @@ class Criticism:
     suspects: tuple[Suspect, ...] = ()
     not_testable: tuple[Mapping[str, Any], ...] = ()
     explained: float | None = None
+    views: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def drift_over_datasheet(self) -> float | None:
@@ -102,7 +105,7 @@ def criticise(
 
     Raises NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict.
     """
-    data = compress(recording)
+    data = replace(compress(recording), static=static_record(recording, 0.0 if full else LONG_S))
     context = context_of(points or recording)
     if shape_only:
         return Criticism(_shapes(data, changed(model).build(context)[0], catalogue), data, None, None, None)
@@ -120,6 +123,7 @@ def criticise(
     return Criticism(
         verdict, data, base, direct, weighed, left,
         tuple(_suspects(weighed, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)), explained,
+        views_of(weighed, left, recording, catalogue),
     )  # fmt: skip
 
 

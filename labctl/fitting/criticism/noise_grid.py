@@ -18,6 +18,8 @@ WHITE_FACTORS = (1.0,)
 #: Width of the prior, a factor.
 PRIOR_FACTOR = 2.5
 MIXTURE_S = (120.0, 700.0, 3600.0)
+#: Drift of this size, in three equal parts, has an Allan deviation as high as a bias instability of 1 has.
+DRIFT_PER_INSTABILITY = 1.35
 #: Half of the usual bias stability, deg/s, where no data sheet says it.
 USUAL_DPS = {"fog": 0.001, "mems": 0.0015, "piezo": 0.01, "": 0.002}
 
@@ -31,9 +33,21 @@ class Noise:
     log_prior: float
 
 
-def noise_grid(technology: str, stability_dps: float | None, white_dps: float) -> list[Noise]:
+def expected_drift_dps(technology: str, stability_dps: float | None, instability_dps: float | None = None) -> float:
+    """Return the size that drift is expected to have: measured at rest, else by the data sheet, else as usual.
+
+    `stability_dps` is the data sheet's bias stability, `instability_dps` the bias instability B of a static record.
+    """
+    if instability_dps is not None:
+        return DRIFT_PER_INSTABILITY * instability_dps
+    return stability_dps / 2 if stability_dps else USUAL_DPS.get(technology, USUAL_DPS[""])
+
+
+def noise_grid(
+    technology: str, stability_dps: float | None, white_dps: float, instability_dps: float | None = None
+) -> list[Noise]:
     """Return the noise to weigh, for a white noise of a mean."""
-    centre = stability_dps / 2 if stability_dps else USUAL_DPS.get(technology, USUAL_DPS[""])
+    centre = expected_drift_dps(technology, stability_dps, instability_dps)
     width = np.log(PRIOR_FACTOR)
     points = []
     for factor in SIZES:

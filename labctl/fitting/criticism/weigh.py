@@ -124,7 +124,7 @@ def _noise_of(data: Compressed, design: Design, y: NDArray[np.float64], axis: st
     known = data.white_var
     white = known[axis] if known is not None else np.full(len(data), _floor_squared(design, y))
     level = float(np.sqrt(np.median(white)))
-    return white, noise_grid(data.info.technology or "", stability, level)
+    return white, noise_grid(data.info.technology or "", stability, level, data.instability_dps(axis))
 
 
 def _floor_squared(design: Design, y: NDArray[np.float64]) -> float:

@@ -79,6 +79,7 @@ def describe_effects() -> list[dict[str, Any]]:
             "plausible": {technology: list(span) for technology, span in kind.ranges.items()},
             "aliases": list(kind.aliases),
             "experiment": kind.experiment,
+            "draws": list(kind.draws),
         }
         for kind in CATALOGUE.values()
     ]

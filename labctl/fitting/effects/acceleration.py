@@ -32,6 +32,7 @@ class GSensitivity(_Acceleration):
     sentence = "The bias changes with gravity along the gyro's own axis: it differs between up and down."
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
     experiment = "each axis up and down within the same powered run"
+    draws = ("map", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("g_own", "deg/s/g", force_g(channels, axis))]
@@ -45,6 +46,7 @@ class CrossGSensitivity(_Acceleration):
     sentence = "The bias changes with gravity along the other axes."
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
     experiment = "a tumble over six faces within the same powered run"
+    draws = ("map", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [
@@ -62,6 +64,7 @@ class GSquaredSensitivity(_Acceleration):
     sentence = "The bias changes with the square of gravity along an axis, alike for up and down."
     ranges: ClassVar = {"fog": (0.0, 1e-4), "mems": (1e-4, 1e-2), "piezo": (0.0, 1e-2)}
     experiment = "up and down positions within one run, or a centrifuge"
+    draws = ("map", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("g_own_squared", "deg/s/g^2", force_g(channels, axis) ** 2)]
@@ -78,6 +81,7 @@ class CentripetalAcceleration(_Acceleration):
     aliases = ("scale_factor_even",)
     parameters = (Parameter("by_position", "1", 0, 1),)
     experiment = "another radius, or the unit turned by 180 deg on the table"
+    draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """At a radius of 0.1 m; which way the pull points in the body may be another one in every position."""

@@ -19,6 +19,7 @@ class Misalignment(Effect):
     ranges: ClassVar = {"fog": (0.0017, 0.017), "mems": (0.0017, 0.02), "piezo": (0.0017, 0.017)}
     aliases = ("non_orthogonality",)
     experiment = "remove and refit the unit at least three times: what changes is the fixture's"
+    draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [
@@ -36,6 +37,7 @@ class NonOrthogonality(Misalignment):
     sentence = "The input axes are not square to each other; nine numbers cannot tell this from misalignment."
     aliases = ("misalignment",)
     experiment = "an external alignment cube"
+    draws = ("table_rate_dps", "map")
 
 
 EFFECTS: tuple[type[Effect], ...] = (Misalignment, NonOrthogonality)

@@ -111,6 +111,7 @@ class Effect(ABC):
     ranges: ClassVar[Mapping[str, tuple[float, float]]] = {}  #: technology -> plausible size of the first coefficient
     aliases: ClassVar[tuple[str, ...]] = ()  #: ids whose columns are the same whatever the schedule
     experiment: ClassVar[str] = ""  #: what would tell it from its likes
+    draws: ClassVar[tuple[str, ...]] = ()  #: views of a criticism, or channels, whose picture it would draw
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 
     @abstractmethod

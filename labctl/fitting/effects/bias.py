@@ -20,6 +20,7 @@ class Bias(Effect):
     rows: ClassVar[Rows] = "all"
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 3.0), "piezo": (0.0, 5.0)}
     experiment = "input axis up, then down, table clamped: half the sum is bias, half the difference is not"
+    draws = ("map",)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("bias", "deg/s", np.ones(len(channels)))]
@@ -40,6 +41,7 @@ class BiasTemperature(Effect):
     max_order = 5
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.005, 0.08), "piezo": (0.05, 0.63)}
     experiment = "take the temperatures in the opposite order and repeat one at the end"
+    draws = ("temperature_c", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         centred = channels.temperature_c(axis) - reference.temperature_c

@@ -50,6 +50,8 @@ class Formula(Effect):
         self.sentence = sentence or f"The error follows {text}."  # type: ignore[misc]
         self._tree = _parsed(name, text)
         self.needs = tuple(sorted(_names(self._tree) - {OWN_RATE, "table_rate_dps", "temperature_c"}))  # type: ignore[misc]
+        names = {"table_rate_dps" if name == OWN_RATE else name for name in _names(self._tree)}
+        self.draws = tuple("time" if name == "t_s" else name for name in sorted(names))  # type: ignore[misc]
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the formula's value; raises BadInput when it is not finite everywhere."""

@@ -22,6 +22,7 @@ class BiasDrift(Effect):
     needs = ("t_s",)
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.5)}
     experiment = "the first temperature again at the end; a long record at rest"
+    draws = ("time", "repeats", "legs")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("bias_drift", "deg/s/h", np.asarray(channels["t_s"], dtype=np.float64) / 3600.0)]
@@ -32,10 +33,10 @@ class _Shift(Effect):
     rows: ClassVar[Rows] = "all"
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        numbers = np.asarray(channels[self.counted])
+        later = channels.past.numbers(self.counted)[1:]
+        numbers = np.asarray(channels[self.counted]) if later else np.zeros(len(channels))
         return [
-            Column(f"{self.counted}_{int(number)}", "deg/s", (numbers == number).astype(np.float64))
-            for number in channels.past.numbers(self.counted)[1:]
+            Column(f"{self.counted}_{int(number)}", "deg/s", (numbers == number).astype(np.float64)) for number in later
         ]
 
 
@@ -50,6 +51,7 @@ class RunShift(_Shift):
     counted = "run"
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.1), "piezo": (0.0, 0.5)}
     experiment = "at least two power cycles in each mounting"
+    draws = ("time", "repeats")
 
 
 class MountingShift(_Shift):
@@ -63,6 +65,7 @@ class MountingShift(_Shift):
     counted = "mounting"
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.1), "piezo": (0.0, 0.5)}
     experiment = "both mountings in one powered run"
+    draws = ("time", "map")
 
 
 class RateHysteresis(Effect):
@@ -78,6 +81,7 @@ class RateHysteresis(Effect):
     parameters = (Parameter("by_sign", "1", 0, 1),)
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.05), "piezo": (0.0, 0.2)}
     experiment = "rates in random order, each approached from both sides"
+    draws = ("previous_rate",)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         before = np.asarray(channels["previous_rate_dps"], dtype=np.float64)
@@ -102,6 +106,7 @@ class StartTransient(Effect):
     parameters = (Parameter("tau_s", "s", 0.5, 20.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.2)}
     experiment = "a longer wait before each data set; look at the first seconds of all of them"
+    draws = ("time_in_set", "previous_rate")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         decay = channels.decayed(term.parameters.get("tau_s", 4.0))
@@ -126,6 +131,7 @@ class SupplySensitivity(Effect):
     needs = ("supply_v",)
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.2), "piezo": (0.0, 50.0)}
     experiment = "steps of 5 % in the supply, at rest and at one rate"
+    draws = ("supply_v", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("supply", "deg/s/V", np.asarray(channels["supply_v"], dtype=np.float64))]

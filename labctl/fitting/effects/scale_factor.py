@@ -20,6 +20,7 @@ class ScaleFactor(Effect):
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.01), "piezo": (0.0, 0.0035)}
     aliases = ("table_rate_ratio",)
     experiment = "count whole turns against an index pulse: the integral of the output is 360 deg each"
+    draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("scale_factor", "1", channels.rate_dps(axis))]
@@ -36,6 +37,7 @@ class ScaleFactorTemperature(Effect):
     max_order = 5
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (1e-4, 5e-4), "piezo": (0.0, 2e-4)}
     experiment = "the same rates on the way up and on the way down in temperature"
+    draws = ("map",)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate = channels.rate_dps(axis)
@@ -61,6 +63,7 @@ class ScaleFactorAsymmetry(Effect):
     origin: ClassVar[Origin] = "sensor"
     ranges: ClassVar = {"fog": (1e-5, 5e-4), "mems": (5e-5, 1e-3), "piezo": (0.0, 1e-3)}
     experiment = "at least six rates of each sign, in random order"
+    draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("asymmetry", "1", np.abs(channels.rate_dps(axis)))]
@@ -97,6 +100,7 @@ class ScaleFactorEven(_Power):
     ranges: ClassVar = {"fog": (0.0, 1e-6), "mems": (1e-7, 2e-6), "piezo": (0.0, 1e-5)}
     aliases = ("centripetal_acceleration",)
     experiment = "repeat at another radius, or with the unit turned by 180 deg on the table"
+    draws = ("table_rate_dps", "map")
 
 
 class ScaleFactorOdd(_Power):
@@ -111,6 +115,7 @@ class ScaleFactorOdd(_Power):
     max_order = 5
     ranges: ClassVar = {"fog": (0.0, 5e-7), "mems": (0.0, 1e-8), "piezo": (0.0, 1e-7)}
     experiment = "more rates in the top third of the range"
+    draws = ("table_rate_dps", "map")
 
 
 class SineResponse(Effect):
@@ -123,6 +128,7 @@ class SineResponse(Effect):
     parameters = (Parameter("k", "s/rad", 0.05, 1.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 1.5), "mems": (0.0, 0.0), "piezo": (0.0, 0.0)}
     experiment = "more rates in the top third of the range"
+    draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         k = term.parameters.get("k", 0.3)
@@ -140,6 +146,7 @@ class Saturation(Effect):
     parameters = (Parameter("knee_dps", "deg/s", 20.0, 400.0),)
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
     experiment = "rates every 2 to 5 % above 70 % of full scale"
+    draws = ("table_rate_dps", "map", "worst")
     softness: ClassVar[float] = 0.02  #: of the knee: what saturates does not break off
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:

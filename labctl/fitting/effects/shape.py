@@ -20,6 +20,7 @@ class CrossAxisNonlinearity(Effect):
     rows: ClassVar[Rows] = "cross"
     ranges: ClassVar = {"fog": (0.0, 1e-7), "mems": (0.0, 1e-6), "piezo": (0.0, 1e-5)}
     experiment = "a second table axis, so that two rates can be given at once"
+    draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [
@@ -44,6 +45,7 @@ class VibrationRectification(Effect):
     )
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.05), "piezo": (0.0, 0.5)}
     experiment = "the same rates at another microstep setting or motor current, with an accelerometer logged"
+    draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         centre, width = term.parameters.get("centre_dps", 100.0), term.parameters.get("width", 0.4)
@@ -65,6 +67,7 @@ class DeadBand(Effect):
     parameters = (Parameter("band_dps", "deg/s", 0.005, 20.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}
     experiment = "rates from 0.01 to 1 deg/s of both signs, evenly spaced on a logarithmic scale"
+    draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate, band = channels.rate_dps(axis), term.parameters.get("band_dps", 0.05)
@@ -86,6 +89,7 @@ class Quantization(Effect):
     ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}
     needs = ("raw_code",)
     experiment = "a histogram of raw codes at rest"
+    draws = ("table_rate_dps", "repeats")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         step, rate = term.parameters.get("step_dps", 0.05), channels.rate_dps(axis)

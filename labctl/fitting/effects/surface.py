@@ -28,6 +28,7 @@ class RateTemperatureSurface(Effect):
     default_order = 3
     max_order = 5
     experiment = "nothing to separate: it holds bias, scale factor and nonlinearity with their temperature terms"
+    draws = ("map", "table_rate_dps", "temperature_c")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate, centred = channels.rate_dps(axis), channels.temperature_c(axis) - reference.temperature_c

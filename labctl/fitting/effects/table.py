@@ -20,6 +20,7 @@ class EarthRate(Effect):
     rows: ClassVar[Rows] = "own"
     ranges: ClassVar = {"fog": (0.0, 0.0042), "mems": (0.0, 0.0042), "piezo": (0.0, 0.0042)}
     experiment = "axis up and axis down; and state the bench's latitude, which fixes it"
+    draws = ("map",)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("earth_up", "deg/s", channels.up(axis))]
@@ -51,6 +52,7 @@ class EarthRateTilt(_OncePerTurn):
     aliases = ("magnetic_sensitivity", "table_tilt")
     mark = "earth"
     experiment = "turn the table's base by 90 deg: what comes from north stays with north"
+    draws = ("angle",)
 
 
 class MagneticSensitivity(_OncePerTurn):
@@ -64,6 +66,7 @@ class MagneticSensitivity(_OncePerTurn):
     aliases = ("earth_rate_tilt", "table_tilt")
     mark = "field"
     experiment = "a coil around the fixture, a shield, or a magnetometer logged"
+    draws = ("angle",)
 
 
 class TableTilt(_OncePerTurn):
@@ -77,6 +80,7 @@ class TableTilt(_OncePerTurn):
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.01), "piezo": (0.0, 0.05)}
     mark = "tilt"
     experiment = "level the table; then repeat with a deliberate tilt of 2 deg"
+    draws = ("angle",)
 
 
 class TableRateRatio(Effect):
@@ -89,6 +93,7 @@ class TableRateRatio(Effect):
     ranges: ClassVar = {"fog": (0.0, 2e-4), "mems": (0.0, 2e-4), "piezo": (0.0, 2e-4)}
     aliases = ("scale_factor",)
     experiment = "count whole turns against an index pulse"
+    draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("table_rate", "1", channels.rate_dps(axis))]
@@ -105,6 +110,7 @@ class TableRateRipple(Effect):
     parameters = (Parameter("per_turn", "1", 1, 200),)
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.01), "piezo": (0.0, 0.01)}
     experiment = "data sets over whole turns that start and stop at the same angle; does the line follow angle or time?"
+    draws = ("angle", "frequency")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         n, rate = int(term.parameters.get("per_turn", 4)), channels.rate_dps(axis)
@@ -124,6 +130,7 @@ class MissedSteps(Effect):
     parameters = (Parameter("stall_dps", "deg/s", 20.0, 400.0),)
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
     experiment = "count index pulses"
+    draws = ("table_rate_dps", "worst")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         rate, stall = channels.rate_dps(axis), term.parameters.get("stall_dps", 100.0)

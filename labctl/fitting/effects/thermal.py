@@ -23,6 +23,7 @@ class TemperatureRate(Effect):
     parameters = (Parameter("of_gradient", "1", 0, 1), Parameter("over_s", "s", 40.0, 600.0, logarithmic=True))
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.5)}
     experiment = "two ramp speeds at one constant rate; measure during and after the soak"
+    draws = ("legs", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Against the change of the gyro's thermometer, or (of_gradient) the air's lead over it."""
@@ -51,6 +52,7 @@ class ThermalLag(Effect):
     parameters = (Parameter("tau_s", "s", 60.0, 3600.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.1), "piezo": (0.0, 0.6)}
     experiment = "two ramp speeds: an error by lag grows with the speed, one by hysteresis does not"
+    draws = ("legs", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("thermal_lag", "deg/s/K", channels.past.lag_k(channels, term.parameters.get("tau_s", 600.0)))]
@@ -72,6 +74,7 @@ class ThermalHysteresis(Effect):
     parameters = (Parameter("width_k", "K", 1.0, 15.0, logarithmic=True), Parameter("bowed", "1", 0, 1))
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.2), "piezo": (0.0, 0.2)}
     experiment = "temperatures on the way up and on the way down, then a smaller loop"
+    draws = ("legs", "temperature_c")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         leg = channels.past.leg(channels, term.parameters.get("width_k", 3.0))
@@ -99,6 +102,7 @@ class WarmUp(Effect):
     parameters = (Parameter("tau_s", "s", 100.0, 7200.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.1), "mems": (0.0, 0.5), "piezo": (0.0, 2.0)}
     experiment = "a power cycle at constant temperature, and a wait of five time constants"
+    draws = ("power_s", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         on_s = np.asarray(channels["power_s"], dtype=np.float64)
@@ -120,6 +124,7 @@ class SelfHeating(Effect):
     parameters = (Parameter("tau_s", "s", 300.0, 3600.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.5), "piezo": (0.0, 5.0)}
     experiment = "compare the gyro's thermometer with the chamber's at rest, long after power-on"
+    draws = ("power_s", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """What is not yet there of the heating, times the rate: its part at rest is the warm-up's."""
@@ -144,6 +149,7 @@ class ThermometerError(Effect):
     rows: ClassVar[Rows] = "all"
     ranges: ClassVar = {"fog": (-2.0, 2.0), "mems": (-2.0, 2.0), "piezo": (-2.0, 2.0)}
     experiment = "calibrate and use with the same thermometer; try a ramp that was not calibrated"
+    draws = ("temperature_c", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """A bend of the temperature scale across the range, in the bias and in the scale factor."""

@@ -1,0 +1,21 @@
+"""Arrays as plain numbers of a few digits: what leaves as JSON."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+DIGITS = 5
+
+
+def plain(value: float | np.floating) -> float | None:
+    """Return a number rounded to a few significant digits; None where it is not finite."""
+    number = float(value)
+    return float(f"{number:.{DIGITS}g}") if math.isfinite(number) else None
+
+
+def plain_list(values: ArrayLike) -> list[float | None]:
+    """Return numbers (n,) rounded to a few significant digits; None where one is not finite."""
+    return [plain(value) for value in np.asarray(values, dtype=np.float64).tolist()]
