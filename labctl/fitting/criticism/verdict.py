@@ -37,6 +37,8 @@ SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
 NEXT_SHARE = 0.04
 #: An effect that takes off less than this share of the excess chi2 is not named alone at the first step.
 LEAST_SHARE = 0.3
+#: Columns that are the same up to rounding have the same evidence within this.
+SAME = 0.02
 #: At most this many effects beside exact aliases in an ambiguous answer.
 MOST = 4
 
@@ -97,7 +99,7 @@ def alias_group(weighed: Weighed, leader: Candidate) -> tuple[str, ...]:
         close = rival.log_bf > leader.log_bf - LEAD
         if close or (rival.log_bf > 0 and _is_untold(weighed, leader, rival)):
             near.append(rival)
-    exact = [r for r in near if abs(r.log_bf - leader.log_bf) < 1e-6]
+    exact = [r for r in near if abs(r.log_bf - leader.log_bf) < SAME]
     others = [r for r in near if r not in exact][:MOST]
     return (leader.id, *(r.id for r in exact), *(r.id for r in others))
 
