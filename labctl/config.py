@@ -6,6 +6,22 @@ import os
 from pathlib import Path
 
 DATABASE_VARIABLE = "LABCTL_DATABASE"
+KEY_VARIABLE = "LABCTL_KEY"
+
+
+def key() -> str | None:
+    """Return the API key to show to a service, where the environment has one."""
+    return os.environ.get(KEY_VARIABLE) or None
+
+
+def os_user() -> str:
+    """Return the operating system's name of who runs this process."""
+    import pwd  # noqa: PLC0415
+
+    try:
+        return pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return f"uid {os.getuid()}"
 
 
 def default_database() -> str:

@@ -10,7 +10,11 @@ LabctlError              exit 2, HTTP 400
 │   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
 ├── Conflict             somebody else holds it, or it is already so               HTTP 409
-└── StoreError           the database cannot be used: newer, damaged, locked, full     HTTP 503
+├── NotAllowed           the key's role may not do this, or the request came a way it may not    HTTP 403
+│   └── NotIdentified    no key was given, or it is not one in force                             HTTP 401
+├── TooLarge             a request carries more than this service takes              HTTP 413
+└── StoreError           the database cannot be used: newer, damaged, locked         HTTP 503
+    └── DiskFull         nothing of the act was kept                                 HTTP 507
 """
 
 from __future__ import annotations
@@ -87,3 +91,31 @@ class StoreError(LabctlError):
 
     status = 503
     slug = "store"
+
+
+class DiskFull(StoreError):
+    """The disk is full; nothing of the act was kept."""
+
+    status = 507
+    slug = "disk-full"
+
+
+class NotAllowed(LabctlError):
+    """No key, a wrong one, or one whose role may not do this."""
+
+    status = 403
+    slug = "not-allowed"
+
+
+class NotIdentified(NotAllowed):
+    """No key was given, or it is not one in force."""
+
+    status = 401
+    slug = "not-identified"
+
+
+class TooLarge(LabctlError):
+    """A request carries more than this service takes."""
+
+    status = 413
+    slug = "too-large"

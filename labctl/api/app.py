@@ -8,7 +8,8 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 
-from labctl.api import calibrations, campaigns, health, problems, recordings, units
+from labctl.api import calibrations, campaigns, health, keys, problems, recordings, units, watchdog
+from labctl.api.door import Access, Door
 from labctl.services.house import House
 
 DESCRIPTION = """
@@ -20,23 +21,39 @@ Calibrations of gyroscopes by serial number, the campaigns that measured them, a
 * `POST /api/campaigns` runs a recipe on this service's bench; `GET /api/campaigns/{id}/events` follows it.
 
 Rates are deg/s, temperatures deg C, times s, instants UTC. Errors are problem documents (RFC 9457).
+Where keys are asked for, they travel as `Authorization: Bearer`: reading asks for a viewer's, acting for an operator's,
+certifying and keys for an approver's.
 """
 
 
-def create_app(house: House) -> FastAPI:
+#: The parser's own bound on parts of a form: a recording has at most three files.
+MOST_FILES = 4
+
+
+def create_app(house: House, access: Access | None = None) -> FastAPI:
     """Make the HTTP application of a house; closing the application closes the house, bench left safe."""
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         house.start()
+        watchdog.ready()
         try:
             yield
         finally:
+            watchdog.stopping()
             house.close()
 
-    app = FastAPI(title="labctl", version=version("labctl"), description=DESCRIPTION, lifespan=lifespan)
+    app = FastAPI(
+        title="labctl",
+        version=version("labctl"),
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        form_limits={"max_files": MOST_FILES, "max_fields": MOST_FILES},
+    )
     app.state.house = house
     problems.install(app)
-    for router in (health.router, units.router, calibrations.router, campaigns.router, recordings.router):
-        app.include_router(router)
+    rooms = (health, units, calibrations, campaigns, recordings, keys)
+    for room in rooms:
+        app.include_router(room.router)
+    app.add_middleware(Door, house=house, access=access or Access())
     return app

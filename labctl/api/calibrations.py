@@ -6,7 +6,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
 
+from labctl.api.door import NEEDS_APPROVER
 from labctl.api.rooms import HouseOf
+from labctl.fitting.effects import read_formula
 from labctl.services import calibrations as services
 from labctl.services import criticism as criticism_services
 from labctl.services.acts import CertifyRequest, FitRequest, ImproveRequest
@@ -16,6 +18,7 @@ from labctl.services.uncertainty import UncertaintyAnswer, uncertainty_at
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 
 
+@router.head("/calibration", include_in_schema=False)
 @router.get("/calibration", summary="The calibration to use", response_class=Response)
 async def calibration(
     serial: str,
@@ -35,6 +38,7 @@ async def calibration(
     return Response(file.content, media_type=file.media_type, headers=headers)
 
 
+@router.head("/calibrations", include_in_schema=False)
 @router.get("/calibrations", summary="All versions")
 def calibrations(serial: str, house: HouseOf) -> list[CalibrationRow]:
     """Every version of the unit, newest first, with its error figures."""
@@ -62,7 +66,8 @@ def criticism(
     formula: Annotated[list[str] | None, Query(description="Effects of your own that compete: 'name: expr'.")] = None,
 ) -> CriticismAnswer:
     """What the model leaves, where, which effect may be missing, and what this recording cannot say."""
-    return criticism_services.criticise_unit(house.store, serial, version, recording, formula or [])
+    competing = [read_formula(line) for line in formula or []]
+    return criticism_services.criticise_unit(house.store, serial, version, recording, competing)
 
 
 @router.get("/calibrations/{version}/uncertainty", summary="How far a corrected rate may be off")
@@ -77,19 +82,23 @@ def uncertainty(
     return uncertainty_at(house.store, serial, version, rate_dps, temperature_c)
 
 
+@router.head("/ladder", include_in_schema=False)
 @router.get("/ladder", summary="The error, version by version")
 def ladder(serial: str, house: HouseOf) -> LadderAnswer:
     """Every version's errors, oldest first, down to the noise floor."""
     return criticism_services.ladder(house.store, serial)
 
 
-@router.post("/calibrations/{version}/certify", summary="Make a version current")
+@router.post("/calibrations/{version}/certify", summary="Make a version current", dependencies=[NEEDS_APPROVER])
 def certify(serial: str, version: int, request: CertifyRequest, house: HouseOf) -> Certified:
-    """Make a version the one in force: who, why, and when it is due again. An older version again is a rollback."""
+    """Make a version the one in force: who, why, and when it is due again. An older version again is a rollback.
+
+    Asks for an approver.
+    """
     return house.acts().certify(serial, version, request)
 
 
-@router.post("/calibrations/{version}/revoke", summary="Take a version out of force")
+@router.post("/calibrations/{version}/revoke", summary="Take a version out of force", dependencies=[NEEDS_APPROVER])
 def revoke(serial: str, version: int, request: CertifyRequest, house: HouseOf) -> Certified:
-    """Take the version out of force; the unit then has no certified calibration."""
+    """Take the version out of force; the unit then has no certified calibration. Asks for an approver."""
     return house.acts().revoke(serial, version, request)

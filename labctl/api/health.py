@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from fastapi.responses import PlainTextResponse
 
 from labctl.api.rooms import HouseOf
@@ -13,9 +13,9 @@ router = APIRouter(tags=["service"])
 
 
 @router.get("/health", summary="Is the service well?")
-def health(house: HouseOf) -> dict[str, Any]:
-    """Whether the database answers, which versions run, and what the bench is doing."""
-    return house.health()
+def health(house: HouseOf, request: Request) -> dict[str, Any]:
+    """Whether the service answers and in which version; to those who may read, also the database and the bench."""
+    return house.health() if request.state.caller is not None else house.pulse()
 
 
 @router.get("/metrics", summary="Figures for a monitor", response_class=PlainTextResponse)

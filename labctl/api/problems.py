@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import errno
+from collections.abc import Callable, Mapping
+from typing import Any
+
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from instruments.errors import InstrumentError
-from labctl.errors import LabctlError
+from labctl.errors import DiskFull, LabctlError, NotIdentified, TooLarge
 from procedures.errors import PlanRefused, ProcedureError
 
 TYPE_PREFIX = "urn:labctl:problem:"
@@ -20,38 +24,76 @@ def problem(status: int, slug: str, title: str, detail: str, instance: str) -> J
     return JSONResponse(body, status_code=status, media_type="application/problem+json")
 
 
+def as_problem(error: LabctlError, path: str) -> JSONResponse:
+    """Make the problem document of an error of the house."""
+    answer = problem(error.status, error.slug, _title(type(error)), str(error), path)
+    if isinstance(error, NotIdentified):
+        answer.headers["WWW-Authenticate"] = 'Bearer realm="labctl"'
+    return answer
+
+
 def _title(error: type[Exception]) -> str:
     return (error.__doc__ or error.__name__).split(";")[0].split(".")[0]
 
 
+def _of_the_house(request: Request, error: LabctlError) -> JSONResponse:
+    return as_problem(error, request.url.path)
+
+
+def _of_an_instrument(request: Request, error: InstrumentError) -> JSONResponse:
+    return problem(502, "instrument", _title(type(error)), str(error), request.url.path)
+
+
+def _of_a_procedure(request: Request, error: ProcedureError) -> JSONResponse:
+    slug = "plan-refused" if isinstance(error, PlanRefused) else "recipe"
+    return problem(400, slug, _title(type(error)), str(error), request.url.path)
+
+
+def _of_the_request(request: Request, error: RequestValidationError) -> JSONResponse:
+    places = "; ".join(f"{'.'.join(str(p) for p in e['loc'])}: {e['msg']}" for e in error.errors())
+    return problem(422, "bad-request", "The request does not fit its description", places, request.url.path)
+
+
+def _of_a_number(request: Request, error: OverflowError) -> JSONResponse:
+    text = f"a number is larger than anything here can be ({error})"
+    return problem(400, "bad-input", "A number is too large", text, request.url.path)
+
+
+def _of_a_text(request: Request, error: UnicodeEncodeError) -> JSONResponse:
+    text = f"a text holds half a character at place {error.start}; send whole Unicode"
+    return problem(400, "bad-input", "A text is not whole", text, request.url.path)
+
+
+def _of_the_system(request: Request, error: OSError) -> JSONResponse:
+    if error.errno not in {errno.ENOSPC, errno.EDQUOT}:
+        raise error
+    text = "the disk is full; nothing of this act was kept. Make room, then send it again"
+    return as_problem(DiskFull(text), request.url.path)
+
+
+def _of_http(request: Request, error: HTTPException) -> JSONResponse:
+    text = str(error.detail)
+    too_many = error.status_code == 400 and text.startswith("Too many")  # parts of a form: the parser's own bound
+    if error.status_code == TooLarge.status or too_many:
+        return as_problem(TooLarge(text), request.url.path)
+    answer = problem(error.status_code, f"http-{error.status_code}", text, text, request.url.path)
+    answer.headers.update(error.headers or {})
+    return answer
+
+
+HANDLERS: Mapping[type[Exception], Callable[[Request, Any], JSONResponse]] = {
+    LabctlError: _of_the_house,
+    InstrumentError: _of_an_instrument,
+    ProcedureError: _of_a_procedure,
+    RequestValidationError: _of_the_request,
+    OverflowError: _of_a_number,
+    UnicodeEncodeError: _of_a_text,
+    OSError: _of_the_system,
+    HTTPException: _of_http,
+}
+
+
 def install(app: FastAPI) -> None:
     """Make every error of the house, and of the framework, leave as a problem document."""
-
-    @app.exception_handler(LabctlError)
-    def of_the_house(request: Request, error: LabctlError) -> JSONResponse:
-        return problem(error.status, error.slug, _title(type(error)), str(error), request.url.path)
-
-    @app.exception_handler(InstrumentError)
-    def of_an_instrument(request: Request, error: InstrumentError) -> JSONResponse:
-        return problem(502, "instrument", _title(type(error)), str(error), request.url.path)
-
-    @app.exception_handler(ProcedureError)
-    def of_a_procedure(request: Request, error: ProcedureError) -> JSONResponse:
-        slug = "plan-refused" if isinstance(error, PlanRefused) else "recipe"
-        return problem(400, slug, _title(type(error)), str(error), request.url.path)
-
-    @app.exception_handler(RequestValidationError)
-    def of_the_request(request: Request, error: RequestValidationError) -> JSONResponse:
-        places = "; ".join(f"{'.'.join(str(p) for p in e['loc'])}: {e['msg']}" for e in error.errors())
-        return problem(422, "bad-request", "The request does not fit its description", places, request.url.path)
-
-    @app.exception_handler(OverflowError)
-    def of_a_number(request: Request, error: OverflowError) -> JSONResponse:
-        text = f"a number is larger than anything here can be ({error})"
-        return problem(400, "bad-input", "A number is too large", text, request.url.path)
-
-    @app.exception_handler(HTTPException)
-    def of_http(request: Request, error: HTTPException) -> JSONResponse:
-        return problem(
-            error.status_code, f"http-{error.status_code}", str(error.detail), str(error.detail), request.url.path
-        )
+    for error, handler in HANDLERS.items():
+        app.add_exception_handler(error, handler)

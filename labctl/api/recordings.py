@@ -17,7 +17,7 @@ router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 def import_recording(files: list[UploadFile], house: HouseOf) -> Imported:
     """Take in a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
     environment file, as parts of one multipart form. All of it or nothing; an error names file, column and row."""
-    return services.import_files(house.acts(), {file.filename or "": file.file for file in files})
+    return services.import_files(house.acts(), [(file.filename or "", file.file) for file in files])
 
 
 @router.get("/{recording}", summary="One recording")

@@ -12,11 +12,14 @@ from dataclasses import dataclass
 import uvicorn
 
 from instruments.clock import Clock, SystemClock
+from labctl.api import watchdog
 from labctl.api.app import create_app
+from labctl.api.door import LOOPBACK_NAMES, MIB, Access
 from labctl.config import default_database
 from labctl.errors import BadInput
 from labctl.services.bench_runner import BenchRunner
 from labctl.services.house import House
+from labctl.services.keys import refuse_open_doors
 from labctl.services.planning import load_bench
 from labctl.services.running import clock_for
 from labctl.store import Store
@@ -35,6 +38,8 @@ class ServeRequest:
     host: str = "127.0.0.1"
     port: int = 8420
     database: str | None = None
+    require_keys: bool = False
+    max_upload_mib: int = 2048
 
 
 def open_house(request: ServeRequest, url: str | None) -> House:
@@ -58,23 +63,33 @@ def open_house(request: ServeRequest, url: str | None) -> House:
 
 
 def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> None:
-    """Serve until interrupted. Raises BadInput for an address other than loopback, Conflict, BadBench."""
-    if not _is_loopback(request.host):
-        raise BadInput(
-            f"--host {request.host}: labctl listens on loopback only (127.0.0.1), it has no keys to give out yet; "
-            "put a reverse proxy with authentication in front of it"
-        )
+    """Serve until interrupted.
+
+    Raises BadInput for an address that others can reach while there is no key to ask them for, Conflict, BadBench.
+    """
     if not 0 <= request.speed < float("inf"):
         raise BadInput(f"--speed {request.speed}: a positive number, or 0 for as fast as it can")
-    with socket.socket() as listener:
+    if not 1 <= request.max_upload_mib <= 1 << 20:
+        raise BadInput(f"--max-upload-mib {request.max_upload_mib}: 1 to {1 << 20}")
+    with socket.socket(socket.AF_INET6 if ":" in request.host else socket.AF_INET) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((request.host, request.port))
         except OSError as error:
             raise BadInput(f"--port {request.port} on {request.host}: {error.strerror}; name another, or 0") from error
-        url = f"http://{request.host}:{listener.getsockname()[1]}"
+        at = f"[{request.host}]" if ":" in request.host else request.host
+        url = f"http://{at}:{listener.getsockname()[1]}"
         house = open_house(request, url)
-        server = uvicorn.Server(uvicorn.Config(create_app(house), log_level="warning", lifespan="on"))
+        try:
+            app = create_app(house, access_for(request, house, at))
+        except BaseException:
+            house.close()
+            raise
+        settings = uvicorn.Config(
+            app, log_level="warning", lifespan="on", callback_notify=watchdog.alive, timeout_notify=watchdog.period_s(),
+            proxy_headers=False,
+        )  # fmt: skip
+        server = uvicorn.Server(settings)
         listener.listen(server.config.backlog)  # whoever reads the address may connect at once
         ready(url)
         signal.signal(
@@ -82,6 +97,15 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> None:
         )  # a lost terminal ends it in order
         with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how it is stopped
             server.run(sockets=[listener])
+
+
+def access_for(request: ServeRequest, house: House, at: str) -> Access:
+    """Return who may come in: on loopback this machine's users, elsewhere whoever shows a key. Raises BadInput."""
+    upload = request.max_upload_mib * MIB
+    if _is_loopback(request.host) and not request.require_keys:
+        return Access(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload)
+    refuse_open_doors(house.store, request.host)
+    return Access(keys=True, upload_bytes=upload)
 
 
 def _is_loopback(host: str) -> bool:

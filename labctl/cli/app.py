@@ -8,7 +8,9 @@ from typing import Annotated
 
 import typer
 
-from labctl.cli import bench, calibrations, campaign, criticism, recordings, serving
+from labctl.actor import Actor, acting
+from labctl.cli import bench, calibrations, campaign, criticism, keeping, recordings, serving
+from labctl.config import os_user
 
 app = typer.Typer(
     name="labctl",
@@ -21,6 +23,8 @@ app = typer.Typer(
 app.add_typer(bench.app, name="bench")
 app.add_typer(campaign.app, name="campaign")
 app.add_typer(recordings.export_app, name="export")
+app.add_typer(keeping.key_app, name="key")
+app.add_typer(keeping.audit_app, name="audit")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": serving.demo,
     "serve": serving.serve,
@@ -36,6 +40,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "revoke": calibrations.revoke,
     "calibration": calibrations.calibration,
     "compensate": calibrations.compensate,
+    "backup": keeping.backup,
+    "check": keeping.check,
 }
 for name, command in COMMANDS.items():
     app.command(name)(command)
@@ -49,12 +55,14 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def everywhere(
+    context: typer.Context,
     show: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
-    """Take the options that need no command."""
+    """Take the options that need no command; whatever is done is done in the name of who typed it."""
     del show
+    context.with_resource(acting(Actor(os_user(), "command line")))
 
 
 def main() -> None:

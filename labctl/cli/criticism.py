@@ -39,11 +39,11 @@ def criticise(
     database: Database = None,
 ) -> None:
     """Hold a version against a recording: what is left, where, and which effect may be missing."""
-    from labctl.services.criticism import criticise_unit, write_next
+    from labctl.services.criticism import criticise_unit, with_files, write_next
     from labctl.services.opening import open_reading
 
     with one_clear_line(), open_reading(database) as store:
-        answer = criticise_unit(store, serial, version, recording, formula or [])
+        answer = criticise_unit(store, serial, version, recording, with_files(formula or []))
         if next_recipe is not None:
             write_next(answer, next_recipe)
         if report is not None:

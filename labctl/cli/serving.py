@@ -18,6 +18,12 @@ def serve(
     speed: Annotated[float, typer.Option("--speed", metavar="X", help="Simulated bench, X times as fast.")] = 1.0,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", metavar="N", help="Port; 0 takes a free one.")] = 8420,
+    require_keys: Annotated[
+        bool, typer.Option("--require-keys", help="Ask for a key on loopback too; elsewhere one is always asked for.")
+    ] = False,
+    max_upload_mib: Annotated[
+        int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
+    ] = 2048,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -31,9 +37,11 @@ def serve(
             console.print(f"labctl listens on {url}  (API text: {url}/docs)", markup=False)
 
     with one_clear_line():
-        serve_forever(
-            ServeRequest(bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database), ready
-        )
+        request = ServeRequest(
+            bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
+            require_keys=require_keys, max_upload_mib=max_upload_mib,
+        )  # fmt: skip
+        serve_forever(request, ready)
 
 
 def simulator(

@@ -6,11 +6,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
+from procedures.errors import RecipeError
+from procedures.recipe import shipped_recipes
+
+if TYPE_CHECKING:
+    from labctl.services.keys import KeyAnswer, KeyRequest, NewKeyAnswer
 
 
 class Request(BaseModel):
@@ -54,11 +59,27 @@ class CampaignRequest(Request):
     recipe: str = Field(description="Name of a shipped recipe, or the recipe itself as TOML text.")
     clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
 
+    @field_validator("recipe")
+    @classmethod
+    def never_a_path(cls, recipe: str) -> str:
+        """Refuse what would be looked for as a file: a request names a shipped recipe or brings its own text."""
+        if "\n" in recipe or recipe in shipped_recipes():
+            return recipe
+        raise RecipeError(f"no recipe {recipe!r}: send its text, or one of {', '.join(shipped_recipes())}")
+
 
 class ReasonRequest(Request):
-    """Why something is done to a campaign."""
+    """Why something is done to a campaign, or to a key."""
 
     reason: str = Field(min_length=1)
+
+
+class BackupNote(Request):
+    """A backup that was made, for the audit trail; nothing is opened by this name."""
+
+    file: str = Field(min_length=1, max_length=255)
+    bytes: int = Field(ge=0)
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
 
 
 class Acts(Protocol):
@@ -86,4 +107,16 @@ class Acts(Protocol):
 
     def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
         """End a campaign now, in the safe state."""
+        ...
+
+    def create_key(self, request: KeyRequest) -> NewKeyAnswer:
+        """Make an API key; the answer is the only place where it is shown."""
+        ...
+
+    def revoke_key(self, name: str, reason: str) -> KeyAnswer:
+        """Take a key's power away."""
+        ...
+
+    def note_backup(self, note: BackupNote) -> None:
+        """Write down that a backup was made."""
         ...

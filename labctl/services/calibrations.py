@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Literal
 
+from labctl.actor import actor
 from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
@@ -105,5 +106,9 @@ def certify(
     """Put a version in force, or take it out of force. Raises NotFound, Conflict."""
     store.units.get(serial)
     due = at + timedelta(days=request.due_days) if request.due_days and act == "certify" else None
-    row = store.calibrations.certify(serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due)
+    door = actor()
+    row = store.calibrations.certify(
+        serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due,
+        who=door.name if door.via == "key" else request.by,
+    )  # fmt: skip
     return Certified(serial=serial, version=version, act=act, by=row.by, reason=row.reason, at=at, due=due)

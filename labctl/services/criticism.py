@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -17,7 +17,7 @@ from labctl.fitting import FitResult
 from labctl.fitting.context import context_of
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.compress import thin
-from labctl.fitting.effects import CATALOGUE, Effect, Formula, Term, formulas, kind_of, parse_term
+from labctl.fitting.effects import CATALOGUE, Effect, Formula, Term, formulas, kind_of, parse_term, read_formula
 from labctl.fitting.fit import fit_context
 from labctl.fitting.model import ErrorModel
 from labctl.fitting.presets import changed
@@ -33,12 +33,12 @@ ERRORS = ("raw_rms_dps", "rms_dps", "heldout_rms_dps", "noise_floor_dps")
 
 
 def criticise_unit(
-    store: Store, serial: str, version: int | None, recording: int | None, formula: list[str]
+    store: Store, serial: str, version: int | None, recording: int | None, competing: Sequence[Formula] = ()
 ) -> CriticismAnswer:
     """Hold a version (default: the newest) against a recording (default: the newest). Raises NotFound, BadInput."""
     row = _version(store, serial, version)
     number = newest_recording(store, serial, recording)
-    found = _criticise(store, number, model_of(row), _catalogue(formula))
+    found = _criticise(store, number, model_of(row), _catalogue(competing))
     return answer_of(serial, row.version, number, found, experiments_for(store, number, found))
 
 
@@ -68,7 +68,7 @@ def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetim
     for effect_id in request.remove:
         if effect_id not in model.effect_ids:
             raise BadInput(f"effect {effect_id!r} is not in version {row.version} ({', '.join(model.effect_ids)})")
-    written = [formula for source in request.formula for formula in formulas(source)]
+    written = [read_formula(line) for line in request.formula]
     wanted = [*(parse_term(text) for text in request.add), *(Term(f.id, formula=f.text) for f in written)]
     if not wanted and not request.remove:
         raise BadInput("say what to change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
@@ -161,17 +161,21 @@ def _version(store: Store, serial: str, version: int | None) -> CalibrationRecor
     return store.calibrations.get(serial, version)
 
 
-def _catalogue(sources: list[str]) -> dict[str, Effect]:
-    written: list[Formula] = [formula for source in sources for formula in formulas(source)]
-    for formula in written:
-        if formula.id in CATALOGUE:
-            raise BadInput(f"formula {formula.id!r}: the catalogue has an effect of that name; choose another")
-    return {**CATALOGUE, **{formula.id: formula for formula in written}}
+def _catalogue(written: Sequence[Formula]) -> dict[str, Effect]:
+    for each in written:
+        if each.id in CATALOGUE:
+            raise BadInput(f"formula {each.id!r}: the catalogue has an effect of that name; choose another")
+    return {**CATALOGUE, **{each.id: each for each in written}}
+
+
+def with_files(sources: list[str]) -> list[Formula]:
+    """Return formulas from lines `name: expression` and from files of this machine; raises BadInput."""
+    return [each for source in sources for each in formulas(source)]
 
 
 def as_lines(sources: list[str]) -> list[str]:
     """Return formulas as lines `name: expression`, with those of files read here; raises BadInput."""
-    return [f"{formula.id}: {formula.text}" for source in sources for formula in formulas(source)]
+    return [f"{each.id}: {each.text}" for each in with_files(sources)]
 
 
 def write_next(answer: CriticismAnswer, path: Path) -> None:

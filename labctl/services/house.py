@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from instruments.clock import Clock
+from labctl.actor import ITSELF, acting
 from labctl.errors import Conflict
 from labctl.services.answers import CampaignAnswer, EventAnswer
 from labctl.services.bench_runner import BenchRunner
@@ -29,6 +31,7 @@ class ServiceActs(LocalActs):
     def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
         """End a campaign now, in the safe state."""
         if self._runner is not None and self._runner.runs(campaign):
+            self._note_campaign("abort", campaign, reason)
             return self._runner.abort(campaign, reason)
         return super().abort_campaign(campaign, reason)
 
@@ -44,8 +47,9 @@ class House:
 
     def start(self) -> None:
         """Make the house ready: campaigns that an earlier process left are marked as such."""
-        for row in self.store.campaigns.unfinished():
-            self.store.campaigns.close_unfinished(row.id, "the process that ran it ended", self.clock.utc())
+        with acting(ITSELF):  # nobody asked for it
+            for row in self.store.campaigns.unfinished():
+                self.store.campaigns.close_unfinished(row.id, "the process that ran it ended", self.clock.utc())
 
     def close(self) -> None:
         """End what runs, leave the bench safe, close the store."""
@@ -99,12 +103,15 @@ class House:
             if stop is not None:
                 stop()
 
+    def pulse(self) -> dict[str, Any]:
+        """Return what anybody may know: that the service lives, and which."""
+        return {"status": "ok", "version": version("labctl")}
+
     def health(self) -> dict[str, Any]:
         """Return whether the service is well."""
         return {
-            "status": "ok",
-            "version": version("labctl"),
-            "database": self.store.location,
+            **self.pulse(),
+            "database": Path(self.store.location).name,  # a folder, or a password in a URL, is nobody's business here
             "since": self._opened_at.isoformat(),
             "bench": self._runner.describe() if self._runner is not None else None,
         }

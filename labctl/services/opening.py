@@ -9,8 +9,8 @@ from pathlib import Path
 from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
-from labctl.services import calibrations, criticism, recordings
-from labctl.services.acts import Acts, CertifyRequest, FitRequest, ImproveRequest
+from labctl.services import calibrations, criticism, keys, recordings
+from labctl.services.acts import Acts, BackupNote, CertifyRequest, FitRequest, ImproveRequest
 from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
 from labctl.services.campaigns import campaign_status
 from labctl.store import Store, holder_of, open_store
@@ -48,8 +48,26 @@ class LocalActs:
         answer = campaign_status(self._store, campaign)
         if answer.state in {"done", "aborted", "failed"}:
             raise Conflict(f"campaign {campaign} is over already: {answer.state}")
+        self._note_campaign("abort", campaign, reason)
         self._store.campaigns.close_unfinished(campaign, f"left unfinished; {reason}", self._clock.utc())
         return campaign_status(self._store, campaign)
+
+    def _note_campaign(self, act: str, campaign: int, reason: str) -> None:
+        """Write down what a person did to a campaign, before it shows."""
+        self._store.audit.record(self._clock.utc(), f"campaign {act}", f"campaign {campaign}", {"reason": reason})
+
+    def create_key(self, request: keys.KeyRequest) -> keys.NewKeyAnswer:
+        """Make an API key."""
+        return keys.create_key(self._store, request, self._clock.utc())
+
+    def revoke_key(self, name: str, reason: str) -> keys.KeyAnswer:
+        """Take a key's power away."""
+        return keys.revoke_key(self._store, name, reason, self._clock.utc())
+
+    def note_backup(self, note: BackupNote) -> None:
+        """Write down that a backup was made."""
+        detail = {"bytes": note.bytes, "sha256": note.sha256}
+        self._store.audit.record(self._clock.utc(), "backup", note.file, detail)
 
 
 def service_url(database: str | None) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Literal
@@ -46,13 +46,16 @@ def suggested_model(info: RecordingInfo) -> str:
     return "yang2018" if len(info.axes) > 1 else "ojeda2000"
 
 
-def import_files(acts: Acts, files: Mapping[str, BinaryIO]) -> Imported:
+def import_files(acts: Acts, files: Sequence[tuple[str, BinaryIO]]) -> Imported:
     """Take in a recording from uploaded files; their names may only be the format's. Raises BadRecording."""
-    for name in files:
+    names = [name for name, _ in files]
+    for name in names:
         if name not in FILE_NAMES:
             raise BadRecording(f"file {name!r} is not part of a recording (expected {', '.join(sorted(FILE_NAMES))})")
+        if names.count(name) > 1:
+            raise BadRecording(f"file {name!r} came more than once")
     with tempfile.TemporaryDirectory(prefix="labctl-import-") as folder:
-        for name, content in files.items():
+        for name, content in files:
             with (Path(folder) / name).open("wb") as target:
                 shutil.copyfileobj(content, target)
         try:

@@ -5,17 +5,22 @@ from __future__ import annotations
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import httpx
 
+from labctl.config import KEY_VARIABLE, key, os_user
 from labctl.errors import Conflict, LabctlError, NotCertified, StoreError
-from labctl.services.acts import CertifyRequest, FitRequest, ImproveRequest
+from labctl.services.acts import BackupNote, CertifyRequest, FitRequest, ImproveRequest
 from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.keys import KeyAnswer, KeyRequest, NewKeyAnswer
 from labctl.services.planning import load_recipe
 from labctl.services.recordings import FILE_NAMES
 from labctl.services.running import StartRequest
 
 TIMEOUT_S = 300.0
+#: By which a command without a key says who runs it.
+USER_HEADER = "Labctl-User"
 
 
 class ServiceRefused(LabctlError):
@@ -26,7 +31,10 @@ class RemoteActs:
     """Every act as a request to a service."""
 
     def __init__(self, url: str) -> None:
-        self._client = httpx.Client(base_url=url, timeout=TIMEOUT_S)
+        shown = key()
+        # without a key, the name only says who claims to ask; a service that wants a key does not read it
+        identity = {"Authorization": f"Bearer {shown}"} if shown else {USER_HEADER: quote(os_user())}
+        self._client = httpx.Client(base_url=url, timeout=TIMEOUT_S, headers=identity)
 
     def _post(self, path: str, **content: Any) -> Any:
         try:
@@ -38,7 +46,8 @@ class RemoteActs:
             ) from error
         body = response.json()
         if response.is_error:
-            refused = ServiceRefused(body.get("detail", response.text))
+            hint = f" (the command line sends the key in ${KEY_VARIABLE})" if response.status_code == 401 else ""
+            refused = ServiceRefused(body.get("detail", response.text) + hint)
             refused.exit_status = NotCertified.exit_status if body.get("type", "").endswith(NotCertified.slug) else 2
             raise refused
         return body
@@ -54,16 +63,18 @@ class RemoteActs:
 
     def fit(self, serial: str, request: FitRequest) -> FitAnswer:
         """Ask for a fit."""
-        return FitAnswer.model_validate(self._post(f"/api/units/{serial}/calibrations", json=request.model_dump()))
+        return FitAnswer.model_validate(
+            self._post(f"/api/units/{quote(serial, safe='')}/calibrations", json=request.model_dump())
+        )
 
     def improve(self, serial: str, request: ImproveRequest) -> FitAnswer:
         """Ask for a changed model."""
         version = request.version or self._newest(serial)
-        path = f"/api/units/{serial}/calibrations/{version}/improve"
+        path = f"/api/units/{quote(serial, safe='')}/calibrations/{version}/improve"
         return FitAnswer.model_validate(self._post(path, json=request.model_dump(exclude={"version"})))
 
     def _newest(self, serial: str) -> int:
-        rows = self._client.get(f"/api/units/{serial}/calibrations").json()
+        rows = self._client.get(f"/api/units/{quote(serial, safe='')}/calibrations").json()
         return int(rows[0]["version"]) if isinstance(rows, list) and rows else 1
 
     def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:
@@ -75,7 +86,7 @@ class RemoteActs:
         return self._certification(serial, version, "revoke", request)
 
     def _certification(self, serial: str, version: int, act: str, request: CertifyRequest) -> Certified:
-        path = f"/api/units/{serial}/calibrations/{version}/{act}"
+        path = f"/api/units/{quote(serial, safe='')}/calibrations/{version}/{act}"
         return Certified.model_validate(self._post(path, json=request.model_dump()))
 
     def start_campaign(self, request: StartRequest) -> CampaignAnswer:
@@ -97,3 +108,16 @@ class RemoteActs:
     def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
         """Ask for the end of a campaign."""
         return CampaignAnswer.model_validate(self._post(f"/api/campaigns/{campaign}/abort", json={"reason": reason}))
+
+    def create_key(self, request: KeyRequest) -> NewKeyAnswer:
+        """Ask for a new key."""
+        return NewKeyAnswer.model_validate(self._post("/api/keys", json=request.model_dump(mode="json")))
+
+    def revoke_key(self, name: str, reason: str) -> KeyAnswer:
+        """Ask for a key's end."""
+        path = f"/api/keys/{quote(name, safe='')}/revoke"
+        return KeyAnswer.model_validate(self._post(path, json={"reason": reason}))
+
+    def note_backup(self, note: BackupNote) -> None:
+        """Ask for a row in the audit trail."""
+        self._post("/api/backups", json=note.model_dump())

@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from labctl.store.audit import first_broken
+from labctl.store.audit import Audit, Broken, Head
+from labctl.store.backup import Copy, copy_database
 from labctl.store.calibrations import Calibrations, NewCalibration
 from labctl.store.campaigns import Campaigns, NewCampaign
+from labctl.store.check import Checked, Finding, Progress, check
 from labctl.store.database import Database, Holder, holder_of, is_url
 from labctl.store.journal import StoreJournal
+from labctl.store.keys import Keys
 from labctl.store.recordings import Recordings
 from labctl.store.records import (
+    AuditRow,
     CalibrationRecord,
     CampaignRow,
     CertificationRow,
     EventRow,
+    KeyRow,
     NewUnit,
     RecordingRow,
     StepRow,
@@ -24,16 +29,26 @@ from labctl.store.records import (
 from labctl.store.units import Units
 
 __all__ = [
+    "Audit",
+    "AuditRow",
+    "Broken",
     "CalibrationRecord",
     "Calibrations",
     "CampaignRow",
     "Campaigns",
     "CertificationRow",
+    "Checked",
+    "Copy",
     "EventRow",
+    "Finding",
+    "Head",
     "Holder",
+    "KeyRow",
+    "Keys",
     "NewCalibration",
     "NewCampaign",
     "NewUnit",
+    "Progress",
     "RecordingRow",
     "Recordings",
     "StepRow",
@@ -41,6 +56,8 @@ __all__ = [
     "StoreJournal",
     "Unit",
     "Units",
+    "check",
+    "copy_database",
     "holder_of",
     "open_store",
 ]
@@ -55,6 +72,8 @@ class Store:
         self.recordings = Recordings(database)
         self.campaigns = Campaigns(database)
         self.calibrations = Calibrations(database)
+        self.audit = Audit(database)
+        self.keys = Keys(database)
 
     @property
     def location(self) -> str:
@@ -69,11 +88,6 @@ class Store:
     def announce(self, url: str) -> None:
         """Say at which address the holder of this database can be asked to write."""
         self._database.announce(url)
-
-    def first_broken_audit_row(self) -> int | None:
-        """Return the first audit row that was changed or follows a missing one; None when the trail is whole."""
-        with self._database.reading() as connection:
-            return first_broken(connection)
 
     def close(self) -> None:
         """Close the database."""

@@ -71,7 +71,9 @@ class Calibrations:
                     answer=new.answer,
                 )
             )
-            append(connection, at, "labctl", "fit", f"{serial} version {version}", {"hash": new.hash})
+            detail = {"model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash}
+            act = "fit" if new.parent is None else "improve"
+            append(connection, at, act, f"{serial} version {version}", detail)
         return CalibrationRecord(
             serial, version, new.parent, new.recording, new.model, at, new.hash, new.document, new.answer
         )
@@ -123,8 +125,12 @@ class Calibrations:
         reason: str,
         at: datetime,
         due_at: datetime | None = None,
+        who: str | None = None,
     ) -> CertificationRow:
-        """Put a version in force, or take the one in force out of it. Raises NotFound, Conflict."""
+        """Put a version in force, or take the one in force out of it. Raises NotFound, Conflict.
+
+        `by` is the person who answers for it; `who` did it, where that is known better than by whose word.
+        """
         self.get(serial, version)
         last = self._last_act(serial)
         in_force = last.version if last is not None and last.act == "certify" else None
@@ -137,7 +143,8 @@ class Calibrations:
                     serial=serial, version=version, act=act, by=by, reason=reason, at=at, due_at=due_at
                 )
             )
-            append(connection, at, by, act, f"{serial} version {version}", {"reason": reason})
+            detail = {"by": by, "reason": reason, "due": due_at.isoformat() if due_at else None}
+            append(connection, at, act, f"{serial} version {version}", detail, who=who or by)
         return row
 
     def document(self, serial: str, version: int | None) -> tuple[bytes, str]:

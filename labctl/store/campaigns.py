@@ -12,6 +12,7 @@ import sqlalchemy as sa
 from labctl.errors import NotFound
 from labctl.recording import RecordingInfo
 from labctl.store import tables
+from labctl.store.audit import append
 from labctl.store.database import Database
 from labctl.store.journal import StoreJournal
 from labctl.store.recordings import new_recording
@@ -71,6 +72,13 @@ class Campaigns:
             for unit in new.units:
                 info = RecordingInfo.model_validate(unit.info)
                 new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
+            what = {
+                "recipe": new.recipe_name,
+                "bench": new.bench_name,
+                "units": [str(unit.info["serial"]) for unit in new.units],
+                "schedule_hash": new.schedule_hash,
+            }
+            append(connection, at, "campaign start", f"campaign {number}", what)
         return number
 
     @staticmethod
@@ -168,3 +176,4 @@ class Campaigns:
                 .where(tables.campaigns.c.id == campaign)
                 .values(state="failed", reason=reason, ended_at=at)
             )
+            append(connection, at, "campaign state", f"campaign {campaign}", {"state": "failed", "reason": reason})

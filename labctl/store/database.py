@@ -20,10 +20,13 @@ from filelock import FileLock, Timeout
 from sqlalchemy.exc import DatabaseError
 from sqlalchemy.pool import StaticPool
 
-from labctl.errors import Conflict, StoreError
+from labctl.errors import Conflict, DiskFull, StoreError
 from labctl.store import migrations
+from labctl.store.seal import count_commit, missing, seal
 
 BUSY_MS = 5000
+#: What SQLite and PostgreSQL call a full disk.
+SQLITE_FULL, POSTGRESQL_DISK_FULL = 13, "53100"
 
 
 @dataclass(frozen=True)
@@ -68,24 +71,32 @@ def _read_note(location: str) -> Holder:
 
 
 class Database:
-    """A migrated database. `write` holds it for this process; without, only `reading` may be used."""
+    """A migrated database. `write` holds it for this process; without, only `reading` may be used.
 
-    def __init__(self, location: str, *, write: bool, url: str | None = None) -> None:
+    `as_it_is` looks at a database without making or migrating it: there may be nothing, or anything.
+    """
+
+    def __init__(self, location: str, *, write: bool, url: str | None = None, as_it_is: bool = False) -> None:
         self.location = location
         self.writes = write
         self._guard = threading.RLock()
         self._lock: FileLock | None = None
         self._sqlite = not is_url(location)
         self._synced = True
-        if self._sqlite:
+        if self._sqlite and not as_it_is:
             Path(location).parent.mkdir(parents=True, exist_ok=True)
         if write:
             self._hold(url)
         elif self._sqlite and not Path(location).exists():
+            if as_it_is:
+                raise StoreError(f"{location}: there is no such file; name the database with --database")
             Database(location, write=True).close()
         try:
+            if write and self._sqlite and not Path(location).exists():
+                self._refuse_loss(None)
             self._engine = self._make_engine(write=write)
-            self._migrate(write=write)
+            if not as_it_is:
+                self._migrate(write=write)
             #: Reading has connections of its own: it neither waits for the writer nor makes it wait.
             self._reader = self._make_engine(write=False) if write and self._sqlite else self._engine
         except BaseException:
@@ -103,7 +114,11 @@ class Database:
             holder = _read_note(self.location)
             where = f"the service at {holder.url}" if holder.url else f"another labctl (process {holder.pid})"
             raise Conflict(f"{self.location}: {where} writes to this database now; wait for it, or ask it") from None
-        self.announce(url)
+        try:
+            self.announce(url)
+        except OSError:
+            self._release()
+            raise
 
     def announce(self, url: str | None) -> None:
         """Say at which address this process can be asked to write."""
@@ -139,6 +154,8 @@ class Database:
     def _migrate(self, *, write: bool) -> None:
         try:
             with self._engine.connect() as connection:
+                if write:
+                    self._refuse_loss(connection)
                 found = migrations.revision_of(connection)
             if found == migrations.HEAD:
                 return
@@ -154,6 +171,11 @@ class Database:
                 "restore a backup, or name another file with --database"
             ) from error
 
+    def _refuse_loss(self, connection: sa.Connection | None) -> None:
+        """Raise StoreError when commits are missing: nobody goes on writing in an archive that lost some."""
+        if self._sqlite and (text := missing(connection, self.location)):
+            raise StoreError(f"{self.location}: {text}")
+
     @contextmanager
     def writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
         """Give the one writing connection inside a transaction: all of it is kept, or nothing.
@@ -161,13 +183,25 @@ class Database:
         What is not `synced` outlives this process at once, but a power cut only when the next synced transaction ends:
         a log is written in order, so that one carries all before it to the disk.
         """
+        counted = synced and self._sqlite
         with self._guard:
             try:
                 self._sync(synced)
                 with self._engine.begin() as connection:
                     yield connection
-            except sa.exc.OperationalError as error:
-                raise StoreError(f"{self.location}: {error.orig}; nothing of this act was kept") from error
+                    commits = count_commit(connection) if counted else 0
+            except sa.exc.DatabaseError as error:
+                if isinstance(error, sa.exc.IntegrityError | sa.exc.ProgrammingError):
+                    raise
+                raise self._trouble(error) from error
+            if counted:
+                seal(self.location, commits)
+
+    def _trouble(self, error: sa.exc.DatabaseError) -> StoreError:
+        full = getattr(error.orig, "sqlite_errorcode", None) == SQLITE_FULL
+        if full or getattr(error.orig, "sqlstate", None) == POSTGRESQL_DISK_FULL:
+            return DiskFull(f"{self.location}: the disk is full; nothing of this act was kept. Make room, then go on")
+        return StoreError(f"{self.location}: {error.orig}; nothing of this act was kept")
 
     def _sync(self, synced: bool) -> None:
         if not self._sqlite or synced == self._synced:

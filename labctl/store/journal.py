@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from instruments.gyro import Readings
 from labctl.store import blocks, tables
+from labctl.store.audit import append
 from labctl.store.database import Database
 from labctl.store.means import means_rows
 from labctl.store.recordings import block_row, blocks_of, scaled
@@ -63,6 +64,8 @@ class StoreJournal:
                 sa.update(tables.campaigns).where(tables.campaigns.c.id == self._campaign).values(**values)
             )
             self._add_event(connection, Event("state", message, level), t_s, at)
+            change = {"state": state.value, "reason": reason}
+            append(connection, at, "campaign state", f"campaign {self._campaign}", change)
 
     def step_started(self, index: int, t_s: float, at: datetime) -> None:
         """Record that a step begins."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from labctl.errors import NotFound
 from labctl.recording import Recording, RecordingInfo, dataset_starts
 from labctl.store import blocks, tables
+from labctl.store.audit import append
 from labctl.store.database import Database
 from labctl.store.means import means_rows, points_columns
 from labctl.store.records import RecordingRow
@@ -39,6 +40,8 @@ class Recordings:
             else:
                 _add_table(connection, number, recording)
             _add_environment(connection, number, recording)
+            what = {"serial": info.serial, "kind": info.kind, "rows": len(recording)}
+            append(connection, at, "import", f"recording {number}", what)
         return number
 
     def get(self, recording: int) -> RecordingRow:

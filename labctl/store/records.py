@@ -118,3 +118,27 @@ class CertificationRow:
     reason: str
     at: datetime
     due_at: datetime | None
+
+
+@dataclass(frozen=True)
+class AuditRow:
+    """One act: who did what to what, when, and what else there is to say."""
+
+    id: int
+    at: datetime
+    who: str
+    action: str
+    subject: str
+    detail: Mapping[str, Any]
+    hash: str
+
+
+@dataclass(frozen=True)
+class KeyRow:
+    """One API key; in force until it is revoked."""
+
+    name: str
+    role: str
+    digest: str
+    created_at: datetime
+    revoked_at: datetime | None

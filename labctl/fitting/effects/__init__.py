@@ -10,7 +10,7 @@ from typing import Any
 from labctl.errors import BadInput
 from labctl.fitting.effects import acceleration, alignment, bias, history, scale_factor, shape, surface, table, thermal
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Span, Term
-from labctl.fitting.effects.formula import Formula, formulas
+from labctl.fitting.effects.formula import Formula, formulas, read_formula
 
 FAMILIES = (bias, scale_factor, surface, alignment, shape, acceleration, table, thermal, history)
 
@@ -30,6 +30,7 @@ __all__ = [
     "formulas",
     "kind_of",
     "parse_term",
+    "read_formula",
 ]
 
 

@@ -68,7 +68,8 @@ class Formula(Effect):
 
     def _value(self, node: ast.AST, channels: Channels, axis: str) -> Any:
         if isinstance(node, ast.Constant):
-            return node.value
+            assert isinstance(node.value, int | float)
+            return np.float64(node.value)  # whole numbers of Python grow without end: 9**9**9
         if isinstance(node, ast.Name):
             return self._channel(node.id, channels, axis)
         if isinstance(node, ast.UnaryOp):
@@ -95,8 +96,9 @@ def _parsed(name: str, text: str) -> ast.Expression:
         raise BadInput(f"formula {name!r}: {len(text)} characters; at most {LONGEST}")
     try:
         tree = ast.parse(text.strip(), mode="eval")
-    except (SyntaxError, ValueError) as error:
-        raise BadInput(f"formula {name!r}: {text!r} cannot be read ({error.args[0]})") from None
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        said = error.args[0] if error.args else type(error).__name__
+        raise BadInput(f"formula {name!r}: {text!r} cannot be read ({said})") from None
     for node in ast.walk(tree):
         _check(name, node)
     return tree
@@ -126,12 +128,15 @@ def _names(tree: ast.Expression) -> set[str]:
 
 def formulas(source: str) -> list[Formula]:
     """Read `name: formula`, or a TOML file with [[effects]] of `id`, `formula`, perhaps `sentence`. Raises BadInput."""
-    if source.endswith(".toml"):
-        return _from_file(Path(source))
-    name, separator, text = source.partition(":")
+    return _from_file(Path(source)) if source.endswith(".toml") else [read_formula(source)]
+
+
+def read_formula(line: str) -> Formula:
+    """Read `name: formula`; never a file, so that a line may come from anywhere. Raises BadInput."""
+    name, separator, text = line.partition(":")
     if not separator:
-        raise BadInput(f"formula {source!r}: write it as 'name: formula', or name a .toml file")
-    return [_made(name.strip(), text.strip(), "")]
+        raise BadInput(f"formula {line!r}: write it as 'name: formula'; the command line also takes a .toml file")
+    return _made(name.strip(), text.strip(), "")
 
 
 def _from_file(path: Path) -> list[Formula]:

@@ -25,6 +25,7 @@ def configuration(connection: sa.Connection | None = None) -> Config:
 
 SCRIPTS = ScriptDirectory.from_config(configuration())
 HEAD = SCRIPTS.get_current_head()
+KNOWN = frozenset(script.revision for script in SCRIPTS.walk_revisions())
 
 
 def revision_of(connection: sa.Connection) -> str | None:
@@ -34,8 +35,7 @@ def revision_of(connection: sa.Connection) -> str | None:
 
 def refuse_unknown(revision: str | None, location: str) -> None:
     """Raise StoreError when a database stands at a step that this code does not know."""
-    known = {script.revision for script in SCRIPTS.walk_revisions()}
-    if revision is not None and revision not in known:
+    if revision is not None and revision not in KNOWN:
         raise StoreError(
             f"{location}: the database is at step {revision!r}, which is newer than this labctl (step {HEAD!r}); "
             "use the labctl that made it, or a newer one. Nothing was changed"

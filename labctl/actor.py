@@ -1,0 +1,37 @@
+"""In whose name something is done: set once at the door, so that no act on the way can forget to say it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Actor:
+    """Somebody who acts, and how that is known: "key", "command line", "loopback"."""
+
+    name: str
+    via: str = ""
+
+
+#: Who does what nobody asked for, as a campaign's changes of state in a thread of its own.
+ITSELF = Actor("labctl")
+
+_actor: ContextVar[Actor] = ContextVar("actor")
+
+
+@contextmanager
+def acting(who: Actor) -> Iterator[None]:
+    """Do everything inside in the name of `who`."""
+    token = _actor.set(who)
+    try:
+        yield
+    finally:
+        _actor.reset(token)
+
+
+def actor() -> Actor:
+    """Return in whose name this thread or task acts now."""
+    return _actor.get(ITSELF)
