@@ -251,7 +251,7 @@ MANY = [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0]
             "'ghost' cannot be hidden",
         ),
         (lambda _: ["certify", "OSU-FOG-2024", "9", "--by", "A", "--reason", "B"], "no calibration version 9"),
-        (lambda _: ["serve", "--host", "0.0.0.0"], "loopback only"),
+        (lambda _: ["serve", "--host", "0.0.0.0"], "no key to ask them for"),
     ],
 )
 def test_what_is_wrong_gets_one_clear_line_and_changes_nothing(fog: Lab, arguments: Any, said: str) -> None:

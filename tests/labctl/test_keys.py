@@ -1,0 +1,264 @@
+"""Who may come in: keys and roles on every path of the API, and no stranger through the loopback door."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from instruments.clock import SystemClock
+from labctl.api import create_app
+from labctl.api.door import LOOPBACK_NAMES, Access
+from labctl.errors import BadInput, Conflict, NotFound
+from labctl.services.house import House
+from labctl.services.keys import KeyRequest, Role, create_key, digest_of, refuse_open_doors, revoke_key
+from labctl.store import Store, open_store
+from labctl.store.database import Database
+
+CLOCK = SystemClock()
+OPEN = {("get", "/health")}
+
+
+def operations() -> list[tuple[str, str]]:
+    """Every operation of the API, from its own description: a new path is tested as soon as it is there."""
+    document = create_app(None).openapi()  # type: ignore[arg-type]  # nothing is asked of the house
+    return sorted((method, path) for path, item in document["paths"].items() for method in item)
+
+
+def needs(method: str, path: str) -> Role:
+    """What an operation asks for, as the house promises it."""
+    if path.startswith("/api/keys") or path.endswith(("/certify", "/calibrations/{version}/revoke")):
+        return Role.APPROVER
+    return Role.VIEWER if method == "get" else Role.OPERATOR
+
+
+def address(path: str) -> str:
+    return re.sub(r"\{[^}]*\}", "1", path)
+
+
+class Guarded:
+    """An application that asks for keys, and one key of each kind."""
+
+    def __init__(self, store: Store, client: TestClient) -> None:
+        self.store = store
+        self.client = client
+        self.keys = {role: create_key(store, KeyRequest(name=role.value, role=role), CLOCK.utc()).key for role in Role}
+        revoked = create_key(store, KeyRequest(name="revoked", role=Role.APPROVER), CLOCK.utc())
+        revoke_key(store, "revoked", "lost", CLOCK.utc())
+        good = self.keys[Role.APPROVER]
+        self.refused: dict[str, str | None] = {
+            "missing": None,
+            "revoked": f"Bearer {revoked.key}",
+            "wrong": "Bearer labctl_" + "x" * 43,
+            "cut short": f"Bearer {good[:-1]}",
+            "another scheme": f"Basic {good}",
+            "no scheme": good,
+            "empty": "Bearer ",
+            "the digest": f"Bearer {digest_of(good)}",
+            "not ASCII": "Bearer \xe9\xff",
+        }
+
+    def ask(self, method: str, path: str, authorization: str | None) -> Any:
+        headers = {} if authorization is None else {"Authorization": authorization.encode("latin-1")}
+        return self.client.request(method, path, headers=headers, json={} if method == "post" else None)
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
+    store = Store(Database(str(tmp_path_factory.mktemp("guarded") / "lab.sqlite"), write=True))
+    with TestClient(create_app(House(store, CLOCK), Access(keys=True))) as client:
+        yield Guarded(store, client)
+
+
+def test_there_are_paths_to_ask() -> None:
+    assert len(operations()) > 20
+    assert set(operations()) >= OPEN
+
+
+@pytest.mark.parametrize(("method", "path"), operations())
+def test_wrong_missing_and_revoked_keys_are_refused_on_every_path(guarded: Guarded, method: str, path: str) -> None:
+    for kind, authorization in guarded.refused.items():
+        answer = guarded.ask(method, address(path), authorization)
+        if (method, path) in OPEN:
+            assert answer.json().keys() == {"status", "version"}, kind
+            continue
+        assert answer.status_code == 401, kind
+        assert answer.headers["www-authenticate"].startswith("Bearer"), kind
+        assert answer.headers["content-type"] == "application/problem+json", kind
+        assert answer.json()["type"] == "urn:labctl:problem:not-identified", kind
+
+
+@pytest.mark.parametrize(("method", "path"), operations())
+def test_every_path_asks_for_its_role_and_no_more(guarded: Guarded, method: str, path: str) -> None:
+    for role, key in guarded.keys.items():
+        answer = guarded.ask(method, address(path), f"Bearer {key}")
+        assert answer.status_code != 401
+        allowed = role.may(needs(method, path))
+        assert (answer.status_code != 403) == allowed, role
+        if not allowed:
+            assert answer.json()["type"] == "urn:labctl:problem:not-allowed"
+            assert f"{role.value} is {role.value}; this asks for" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("path", ["/", "/docs", "/openapi.json", "/api/nowhere", "/health/", "/health/x", "//health"])
+def test_nothing_else_is_open(guarded: Guarded, path: str) -> None:
+    assert guarded.ask("get", path, None).status_code == 401
+    assert guarded.ask("post", path, None).status_code == 401
+
+
+def test_odd_spellings_of_a_version_do_not_get_an_operator_past_the_approver(guarded: Guarded) -> None:
+    body = {"by": "A", "reason": "B"}
+    key = guarded.keys[Role.OPERATOR]
+    for version in ("1", "+1", "%201", "01", "1.0", "1%20"):
+        for path in (f"/api/units/X/calibrations/{version}/certify", f"/api/units/X/calibrations/{version}/certify/"):
+            answer = guarded.client.post(path, json=body, headers={"Authorization": f"Bearer {key}"})
+            assert answer.status_code == 403, path
+
+
+def test_a_key_is_shown_once_and_kept_as_a_digest(guarded: Guarded, tmp_path: Path) -> None:
+    location = str(tmp_path / "keys.sqlite")
+    with open_store(location, write=True) as store:
+        made = create_key(store, KeyRequest(name="robot", role=Role.VIEWER), CLOCK.utc())
+        other = create_key(store, KeyRequest(name="other", role=Role.VIEWER), CLOCK.utc())
+        assert made.key != other.key
+        with pytest.raises(Conflict, match="made before"):
+            create_key(store, KeyRequest(name="robot", role=Role.APPROVER), CLOCK.utc())
+        with pytest.raises(NotFound, match="no key 'nobody'"):
+            revoke_key(store, "nobody", "x", CLOCK.utc())
+        revoke_key(store, "robot", "x", CLOCK.utc())
+        with pytest.raises(Conflict, match="revoked before"):
+            revoke_key(store, "robot", "x", CLOCK.utc())
+    everything = b"".join(path.read_bytes() for path in tmp_path.iterdir())
+    assert made.key.encode() not in everything
+    assert digest_of(made.key).encode() in everything
+
+
+def test_keys_over_http_and_in_the_audit_trail(guarded: Guarded) -> None:
+    approver = {"Authorization": f"Bearer {guarded.keys[Role.APPROVER]}"}
+    made = guarded.client.post("/api/keys", json={"name": "new", "role": "viewer"}, headers=approver).json()
+    own = {"Authorization": f"bearer  {made['key']}"}
+    assert guarded.client.get("/api/units", headers=own).status_code == 200
+    assert "key" not in guarded.client.get("/api/keys", headers=approver).json()[0]
+    gone = guarded.client.post("/api/keys/new/revoke", json={"reason": "moved on"}, headers=approver)
+    assert gone.json()["revoked_at"] is not None
+    assert guarded.client.get("/api/units", headers=own).status_code == 401
+    rows = [row for row in guarded.client.get("/api/audit", headers=approver).json() if row["subject"] == "key new"]
+    assert [(row["who"], row["action"]) for row in rows] == [("approver", "key create"), ("approver", "key revoke")]
+    assert rows[1]["detail"] == {"role": "viewer", "reason": "moved on", "via": "key"}
+    for name in ("../x", "", "a/b", "a\x00b", "x" * 101):
+        refused = guarded.client.post("/api/keys", json={"name": name, "role": "viewer"}, headers=approver)
+        assert refused.status_code == 422, name
+
+
+def test_any_other_address_needs_a_key_first(tmp_path: Path) -> None:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        with pytest.raises(BadInput, match=r"--host 0\.0\.0\.0: .* labctl key create"):
+            refuse_open_doors(store, "0.0.0.0")
+        create_key(store, KeyRequest(name="only", role=Role.VIEWER), CLOCK.utc())
+        refuse_open_doors(store, "0.0.0.0")
+        revoke_key(store, "only", "x", CLOCK.utc())
+        with pytest.raises(BadInput, match="no key"):
+            refuse_open_doors(store, "0.0.0.0")
+
+
+Ask = Callable[..., Any]
+
+
+@pytest.fixture
+def loopback(tmp_path: Path) -> Iterator[Ask]:
+    store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
+    access = Access(hosts=LOOPBACK_NAMES)
+    with TestClient(create_app(House(store, CLOCK), access), base_url="http://127.0.0.1:8420") as client:
+
+        def ask(method: str = "get", path: str = "/api/units", json: Any = None, **headers: str) -> Any:
+            named = {name.replace("_", "-"): value for name, value in headers.items()}
+            return client.request(method, path, headers=named, json=json)
+
+        yield ask
+
+
+NOTE = {"file": "x.sqlite", "bytes": 1, "sha256": "0" * 64}
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8420", "localhost", "LOCALHOST:1", "[::1]:8420"])
+def test_this_machine_needs_no_key(loopback: Ask, host: str) -> None:
+    assert loopback(host=host).status_code == 200
+    assert loopback("post", "/api/backups", NOTE, host=host, origin=f"http://{host}").status_code == 204
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "127.0.0.1.evil.example", "localhost.evil.example:8420", "10.0.0.1", ""]
+)
+def test_a_name_that_was_bent_to_this_machine_is_refused(loopback: Ask, host: str) -> None:
+    answer = loopback(host=host)
+    assert answer.status_code == 403
+    assert "without keys this service answers to" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"origin": "http://evil.example"},
+        {"origin": "null"},
+        {"origin": "http://127.0.0.1:9999"},
+        {"origin": "http://localhost:8420"},
+        {"sec_fetch_site": "cross-site"},
+        {"sec_fetch_site": "same-site"},
+    ],
+)
+def test_a_page_of_another_site_may_not_act(loopback: Ask, headers: dict[str, str]) -> None:
+    assert loopback("post", "/api/backups", NOTE, **headers).status_code == 403
+    assert loopback("get", "/api/audit").json() == []
+    assert loopback("get", "/api/units", **headers).status_code == 200  # the browser keeps the answer from the page
+
+
+@pytest.mark.parametrize("header", ["x_forwarded_for", "forwarded"])
+def test_what_a_proxy_sends_on_needs_a_key(loopback: Ask, header: str) -> None:
+    assert loopback(**{header: "for=10.1.2.3"}).status_code == 403
+
+
+def test_who_acts_on_loopback(loopback: Ask) -> None:
+    loopback("post", "/api/backups", NOTE)
+    loopback("post", "/api/backups", NOTE, labctl_user="A.%20Person")
+    loopback("post", "/api/backups", NOTE, labctl_user="x%00y")
+    rows = loopback("get", "/api/audit").json()
+    assert [row["who"] for row in rows] == ["local", "A. Person", "local"]
+    assert {row["detail"]["via"] for row in rows} == {"loopback"}
+    made = loopback("post", "/api/keys", {"name": "robot", "role": "viewer"}).json()
+    refused = loopback("post", "/api/backups", NOTE, authorization=f"Bearer {made['key']}")
+    assert refused.status_code == 403  # who shows a key has its role, here too
+    assert loopback(authorization="Bearer wrong").status_code == 401
+
+
+def test_calibrations_can_be_asked_for_by_head(loopback: Ask) -> None:
+    for path in ("calibration", "calibrations", "ladder"):
+        answer = loopback("head", f"/api/units/NOBODY/{path}")
+        assert answer.status_code in {400, 404}, path
+
+
+def test_the_service_tells_its_manager(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    import socket
+
+    from labctl.api import watchdog
+
+    monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
+    watchdog.ready()  # nobody listens: nothing happens
+    address = str(tmp_path / "notify")
+    monkeypatch.setenv("NOTIFY_SOCKET", address)
+    watchdog.ready()  # nobody listens there either
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(address)
+        manager.settimeout(5)
+        store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
+        with TestClient(create_app(House(store, CLOCK))):
+            assert manager.recv(100) == b"READY=1"
+            asyncio.run(watchdog.alive())
+            assert manager.recv(100) == b"WATCHDOG=1"
+        assert manager.recv(100).startswith(b"STOPPING=1\nWATCHDOG_USEC=")
+    monkeypatch.setenv("WATCHDOG_USEC", "60000000")
+    assert watchdog.period_s() == 20
