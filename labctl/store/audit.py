@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any
 
 import sqlalchemy as sa
@@ -15,6 +15,7 @@ from labctl.actor import actor
 from labctl.store import tables
 from labctl.store.database import Database
 from labctl.store.records import AuditRow
+from labctl.store.tables import EPOCH
 
 FIRST = "0" * 64
 HEAD_ID = 1
@@ -78,6 +79,15 @@ def _hash(previous: str, at: datetime, who: str, action: str, subject: str, deta
     return hashlib.sha256(body.encode()).hexdigest()
 
 
+def _hash_of_row(previous: str, at_us: Any, who: Any, action: Any, subject: Any, detail: Any) -> str | None:
+    """Return the hash that belongs to a row as it lies in the table; None when nothing of ours is there."""
+    try:
+        at = EPOCH + timedelta(microseconds=int(at_us))
+        return _hash(previous, at, who, action, subject, json.loads(detail))
+    except (ValueError, TypeError, OverflowError):
+        return None
+
+
 def first_broken(connection: sa.Connection, anchor: Head | None = None) -> Broken | None:
     """Return the first row that was changed, moved, or follows a missing one; None when all fit.
 
@@ -86,9 +96,11 @@ def first_broken(connection: sa.Connection, anchor: Head | None = None) -> Broke
     """
     a = tables.audit.c
     previous, last, length = FIRST, 0, 0
-    query = sa.select(a.id, a.at, a.actor, a.action, a.subject, a.detail, a.previous_hash, a.hash).order_by(a.id)
-    for number, at, who, action, subject, detail, before, own in connection.execute(query):
-        if own != _hash(before, at, who, action, subject, detail):
+    # as they lie in the table: what somebody else wrote there need not be an instant, or JSON
+    at, detail = sa.type_coerce(a.at, sa.BigInteger), sa.cast(a.detail, sa.Text)
+    query = sa.select(a.id, at, a.actor, a.action, a.subject, detail, a.previous_hash, a.hash).order_by(a.id)
+    for number, *content, before, own in connection.execute(query):
+        if own != _hash_of_row(before, *content):
             return Broken(int(number), "its content is not what was written")
         if before != previous:
             return Broken(int(number), f"it does not follow row {last}: a row is missing before it, or rows were moved")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -95,7 +96,9 @@ class _Look:
             return look(connection)
         except sa.exc.DatabaseError as error:
             self.find(part, f"cannot be read: {error.orig}")
-            return part != "schema"
+        except (ValueError, TypeError) as error:  # the row is there, its content is of another kind
+            self.find(part, f"cannot be read: {error}")
+        return part != "schema"
 
     def _at_file(self, connection: sa.Connection) -> bool:
         if is_url(self._location):
@@ -167,7 +170,7 @@ class _Look:
         except StoreError as error:
             self.find("readings", f"{place}: {error}")
             return None
-        except (ValueError, KeyError, RuntimeError, IndexError) as error:  # the checksum fits, the content does not
+        except (ValueError, TypeError, LookupError, RuntimeError, struct.error) as error:  # the checksum fits, the content does not
             self.find("readings", f"{place}: cannot be unpacked ({error})")
             return None
         if any(len(values) != block.n for values in columns.values()):
@@ -180,7 +183,7 @@ class _Look:
         for serial, version, own, document in connection.execute(sa.select(c.serial, c.version, c.hash, c.document)):
             self.calibrations += 1
             try:
-                calibration = read_calibration(bytes(document))
+                calibration = read_calibration(document if isinstance(document, bytes) else str(document).encode())
             except BadCalibrationFile as error:
                 self.find("calibrations", f"{serial} version {version}: {error}")
                 continue
