@@ -44,7 +44,7 @@ class RemoteActs:
                 f"the service at {self._client.base_url} holds the database but does not answer ({error}); "
                 "look at it, or stop it"
             ) from error
-        body = response.json()
+        body = response.json() if response.content else {}
         if response.is_error:
             hint = f" (the command line sends the key in ${KEY_VARIABLE})" if response.status_code == 401 else ""
             refused = ServiceRefused(body.get("detail", response.text) + hint)

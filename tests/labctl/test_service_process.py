@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
+from labctl.config import os_user
+from labctl.services.keys import KeyRequest, Role, create_key
+from labctl.store import check, open_store
+
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 class Service:
     """`labctl serve` in a process of its own, and other commands beside it on the same database."""
 
-    def __init__(self, database: Path) -> None:
+    def __init__(self, database: Path, *options: str) -> None:
         self.database = database
-        command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json"]
+        command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json", *options]
         self.process = subprocess.Popen(
             self.command(*command), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
@@ -32,8 +39,9 @@ class Service:
     def command(self, *arguments: str) -> list[str]:
         return [sys.executable, "-m", "labctl", *arguments, "--database", str(self.database)]
 
-    def run(self, *arguments: str, status: int = 0) -> Any:
-        done = subprocess.run(self.command(*arguments), capture_output=True, text=True, check=False)
+    def run(self, *arguments: str, status: int = 0, key: str = "") -> Any:
+        environment = {**os.environ, "LABCTL_KEY": key}
+        done = subprocess.run(self.command(*arguments), capture_output=True, text=True, check=False, env=environment)
         assert done.returncode == status, done.stderr
         return done
 
@@ -42,6 +50,10 @@ class Service:
 def service(tmp_path: Path) -> Iterator[Service]:
     made = Service(tmp_path / "lab.sqlite")
     yield made
+    end(made)
+
+
+def end(made: Service) -> None:
     made.http.close()
     made.process.kill()
     made.process.wait()
@@ -88,3 +100,40 @@ def test_sigterm_ends_the_campaign_in_the_safe_state(service: Service) -> None:
     answer = json.loads(service.run("campaign", "status", str(campaign), "--json").stdout)
     assert answer["state"] == "aborted"
     assert "the service stops" in answer["reason"]
+
+
+def test_a_page_that_a_browser_was_led_to_cannot_reach_the_service(service: Service) -> None:
+    assert service.http.get("/api/units").status_code == 200
+    assert service.http.get("/api/units", headers={"Host": "evil.example"}).status_code == 403
+    origin = {"Origin": "http://evil.example"}
+    assert service.http.post("/api/campaigns", json={"recipe": "short"}, headers=origin).status_code == 403
+    assert service.http.head("/api/units/NOBODY/calibrations").status_code == 404
+
+
+def test_a_backup_of_a_database_that_a_service_holds(service: Service, tmp_path: Path) -> None:
+    answer = json.loads(service.run("backup", str(tmp_path / "copy.sqlite"), "--json").stdout)
+    assert (answer["noted"], answer["findings"]) == (True, [])
+    (row,) = service.http.get("/api/audit").json()
+    assert (row["who"], row["action"], row["subject"]) == (os_user(), "backup", "copy.sqlite")
+    assert row["detail"] == {"bytes": answer["bytes"], "sha256": answer["sha256"], "via": "loopback"}
+    assert check(str(service.database)).findings == ()
+
+
+def test_a_service_with_keys_asks_the_command_line_too(tmp_path: Path) -> None:
+    database = tmp_path / "lab.sqlite"
+    with open_store(str(database), write=True) as store:
+        keys = {role: create_key(store, KeyRequest(name=role.value, role=role), AT).key for role in Role}
+    service = Service(database, "--host", "0.0.0.0")
+    try:
+        assert service.url.startswith("http://0.0.0.0:")
+        assert "$LABCTL_KEY" in service.run("import", str(EXAMPLES / "osu-fog"), status=2).stderr
+        service.run("import", str(EXAMPLES / "osu-fog"), key=keys[Role.OPERATOR])
+        approver = {"Authorization": f"Bearer {keys[Role.APPROVER]}", "Host": "lab.example"}
+        service.http.post("/api/keys/operator/revoke", json={"reason": "lost"}, headers=approver)
+        assert "revoked" in service.run("fit", "OSU-FOG-2024", status=2, key=keys[Role.OPERATOR]).stderr
+        rows = service.http.get("/api/audit", headers=approver).json()[3:]
+        told = [(row["who"], row["action"], row["detail"]["via"]) for row in rows]
+        assert told == [("operator", "import", "key"), ("approver", "key revoke", "key")]
+        assert service.http.get("/health").json().keys() == {"status", "version"}
+    finally:
+        end(service)
