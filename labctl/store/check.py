@@ -170,7 +170,13 @@ class _Look:
         except StoreError as error:
             self.find("readings", f"{place}: {error}")
             return None
-        except (ValueError, TypeError, LookupError, RuntimeError, struct.error) as error:  # the checksum fits, the content does not
+        except (
+            ValueError,
+            TypeError,
+            LookupError,
+            RuntimeError,
+            struct.error,
+        ) as error:  # the checksum fits, the content does not
             self.find("readings", f"{place}: cannot be unpacked ({error})")
             return None
         if any(len(values) != block.n for values in columns.values()):

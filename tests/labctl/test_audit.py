@@ -11,14 +11,18 @@ from typing import Any
 
 import pytest
 from alembic import command
+from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
-from instruments.clock import VirtualClock
+from instruments.clock import SystemClock, VirtualClock
 from labctl.actor import Actor, acting
+from labctl.api import create_app
 from labctl.cli.app import app
 from labctl.config import os_user
 from labctl.errors import BadInput
 from labctl.services.audit import anchor_of, verify_audit
+from labctl.services.bench_runner import BenchRunner
+from labctl.services.house import House
 from labctl.services.planning import load_bench
 from labctl.services.running import prepare, run
 from labctl.store import Store, migrations, open_store
@@ -185,3 +189,52 @@ def test_what_a_person_does_on_the_command_line_is_in_it(labctl: Callable[..., A
     refused = labctl("audit", "verify", status=1)
     assert "row 4: its content is not what was written" in refused.stderr
     assert labctl("audit", "verify", "--anchor", anchor, "--json", status=1)["row"] == 4
+
+
+def upload(client: TestClient) -> Any:
+    files = [
+        ("files", (path.name, path.read_bytes())) for path in (EXAMPLES / "osu-fog").glob("*") if path.suffix != ".md"
+    ]
+    return client.post("/api/recordings", files=files)
+
+
+UNIT = "/api/units/OSU-FOG-2024/calibrations"
+PERSON = {"by": "A", "reason": "B"}
+NOTE = {"file": "x", "bytes": 1, "sha256": "0" * 64}
+#: Every operation that changes something, in an order in which each succeeds, and the act that it leaves in the trail.
+ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
+    "/api/recordings": ("import", upload),
+    "/api/units/{serial}/calibrations": ("fit", lambda c: c.post(UNIT, json={"effects": ["bias", "scale_factor"]})),
+    "/api/units/{serial}/calibrations/{version}/improve": (
+        "improve", lambda c: c.post(f"{UNIT}/1/improve", json={"remove": ["scale_factor"]}),
+    ),
+    "/api/units/{serial}/calibrations/{version}/certify": (
+        "certify", lambda c: c.post(f"{UNIT}/1/certify", json=PERSON),
+    ),
+    "/api/units/{serial}/calibrations/{version}/revoke": ("revoke", lambda c: c.post(f"{UNIT}/1/revoke", json=PERSON)),
+    "/api/campaigns/{campaign}/abort": (
+        "campaign abort", lambda c: c.post("/api/campaigns/1/abort", json={"reason": "tea"}),
+    ),
+    "/api/campaigns": ("campaign start", lambda c: c.post("/api/campaigns", json={"recipe": "short"})),
+    "/api/keys": ("key create", lambda c: c.post("/api/keys", json={"name": "robot", "role": "viewer"})),
+    "/api/keys/{name}/revoke": ("key revoke", lambda c: c.post("/api/keys/robot/revoke", json={"reason": "lost"})),
+    "/api/backups": ("backup", lambda c: c.post("/api/backups", json=NOTE)),
+}  # fmt: skip
+
+
+def test_every_act_over_http_leaves_its_row(location: str) -> None:
+    """A new operation fails this test until it says here which row it leaves."""
+    store = Store(Database(location, write=True))
+    bench = load_bench("single-axis-sim")
+    house = House(store, SystemClock(), BenchRunner(store, bench, VirtualClock))
+    application = create_app(house)
+    acting_paths = {path for path, item in application.openapi()["paths"].items() if set(item) - {"get", "head"}}
+    assert acting_paths == set(ACTS)
+    with TestClient(application, headers={"Labctl-User": "A. Person"}) as client:
+        prepare(store, "short", bench, VirtualClock(), clip=False).bench.close()  # one that nobody runs
+        for path, (action, act) in ACTS.items():
+            before = store.audit.rows()
+            answer = act(client)
+            assert answer.status_code < 300, (path, answer.text)
+            new = store.audit.rows(after=before[-1].id)
+            assert action in {row.action for row in new if row.who in {"A. Person", "A"}}, path
