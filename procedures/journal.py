@@ -42,6 +42,8 @@ class DataSetHeader:
     gate_until_s: float
     angle_from_deg: float  #: table angle at `gate_from_s`
     setpoint_c: float
+    run: int  #: powered session as it really was: the plan's, and those that a power cut added
+    gyros: tuple[str, ...]  #: the units that take part, by name
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,14 @@ class Journal(Protocol):
 
     def step_ended(self, index: int, result: StepResult, t_s: float, at: datetime) -> None:
         """Record how step `index` ended."""
+        ...
+
+    def session_began(self, run: int, t_s: float) -> None:
+        """Record that the units were switched on for session `run`."""
+        ...
+
+    def unit_dropped(self, gyro: str, reason: str) -> None:
+        """Record that a unit takes no further part, and why."""
         ...
 
     def dataset_opened(self, header: DataSetHeader) -> int:

@@ -205,6 +205,8 @@ class RecordingJournal:
         self.blocks: list[tuple[int, str, Readings, float]] = []
         self.samples: list[Any] = []
         self.events: list[Any] = []
+        self.sessions: list[int] = []
+        self.dropped: list[tuple[str, str]] = []
         self.hooks: list[Callable[[str, Any], None]] = []
 
     def _told(self, what: str, detail: Any) -> None:
@@ -224,6 +226,14 @@ class RecordingJournal:
     def step_ended(self, index: int, result: Any, t_s: float, at: Any) -> None:
         self.steps.append(("ended", index, result))
         self._told("step_ended", index)
+
+    def session_began(self, run: int, t_s: float) -> None:
+        self.sessions.append(run)
+        self._told("session_began", run)
+
+    def unit_dropped(self, gyro: str, reason: str) -> None:
+        self.dropped.append((gyro, reason))
+        self._told("unit_dropped", gyro)
 
     def dataset_opened(self, header: Any) -> int:
         self.headers.append(header)
