@@ -65,7 +65,9 @@ class Engine:
         self.complaints: tuple[str, ...] = ()  #: what the last safe state could not confirm
         self._whole = bench
         self._crew = Crew.of(bench)
-        guards = guards or Guards(plan.recipe.guards, BenchLimits.of(bench), bench.chamber.name, bench.table.name)
+        guards = guards or Guards(
+            plan.recipe.guards, lambda: BenchLimits.of(bench), bench.chamber.name, bench.table.name
+        )
         watch = Watch(self._crew, guards, self._log)
         self._stage = Stage(plan.recipe, self._crew, bench, clock, operator, self.control, self._log, watch)
         self._safe = False
@@ -237,6 +239,7 @@ class Engine:
         self._suspensions += 1
         self._owed, stage.soaked = stage.soaked or self._owed, None
         stage.bench.table.stop()
+        self._log.event(Event("soak_owed", f"suspended: {trip}"))
         self._log.change_state(CampaignState.PAUSED, f"suspended: {trip}")
         began_s = clear_since_s = stage.clock.now_s()
         while stage.clock.now_s() - clear_since_s < rules.release_s:

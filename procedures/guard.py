@@ -58,11 +58,24 @@ Check = Callable[["Guards", Situation], Iterator[Excess]]
 class Guards:
     """All limits of one campaign."""
 
-    def __init__(self, rules: GuardRules, limits: BenchLimits, chamber: str = "chamber", table: str = "table") -> None:
+    def __init__(
+        self,
+        rules: GuardRules,
+        limits: BenchLimits | Callable[[], BenchLimits],
+        chamber: str = "chamber",
+        table: str = "table",
+    ) -> None:
         self.rules = rules
-        self.limits = limits
+        self._limits = limits
         self.chamber = chamber
         self.table = table
+
+    @property
+    def limits(self) -> BenchLimits:
+        """The limits of the bench; its controllers are asked at first use."""
+        if not isinstance(self._limits, BenchLimits):
+            self._limits = self._limits()
+        return self._limits
 
     def check(self, now: Situation) -> list[Trip]:
         """Return every limit that is passed at this moment."""

@@ -128,6 +128,8 @@ class Stage:
     def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
         """Forget that a temperature was taken once the air has left its band."""
         if self.soaked and abs(chamber_c - self.soaked.temperature_c) > self.soaked.band_c:
+            text = f"{self.soaked.temperature_c:g} deg C was left: the air is at {chamber_c:.2f} deg C"
+            self.log.event(Event("soak_owed", text))
             self.soaked = None
 
     def ask(self, prompt: Prompt) -> Answer:

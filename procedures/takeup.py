@@ -1,4 +1,4 @@
-"""Taking up a campaign that was interrupted: safe state first, look where everything is, then what must be done again."""
+"""Taking up an interrupted campaign: safe state first, look where everything is, then what must be done again."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class _Furthest:
 
 
 def _switch_on(stage: Stage, run: int, restart: Restart) -> None:
-    """Have the units on and their streams open. After a power cut they come back by themselves, or a person is asked."""
+    """Have the units on, streams open. After a power cut they come back by themselves, or a person is asked."""
     if not restart.power_lost:
         open_streams(stage, run)
         return

@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from labctl.store.audit import first_broken
+from labctl.store.benches import Benches, BenchRow
 from labctl.store.calibrations import Calibrations, NewCalibration
 from labctl.store.campaigns import Campaigns, NewCampaign
 from labctl.store.database import Database, Holder, holder_of, is_url
+from labctl.store.interruptions import Interruptions, Standing, TakeUp
 from labctl.store.journal import StoreJournal
 from labctl.store.recordings import Recordings
 from labctl.store.records import (
@@ -24,6 +26,8 @@ from labctl.store.records import (
 from labctl.store.units import Units
 
 __all__ = [
+    "BenchRow",
+    "Benches",
     "CalibrationRecord",
     "Calibrations",
     "CampaignRow",
@@ -31,14 +35,17 @@ __all__ = [
     "CertificationRow",
     "EventRow",
     "Holder",
+    "Interruptions",
     "NewCalibration",
     "NewCampaign",
     "NewUnit",
     "RecordingRow",
     "Recordings",
     "StepRow",
+    "Standing",
     "Store",
     "StoreJournal",
+    "TakeUp",
     "Unit",
     "Units",
     "holder_of",
@@ -54,6 +61,8 @@ class Store:
         self.units = Units(database)
         self.recordings = Recordings(database)
         self.campaigns = Campaigns(database)
+        self.interruptions = Interruptions(database)
+        self.benches = Benches(database)
         self.calibrations = Calibrations(database)
 
     @property
