@@ -121,7 +121,7 @@ class Engine:
         self._log.board.update(dropped=dict(self._crew.dropped))
         for index in restart.skipped:
             if isinstance(self.plan.steps[index], Mount):
-                self._left_out.update(self.plan.left_out_with(index))
+                self._left_out |= {index, *self.plan.left_out_with(index)}
         self._stage.added_runs = restart.added_runs
         self._log.change_state(CampaignState.RUNNING, f"taken up at step {start_at + 1}")
         take_up(self._stage, self.plan, start_at, restart, self._carry_out)
@@ -137,30 +137,32 @@ class Engine:
             self._leave_out(index, "nobody turned the units")
             return
         self._suspensions = self._silences = 0
-        while True:
+        while index not in self._left_out:
             try:
                 self._attempt(index)
-            except GuardTripped as trip:
-                if not self._suspends(trip):
-                    raise
-                self._suspend(trip)
-            except LinkError as error:
-                if not self._mends(index, error):
-                    raise
-                self._silences += 1
-                try:
-                    self._mend(error)
-                except (InstrumentError, ProcedureError) as lost:
-                    self._log.step_ended(index, StepResult(outcome="failed", reason=str(lost)))
-                    raise
-            except Unanswered as error:
-                if not self._leaves_out(index):
-                    raise
-                self._leave_out(index, str(error))
-                self._left_out.update(self.plan.left_out_with(index))
                 return
-            else:
-                return
+            except (GuardTripped, LinkError, Unanswered) as error:
+                if not self._relieved(index, error):
+                    raise
+
+    def _relieved(self, index: int, error: GuardTripped | LinkError | Unanswered) -> bool:
+        """Do what the recipe says about what stopped a step; False where that is nothing. Raises when it is in vain."""
+        if isinstance(error, GuardTripped) and self._suspends(error):
+            self._suspend(error)
+            return True
+        if isinstance(error, LinkError) and self._mends(index, error):
+            self._silences += 1
+            try:
+                self._mend(error)
+            except (InstrumentError, ProcedureError) as lost:
+                self._log.step_ended(index, StepResult(outcome="failed", reason=str(lost)))
+                raise
+            return True
+        if isinstance(error, Unanswered) and self._leaves_out(index):
+            self._leave_out(index, str(error))
+            self._left_out |= {index, *self.plan.left_out_with(index)}
+            return True
+        return False
 
     def _suspends(self, error: BaseException) -> bool:
         """Return whether a step is waited with, and begun again."""

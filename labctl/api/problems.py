@@ -9,7 +9,7 @@ from starlette.exceptions import HTTPException
 
 from instruments.errors import InstrumentError
 from labctl.errors import LabctlError
-from procedures.errors import PlanRefused, ProcedureError
+from procedures.errors import PlanRefused, ProcedureError, StalePrompt
 
 TYPE_PREFIX = "urn:labctl:problem:"
 
@@ -37,6 +37,8 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(ProcedureError)
     def of_a_procedure(request: Request, error: ProcedureError) -> JSONResponse:
+        if isinstance(error, StalePrompt):
+            return problem(409, "stale-prompt", _title(type(error)), str(error), request.url.path)
         slug = "plan-refused" if isinstance(error, PlanRefused) else "recipe"
         return problem(400, slug, _title(type(error)), str(error), request.url.path)
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from labctl.cli import bench, calibrations, campaign, criticism, recordings, serving
+from labctl.cli import bench, calibrations, campaign, criticism, recordings, running, serving
 
 app = typer.Typer(
     name="labctl",
@@ -20,6 +20,7 @@ app = typer.Typer(
 )
 app.add_typer(bench.app, name="bench")
 app.add_typer(campaign.app, name="campaign")
+running.add_to(campaign.app)
 app.add_typer(recordings.export_app, name="export")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": serving.demo,

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
-
-from pydantic import Field
 
 from instruments.bench import BenchFile
 from instruments.clock import Clock, VirtualClock
 from instruments.open import Bench, open_bench
 from labctl.config import default_database
 from labctl.errors import Conflict
-from labctl.services.acts import Request
+from labctl.services.acts import ResumeRequest
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import answer_of
 from labctl.services.planning import load_bench
@@ -28,15 +25,6 @@ from procedures.takeup import Restart
 
 #: A campaign that was taken up so often without finishing a step needs a person.
 MOST_TRIES = 5
-
-
-class ResumeRequest(Request):
-    """How an interrupted campaign goes on."""
-
-    by: str = Field(default="a person", min_length=1, max_length=200)
-    power: Literal["lost", "kept"] | None = Field(
-        default=None, description="Whether the units were off meanwhile; absent: yes when the host was."
-    )
 
 
 def plan_of(store: Store, row: CampaignRow) -> Plan:
