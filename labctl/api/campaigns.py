@@ -9,7 +9,6 @@ from fastapi import APIRouter, Header
 from fastapi.responses import StreamingResponse
 
 from labctl.api.rooms import HouseOf
-from labctl.services import campaigns as services
 from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer
 
@@ -25,7 +24,7 @@ def start(request: CampaignRequest, house: HouseOf) -> CampaignAnswer:
 @router.get("", summary="All campaigns")
 def campaigns(house: HouseOf) -> list[CampaignAnswer]:
     """Every campaign, newest first."""
-    return services.list_campaigns(house.store)
+    return house.campaigns()
 
 
 @router.get("/{campaign}", summary="One campaign")

@@ -98,6 +98,10 @@ class House:
         runs = self._runner is not None and self._runner.runs(campaign)
         return looked_after(from_rows(self.store, self.store.campaigns.get(campaign)), by_somebody=runs)
 
+    def campaigns(self) -> list[CampaignAnswer]:
+        """Return every campaign, newest first."""
+        return [self.status(row.id) for row in self.store.campaigns.all()]
+
     async def follow(self, campaign: int, after: int) -> AsyncIterator[EventAnswer | CampaignAnswer | None]:
         """Yield a campaign's events after number `after`, where it stands whenever that has changed, and None to show
         that the stream lives, until the campaign ends.
