@@ -269,6 +269,8 @@ class Engine:
 
     def _end(self, state: CampaignState, reason: str) -> Outcome:
         """Make the bench safe whatever happened, and say how the campaign ended."""
+        if not self._safe:
+            self._log.board.update(step_text="making the bench safe")
         complaints = () if self._safe else make_safe(self._whole, self._stage.clock)
         self.complaints = complaints
         if complaints:

@@ -19,7 +19,7 @@ from labctl.services.planning import load_bench
 from labctl.services.resuming import ResumeRequest, prepare_resume
 from labctl.services.running import prepare
 from labctl.store import Store
-from studies.mortal import Killed, Life, MortalDatabase, World
+from studies.mortal import Killed, Life, MortalDatabase, World, all_readings, complete_data_sets
 
 KILLS = int(os.environ.get("LABCTL_STUDY_KILLS", "240"))
 SEED = 20
@@ -142,7 +142,7 @@ def judge(kill: Kill, expected: Fitted, folder: Path) -> Verdict:
             store.close()
             return Verdict("done", 0, 0, 0, world.within_limits, True, 0.0, False)
         return _verdict(database, world, done[0].id, set(), expected)
-    before = database.all_readings()
+    before = all_readings(database)
     request = ResumeRequest(by="the next process", power="lost" if kill.power_cut else "kept")
     opened = world.open()
     running.run(store, prepare_resume(store, left[0].id, world.bench_file, lambda _: world.clock, request, opened))
@@ -157,13 +157,13 @@ def _verdict(
     expected: Fitted,
 ) -> Verdict:
     store, planned = Store(database), set(range(1, DATA_SETS + 1))
-    complete = database.complete()
+    complete = complete_data_sets(database)
     row, steps = store.campaigns.get(campaign), store.campaigns.steps(campaign)
     wrong = sum(complete[number] != 1 for number in planned) + len(set(complete) - planned)
     verdict = Verdict(
         row.state,
         sum(step.state != "done" for step in steps),
-        len(before - database.all_readings()),
+        len(before - all_readings(database)),
         wrong,
         world.within_limits,
         _safe(world),

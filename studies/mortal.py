@@ -111,21 +111,6 @@ class MortalDatabase(Database):
             self.synced_bytes = self.log.stat().st_size
         self.life.tick()
 
-    def all_readings(self) -> set[tuple[int, int, int]]:
-        """Return every reading, of complete and of partial data sets, as (recording, data set, time in ns)."""
-        b, found = tables.sample_blocks.c, set()
-        with self.reading() as connection:
-            for recording, number in connection.execute(sa.select(b.recording_id, b.number).distinct()).all():
-                for part in blocks_of(connection, recording, number):
-                    found |= {(recording, number, int(t_ns)) for t_ns in part["t_ns"]}
-        return found
-
-    def complete(self) -> Counter[int]:
-        """Return how often each data set of the plan is there as a complete one."""
-        d = tables.data_sets.c
-        with self.reading() as connection:
-            return Counter(connection.scalars(sa.select(d.planned).where(d.state == "complete")))
-
     def left_behind(self, folder: Path, *, power_cut: bool, rng: np.random.Generator) -> str:
         """Copy what the next process finds: everything committed, or after a power cut what was on the disk at least.
 
@@ -140,6 +125,23 @@ class MortalDatabase(Database):
                 data = data[: int(rng.integers(self.synced_bytes, len(data) + 1))]
             (folder / "lab.sqlite-wal").write_bytes(data)
         return str(copy)
+
+
+def all_readings(database: Database) -> set[tuple[int, int, int]]:
+    """Return every reading, of complete and of partial data sets, as (recording, data set, time in ns)."""
+    b, found = tables.sample_blocks.c, set()
+    with database.reading() as connection:
+        for recording, number in connection.execute(sa.select(b.recording_id, b.number).distinct()).all():
+            for part in blocks_of(connection, recording, number):
+                found |= {(recording, number, int(t_ns)) for t_ns in part["t_ns"]}
+    return found
+
+
+def complete_data_sets(database: Database) -> Counter[int]:
+    """Return how often each data set of the plan is there as a complete one."""
+    d = tables.data_sets.c
+    with database.reading() as connection:
+        return Counter(connection.scalars(sa.select(d.planned).where(d.state == "complete")))
 
 
 class World:
