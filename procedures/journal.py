@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
@@ -21,6 +22,20 @@ class CampaignState(StrEnum):
     DONE = "done"
     ABORTED = "aborted"
     FAILED = "failed"
+
+
+_S = CampaignState
+#: Which state may follow which. Only `done` is final: what failed or was aborted goes on by a person's word, what a
+#: dying process left as it was by itself. A suspension inside a pause is a pause for another reason.
+NEXT: Mapping[CampaignState, frozenset[CampaignState]] = {
+    _S.PLANNED: frozenset({_S.RUNNING, _S.ABORTED, _S.FAILED}),
+    _S.RUNNING: frozenset({_S.RUNNING, _S.PAUSED, _S.WAITING, _S.DONE, _S.ABORTED, _S.FAILED}),
+    _S.PAUSED: frozenset({_S.RUNNING, _S.PAUSED, _S.ABORTED, _S.FAILED}),
+    _S.WAITING: frozenset({_S.RUNNING, _S.ABORTED, _S.FAILED}),
+    _S.DONE: frozenset(),
+    _S.ABORTED: frozenset({_S.RUNNING}),
+    _S.FAILED: frozenset({_S.RUNNING}),
+}
 
 
 class DataSetState(StrEnum):

@@ -20,6 +20,7 @@ from procedures.limits import BenchLimits
 from procedures.operator import HandOperator
 from procedures.plan import Plan, make_plan
 from procedures.recipe import Recipe
+from procedures.takeup import Restart
 
 TABLE = TableLimits(max_rate_dps=450, max_acceleration_dps2=200, step_deg=0.225)
 CHAMBER = ChamberLimits(min_c=-70, max_c=150, resolution_c=0.1, ramp_c_per_min=10)
@@ -312,8 +313,10 @@ class Rig:
         )
         return self.engine
 
-    def run(self, recipe: Recipe | None = None, start_at: int = 0, **options: Any) -> Any:
-        return self.make(recipe, **options).run(start_at)
+    def run(
+        self, recipe: Recipe | None = None, start_at: int = 0, restart: Restart | None = None, **options: Any
+    ) -> Any:
+        return self.make(recipe, **options).run(start_at, restart)
 
     def when_step(self, kind: str, act: Callable[[], None]) -> None:
         """Do something once, when the first step of that kind begins."""
