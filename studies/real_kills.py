@@ -23,7 +23,9 @@ from studies.mortal import all_readings, complete_data_sets
 
 KILLS = int(os.environ.get("LABCTL_STUDY_REAL_KILLS", "30"))
 SPEED = 60.0
-WHOLE_S = 22.0  #: of the wall, about what the campaign takes
+#: About what the campaign takes of the wall. A machine that is busy otherwise loses readings at this speed: the recipe
+#: allows for that, as it is not what is looked at here.
+WHOLE_S = 22.0
 RECIPE = """
 format = "labctl-recipe/1"
 name = "killed"
@@ -38,6 +40,8 @@ timeout_s = 1800
 [acquire]
 duration_s = 20
 settle_s = 2
+[guards]
+max_damaged_fraction = 0.5
 """
 DATA_SETS = 6
 

@@ -1,4 +1,4 @@
-"""Whatever is done to a campaign in whatever order: its states follow the table, and its plan is done once and whole."""
+"""Whatever is done to a campaign in whatever order: its states follow the table, its plan is done once and whole."""
 
 from __future__ import annotations
 
@@ -85,22 +85,25 @@ class Campaign(RuleBasedStateMachine):
         self.rig.journal.hooks.insert(0, lambda *_: dead())
         raise Killed
 
-    open = precondition(lambda self: self.state is not CampaignState.DONE)
+    unfinished = precondition(lambda self: self.state is not CampaignState.DONE)
 
-    @open
+    @unfinished
     @rule(at=instants)
     def is_killed(self, at: int) -> None:
         self.leg(at=[(at, self.kill)])
 
-    @open
+    @unfinished
     @rule(at=instants)
     def is_aborted(self, at: int) -> None:
         self.leg(at=[(at, lambda: self.rig.control.abort("enough"))])
 
-    @open
+    @unfinished
     @rule(at=instants, last=st.integers(1, 40))
     def is_paused_and_goes_on(self, at: int, last: int) -> None:
-        self.leg(at=[(at, self.rig_pause), (at + last, lambda: self.rig.control.resume())])
+        self.leg(at=[(at, self.rig_pause), (at + last, self.rig_goes_on)])
+
+    def rig_goes_on(self) -> None:
+        self.rig.control.resume()
 
     def rig_pause(self) -> None:
         self.rig.control.pause()
@@ -113,7 +116,7 @@ class Campaign(RuleBasedStateMachine):
 
         self.rig.journal.hooks.append(goes_on)
 
-    @open
+    @unfinished
     @rule(at=instants, device=st.sampled_from(["table", "chamber", "imu", "fog"]), times=st.integers(1, 5))
     def meets_a_fault(self, at: int, device: str, times: int) -> None:
         def fail() -> None:
@@ -124,7 +127,7 @@ class Campaign(RuleBasedStateMachine):
 
         self.leg(at=[(at, fail)])
 
-    @open
+    @unfinished
     @rule()
     def is_left_alone(self) -> None:
         self.leg()
