@@ -177,8 +177,10 @@ def _campaign(seed: int, bench: BenchFile, armed: tuple[Armed, ...], folder: Pat
     now_s = clock.now_s()
     for each in armed:
         simulation.faults(each.url).clear()
-    chamber = open_bench(bench, clock, simulation).chamber
-    safe = not simulation.world.table.moving(now_s) and abs(chamber.read().setpoint_c - bench.chamber.safe_c) < 0.11
+    looked = open_bench(bench, clock, simulation)
+    at_safe_c = abs(looked.chamber.read().setpoint_c - bench.chamber.safe_c) < 0.11
+    looked.close()
+    safe = at_safe_c and not simulation.world.table.moving(now_s)
     end = End(
         seed, armed, row.state, row.reason, hung, journal.handed_over - len(all_readings(database)), safe,
         bool(store.benches.unconfirmed(bench.name)),

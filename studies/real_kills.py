@@ -22,28 +22,31 @@ from labctl.store.database import Database
 from studies.mortal import all_readings, complete_data_sets
 
 KILLS = int(os.environ.get("LABCTL_STUDY_REAL_KILLS", "30"))
-SPEED = 60.0
-#: About what the campaign takes of the wall. A machine that is busy otherwise loses readings at this speed: the recipe
-#: allows for that, as it is not what is looked at here.
-WHOLE_S = 22.0
+SPEED = 5.0
+#: About what the campaign takes of the wall. A machine that is busy otherwise stalls for seconds of the bench's time:
+#: the recipe allows for that, as it is not what is looked at here.
+WHOLE_S = 16.0
 RECIPE = """
 format = "labctl-recipe/1"
 name = "killed"
-temperatures_c = [24, 26]
-rates_dps = [-40, 0, 40]
+temperatures_c = [25]
+rates_dps = [-40, 0, 20, 40]
 positions = ["z"]
 [soak]
-hold_s = 30
+hold_s = 10
 max_drift_c = 2.0
-drift_window_s = 30
+drift_window_s = 10
 timeout_s = 1800
 [acquire]
-duration_s = 20
+duration_s = 8
 settle_s = 2
 [guards]
-max_damaged_fraction = 0.5
+max_damaged_fraction = 0.9
+stale_s = 600
+[on_failure]
+acquire_attempts = 20
 """
-DATA_SETS = 6
+DATA_SETS = 4
 
 
 @dataclass(frozen=True)

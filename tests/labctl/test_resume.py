@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
 from instruments.errors import NoReply
+from labctl.cli.app import app
 from labctl.errors import Conflict
 from labctl.services.acts import ResumeRequest
 from labctl.services.planning import load_bench
@@ -141,12 +141,12 @@ def test_what_is_not_confirmed_safe_stays_until_a_person_clears_it(tmp_path: Pat
         assert "NOT confirmed safe: chamber to its safe set point: chamber: no answer" in answer.reason
     for command in (["campaign", "start", "short", "--bench", "single-axis-sim"], ["campaign", "resume", "1"]):
         refused = labctl(location, *command)
-        assert refused.returncode == 2
+        assert refused.exit_code == 2
         assert "labctl bench clear single-axis-sim" in refused.stderr
     status = labctl(location, "bench", "status", "--json")
-    assert (status.returncode, "no answer" in json.loads(status.stdout)[0]["unconfirmed"]) == (1, True)
-    assert labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").returncode == 0
-    assert labctl(location, "bench", "status").returncode == 0
+    assert (status.exit_code, "no answer" in json.loads(status.stdout)[0]["unconfirmed"]) == (1, True)
+    assert labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").exit_code == 0
+    assert labctl(location, "bench", "status").exit_code == 0
     assert "nothing is unconfirmed" in labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").stderr
     assert json.loads(labctl(location, "campaign", "resume", "1", "--by", "Ada", "--json").stdout)["state"] == "done"
     with open_store(location, write=False) as store:
@@ -154,8 +154,7 @@ def test_what_is_not_confirmed_safe_stays_until_a_person_clears_it(tmp_path: Pat
 
 
 def labctl(location: str, *arguments: str) -> Any:
-    command = [sys.executable, "-m", "labctl", *arguments, "--database", location]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return CliRunner().invoke(app, [*arguments, "--database", location])
 
 
 def test_a_campaign_that_never_gets_on_waits_for_a_person(tmp_path: Path) -> None:
