@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
+from labctl.errors import Conflict, StoreError
 from labctl.services import running
 from labctl.services.bench_runner import BenchRunner
 from labctl.services.house import House
@@ -127,11 +129,11 @@ def command(database: Path, *arguments: str) -> list[str]:
 def begun(database: Path) -> None:
     """Wait until the first data set of a campaign in another process is being taken."""
     for _ in range(PATIENCE):
-        if database.exists():
-            with open_store(str(database), write=False) as store:
-                rows = store.campaigns.all()
-                if rows and any(step.kind == "acquire" and step.started_s for step in store.campaigns.steps(1)):
-                    return
+        with contextlib.suppress(Conflict, StoreError):  # the other process is making the database
+            if database.exists():
+                with open_store(str(database), write=False) as store:
+                    if any(step.kind == "acquire" and step.started_s for step in store.campaigns.steps(1)):
+                        return
         time.sleep(0.05)
     raise AssertionError("no data set was ever taken")
 
