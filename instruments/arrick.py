@@ -74,6 +74,7 @@ class ArrickC4:
 
     def identify(self) -> str:
         """Get what the controller says it is (`!1fp`, a text that begins with C4)."""
+        self._fresh()
         self._send("!1fp")
         text = self._line()
         if not text.startswith("C4"):
@@ -95,6 +96,7 @@ class ArrickC4:
 
     def home(self) -> None:
         """Control the table to its home switch (`!1h1`, one `o`); the angle is 0 deg there."""
+        self._fresh()
         self._send("!1h1")
         self._expect("o", HOME_S, "home")
         self._steps, self._moving = 0.0, None
@@ -106,6 +108,7 @@ class ArrickC4:
             now = self._clock.now_s()
             return Spin(0.0, 0.0, now, now + steady_s + SPARE_S, self._steps * self._step_deg, self._step_deg)
         run = plan_run(self.settings, rate_dps, steady_s)
+        self._fresh()
         self._program(run)
         steps = run.steps * self.settings.direction
         self._send(f"!1m1{'f' if steps > 0 else 'r'}{abs(steps)}n")
@@ -200,6 +203,15 @@ class ArrickC4:
             self._divisor, self._ramp_set = None, False
         return self._port
 
+    def _fresh(self) -> None:
+        """Drop late replies: of a command that was given up, or of an earlier process. Not while a move's `o` waits."""
+        if self._moving is not None:
+            return
+        try:
+            self._open().reset_input_buffer()
+        except (serial.SerialException, OSError) as error:
+            self._lose(error)
+
     def _send(self, command: str) -> None:
         try:
             self._open().write((command + self.settings.terminator).encode("ascii"))
@@ -243,7 +255,7 @@ class ArrickC4:
             )
 
     def _line(self) -> str:
-        text = self._byte(REPLY_S)
+        text = self._byte(REPLY_S, skip="ao")  # letters of an earlier move that ended just now
         port = self._open()
         while (found := bytes(port.read(1))) and found not in b"\r\n":
             text += found.decode("latin-1")

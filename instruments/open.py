@@ -54,9 +54,13 @@ class Bench:
             raise failures[0]
 
 
-def open_bench(bench: BenchFile, clock: Clock) -> Bench:
-    """Make the drivers of a bench. No byte is sent before one of them is used."""
-    simulation = open_simulation(bench, clock) if bench.has_simulated else None
+def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = None) -> Bench:
+    """Make the drivers of a bench. No byte is sent before one of them is used.
+
+    `simulation` is the world that simulated instruments stand in, where it is there already.
+    """
+    if simulation is None and bench.has_simulated:
+        simulation = open_simulation(bench, clock)
     ports = Ports(clock, simulation)
     return Bench(
         TABLES[bench.table.driver](bench.table, ports, clock),

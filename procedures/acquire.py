@@ -11,14 +11,13 @@ from procedures.errors import BadData, GuardTripped, StepFailed
 from procedures.journal import DataSetHeader, DataSetState
 from procedures.logbook import warning
 from procedures.situation import Tally, gyro_temperature_c
-from procedures.stage import Stage, heed
+from procedures.stage import UNIT_FAULTS, Stage, heed
 from procedures.steps import Acquire
 
 LEAD_S = 0.5  #: streams are cleared this long before the gate opens
 BLOCK_S = 1.0  #: readings are written down this often
 #: With several units each is read in turn while the others' ports buffer; half a second of the fastest stream fits.
 SHARED_BLOCK_S = 0.5
-READINGS_AT_FAULT = {"damaged_readings", "invalid_readings"}
 
 
 def acquire(stage: Stage, step: Acquire) -> dict[str, float]:
@@ -26,25 +25,43 @@ def acquire(stage: Stage, step: Acquire) -> dict[str, float]:
 
     Raises StepFailed, InstrumentError, Aborted.
     """
-    attempts = stage.recipe.on_failure.acquire_attempts
-    for attempt in range(1, attempts + 1):
+    attempt = 0
+    while True:
+        attempt += 1
         try:
             return _take(stage, step)
         except (LinkError, BadData, GuardTripped) as error:
-            if attempt == attempts or not _lies_with_readings(stage, error):
+            unit = _unit_at_fault(stage, error)
+            if unit is None:
                 raise
+            if attempt >= stage.recipe.on_failure.acquire_attempts:
+                if not stage.can_drop(unit):
+                    raise
+                stage.drop(unit, str(error))
+                attempt = 0  # the others had no fault of their own yet
             stage.log.event(warning("data_set_repeated", f"data set {step.dataset} is taken again: {error}"))
             stage.bench.table.stop()
-            for gyro in stage.bench.gyros.values():
-                gyro.stop()
-                gyro.start()
-    raise AssertionError("a recipe allows at least one attempt")
+            reopen(stage)
 
 
-def _lies_with_readings(stage: Stage, error: Exception) -> bool:
-    if isinstance(error, LinkError):
-        return error.device in stage.bench.gyros
-    return isinstance(error, BadData) or (isinstance(error, GuardTripped) and error.kind in READINGS_AT_FAULT)
+def reopen(stage: Stage) -> None:
+    """Open every unit's stream anew; a unit that cannot be reached drops out where others go on."""
+    for name, gyro in list(stage.bench.gyros.items()):
+        try:
+            gyro.stop()
+            gyro.start()
+        except LinkError as error:
+            if not stage.can_drop(name):
+                raise
+            stage.drop(name, str(error))
+
+
+def _unit_at_fault(stage: Stage, error: LinkError | BadData | GuardTripped) -> str | None:
+    """Return the unit whose readings failed; None when it is something else, or a limit that suspends."""
+    if isinstance(error, GuardTripped) and (error.kind not in UNIT_FAULTS or error.action != "fail"):
+        return None
+    unit = error.gyro if isinstance(error, BadData) else error.device
+    return unit if unit in stage.bench.gyros else None
 
 
 def _take(stage: Stage, step: Acquire) -> dict[str, float]:
@@ -110,6 +127,8 @@ def _header(stage: Stage, step: Acquire, spin: Spin, gate: tuple[float, float]) 
         gate_until_s=gate[1] - stage.log.start_s,
         angle_from_deg=float(spin.angle_deg(np.array([gate[0]]))[0]),
         setpoint_c=stage.watch.setpoint_c,
+        run=step.run + stage.added_runs,
+        gyros=tuple(stage.bench.gyros),
     )
 
 

@@ -6,7 +6,8 @@ ProcedureError
 ├── StepFailed           a step could not be carried out
 │   ├── SoakFailed       a temperature was not reached or did not settle in time
 │   ├── BadData          a unit's readings are missing, damaged or too few
-│   └── GuardTripped     a limit that is watched was passed
+│   ├── GuardTripped     a limit that is watched was passed
+│   └── Unanswered       nobody answered a question in time
 ├── Aborted              a person asked for the end
 └── StalePrompt          an answer to a question that is no longer asked
 """
@@ -55,10 +56,15 @@ class BadData(StepFailed):
 class GuardTripped(StepFailed):
     """A limit that is watched was passed; `kind` names the guard and `action` what the recipe wants done."""
 
-    def __init__(self, kind: str, action: str, reason: str) -> None:
+    def __init__(self, kind: str, action: str, reason: str, device: str = "") -> None:
         super().__init__(reason)
         self.kind = kind
         self.action = action
+        self.device = device
+
+
+class Unanswered(StepFailed):
+    """Nobody answered a question in time."""
 
 
 class Aborted(ProcedureError):

@@ -38,7 +38,7 @@ class Trip:
 
     def error(self) -> GuardTripped:
         """Return what ends the step."""
-        return GuardTripped(self.kind, self.action, self.message)
+        return GuardTripped(self.kind, self.action, self.message, self.device)
 
 
 @dataclass(frozen=True)
@@ -58,11 +58,24 @@ Check = Callable[["Guards", Situation], Iterator[Excess]]
 class Guards:
     """All limits of one campaign."""
 
-    def __init__(self, rules: GuardRules, limits: BenchLimits, chamber: str = "chamber", table: str = "table") -> None:
+    def __init__(
+        self,
+        rules: GuardRules,
+        limits: BenchLimits | Callable[[], BenchLimits],
+        chamber: str = "chamber",
+        table: str = "table",
+    ) -> None:
         self.rules = rules
-        self.limits = limits
+        self._limits = limits
         self.chamber = chamber
         self.table = table
+
+    @property
+    def limits(self) -> BenchLimits:
+        """The limits of the bench; its controllers are asked at first use."""
+        if not isinstance(self._limits, BenchLimits):
+            self._limits = self._limits()
+        return self._limits
 
     def check(self, now: Situation) -> list[Trip]:
         """Return every limit that is passed at this moment."""
@@ -113,6 +126,15 @@ def _chamber_deviation(guards: Guards, now: Situation) -> Iterator[Excess]:
         yield Excess(guards.chamber, off_c, guards.rules.chamber_deviation_c, "deg C", text)
 
 
+def _unit_off_air(guards: Guards, now: Situation) -> Iterator[Excess]:
+    limit_c = guards.rules.max_gyro_off_air_c
+    for name, temperature_c in now.gyro_c.items():
+        off_c = abs(temperature_c - now.chamber_c)
+        if now.taking_readings and off_c > limit_c:
+            text = f"its own thermometer is off the air's {now.chamber_c:.1f} deg C by"
+            yield Excess(name, off_c, limit_c, "deg C", text)
+
+
 def _chamber_alarm(guards: Guards, now: Situation) -> Iterator[Excess]:
     if now.alarms:
         yield Excess(guards.chamber, float(len(now.alarms)), 0.0, "", f"alarms ({', '.join(now.alarms)})")
@@ -157,4 +179,5 @@ CHECKS: Mapping[GuardKind, Check] = {
     "damaged_readings": _damaged,
     "invalid_readings": _invalid,
     "rate": _rate,
+    "unit_off_air": _unit_off_air,
 }

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from instruments.errors import LinkError
+from instruments.gyro import Gyro
 from procedures.acquire import acquire
-from procedures.errors import SoakFailed, StepFailed
+from procedures.errors import GuardTripped, SoakFailed, StepFailed
+from procedures.journal import Event
 from procedures.operator import Prompt
 from procedures.safe import make_safe
 from procedures.settle import SoakJudge
@@ -14,6 +17,8 @@ from procedures.stage import Stage
 from procedures.steps import Home, Mount, MoveChamber, PowerOff, PowerOn, Rest, SafeState, Soak
 
 Figures = dict[str, float]
+#: A unit that is silent when its stream is opened is asked again after these.
+STARTING_PAUSES_S = (1.0, 2.0, 4.0)
 
 
 def home(stage: Stage, _step: Home) -> Figures:
@@ -27,29 +32,54 @@ def home(stage: Stage, _step: Home) -> Figures:
 def power_on(stage: Stage, step: PowerOn) -> Figures:
     """Have the units switched on, make sure they are who the bench file says, open their streams, warm up."""
     stage.soaked = None
-    stage.ask(Prompt(stage.new_prompt_id(), "power_on", f"switch the units on (session {step.run})"))
-    open_streams(stage, step.run)
+    run = step.run + stage.added_runs
+    stage.ask(Prompt(stage.new_prompt_id(), "power_on", f"switch the units on (session {run})"))
+    stage.log.journal.session_began(run, stage.log.t_s())
+    open_streams(stage, run)
     stage.watch_for(step.wait_s)
-    return {"run": float(step.run)}
+    return {"run": float(run)}
 
 
-def open_streams(stage: Stage, run: int) -> None:
-    """Open every unit's stream and begin to watch it."""
-    for gyro in stage.bench.gyros.values():
-        gyro.identify()
-        gyro.start()
+def open_streams(stage: Stage, run: int, *, dropping: bool = True) -> None:
+    """Open every unit's stream and begin to watch it. A unit may take a while to start up.
+
+    One that stays silent drops out where others go on. Raises InstrumentError.
+    """
+    for name in list(stage.bench.gyros):
+        try:
+            _open_stream(stage, stage.bench.gyros[name])
+        except LinkError as error:
+            if not dropping or not stage.can_drop(name):
+                raise
+            stage.drop(name, str(error))
     stage.watch.powered(run)
+
+
+def _open_stream(stage: Stage, gyro: Gyro) -> None:
+    for pause_s in (*STARTING_PAUSES_S, None):
+        try:
+            gyro.identify()
+            gyro.start()
+        except LinkError:
+            if pause_s is None:
+                raise
+            stage.pass_time(pause_s, pausing=False)
+        else:
+            return
 
 
 def power_off(stage: Stage, step: PowerOff) -> Figures:
     """Close the streams and have the units switched off; the chamber is watched while they are."""
     stage.soaked = None
+    if not stage.watch.run:  # the switching-on was left out
+        return {"run": 0.0}
     for gyro in stage.bench.gyros.values():
         gyro.stop()
     stage.watch.powered(0)
-    stage.ask(Prompt(stage.new_prompt_id(), "power_off", f"switch the units off (session {step.run})"))
+    run = step.run + stage.added_runs
+    stage.ask(Prompt(stage.new_prompt_id(), "power_off", f"switch the units off (session {run})"))
     stage.watch_for(step.off_s)
-    return {"run": float(step.run)}
+    return {"run": float(run)}
 
 
 def mount(stage: Stage, step: Mount) -> Figures:
@@ -85,7 +115,7 @@ def move_chamber(stage: Stage, step: MoveChamber) -> Figures:
 
 
 def soak(stage: Stage, step: Soak) -> Figures:
-    """Hold a temperature until the units have taken it. Raises SoakFailed, never passes, when they do not in time."""
+    """Hold a temperature until the units have taken it. When they do not in time, the recipe says what follows."""
     judge = SoakJudge(step)
     began_s = stage.clock.now_s() - stage.paused_s
     with stage.watch.telling(judge.add):
@@ -94,10 +124,22 @@ def soak(stage: Stage, step: Soak) -> Figures:
                 break
             took_s = stage.clock.now_s() - stage.paused_s - began_s
             if took_s >= step.timeout_s:
-                reason = f"the soak at {step.temperature_c:g} deg C did not settle within {step.timeout_s:g} s"
-                raise SoakFailed(f"{reason}: {judge.why_not()}", judge.figures())
+                _unsettled(stage, step, judge, took_s)
+                break
     stage.soaked = step
     return judge.figures()
+
+
+def _unsettled(stage: Stage, step: Soak, judge: SoakJudge, took_s: float) -> None:
+    """Do what the recipe says about a soak that does not settle. Raises SoakFailed or GuardTripped, or warns."""
+    action = stage.recipe.guards.actions.get("soak", "fail")
+    reason = f"the soak at {step.temperature_c:g} deg C did not settle within {step.timeout_s:g} s: {judge.why_not()}"
+    level = "warning" if action == "warn" else "error"
+    stage.log.event(Event("guard.soak", reason, level, stage.bench.chamber.name, took_s, step.timeout_s, "s"))
+    if action == "fail":
+        raise SoakFailed(reason, judge.figures())
+    if action == "suspend":
+        raise GuardTripped("soak", action, reason, stage.bench.chamber.name)
 
 
 def rest(stage: Stage, step: Rest) -> Figures:
@@ -110,7 +152,7 @@ def rest(stage: Stage, step: Rest) -> Figures:
 def safe_state(stage: Stage, _step: SafeState) -> Figures:
     """Bring the bench to its safe state. Raises StepFailed naming what could not be confirmed."""
     stage.watch.powered(0)
-    if complaints := make_safe(stage.bench, stage.clock):
+    if complaints := make_safe(stage.whole, stage.clock):
         raise StepFailed("NOT confirmed safe: " + "; ".join(complaints))
     return {}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
@@ -23,6 +24,20 @@ class CampaignState(StrEnum):
     FAILED = "failed"
 
 
+_S = CampaignState
+#: Which state may follow which. Only `done` is final: what failed or was aborted goes on by a person's word, what a
+#: dying process left as it was by itself. A suspension inside a pause is a pause for another reason.
+NEXT: Mapping[CampaignState, frozenset[CampaignState]] = {
+    _S.PLANNED: frozenset({_S.RUNNING, _S.ABORTED, _S.FAILED}),
+    _S.RUNNING: frozenset({_S.RUNNING, _S.PAUSED, _S.WAITING, _S.DONE, _S.ABORTED, _S.FAILED}),
+    _S.PAUSED: frozenset({_S.RUNNING, _S.PAUSED, _S.ABORTED, _S.FAILED}),
+    _S.WAITING: frozenset({_S.RUNNING, _S.ABORTED, _S.FAILED}),
+    _S.DONE: frozenset(),
+    _S.ABORTED: frozenset({_S.RUNNING}),
+    _S.FAILED: frozenset({_S.RUNNING}),
+}
+
+
 class DataSetState(StrEnum):
     """What became of a data set. Only complete ones are fitted; the others are kept and marked."""
 
@@ -42,6 +57,8 @@ class DataSetHeader:
     gate_until_s: float
     angle_from_deg: float  #: table angle at `gate_from_s`
     setpoint_c: float
+    run: int  #: powered session as it really was: the plan's, and those that a power cut added
+    gyros: tuple[str, ...]  #: the units that take part, by name
 
 
 @dataclass(frozen=True)
@@ -81,6 +98,14 @@ class Journal(Protocol):
 
     def step_ended(self, index: int, result: StepResult, t_s: float, at: datetime) -> None:
         """Record how step `index` ended."""
+        ...
+
+    def session_began(self, run: int, t_s: float) -> None:
+        """Record that the units were switched on for session `run`."""
+        ...
+
+    def unit_dropped(self, gyro: str, reason: str) -> None:
+        """Record that a unit takes no further part, and why."""
         ...
 
     def dataset_opened(self, header: DataSetHeader) -> int:

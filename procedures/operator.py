@@ -35,6 +35,11 @@ class Answer:
 class Operator(Protocol):
     """Somebody who can be asked. The engine asks once and then looks for the answer about once a second."""
 
+    @property
+    def at_once(self) -> bool:
+        """Whether answers come without anybody having to walk up."""
+        ...
+
     def ask(self, prompt: Prompt) -> None:
         """Put the question; must not block for longer than it takes to show it."""
         ...
@@ -50,6 +55,8 @@ class Operator(Protocol):
 
 class HandOperator:
     """Somebody who does at once what is asked, with a hand that reaches into the simulated bench."""
+
+    at_once = True
 
     def __init__(self, hand: Hand, by: str = "simulated bench") -> None:
         self._hand = hand
@@ -71,6 +78,8 @@ class HandOperator:
 
 class PersonOperator:
     """A person who answers from another thread: command line, HTTP, a page. One question at a time."""
+
+    at_once = False
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

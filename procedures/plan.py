@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict
 from procedures.limits import BenchLimits, fit_to_bench
 from procedures.recipe import Recipe
 from procedures.schedule import Level, Stay, schedule
-from procedures.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerOn, SafeState, Soak, Step
+from procedures.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerOn, Rest, SafeState, Soak, Step
 
 # What is expected of things that have no limit to compute with; only the forecast hangs on them.
 ROOM_C = 25.0
@@ -60,11 +60,18 @@ class Plan(BaseModel):
     def lead_in(self, index: int) -> tuple[Step, ...]:
         """Return what has to be done again before step `index` can be run from cold: home, temperature, soak.
 
-        For taking up a campaign in the middle. The mounting is as it was left, so no Mount is among them.
+        For taking up a campaign in the middle. The mounting is as it was left, so no Mount is among them. What the
+        step does itself is not done before it: no temperature before one that sets another.
         """
+        if index >= len(self.steps) or isinstance(self.steps[index], SafeState):
+            return ()
+        if isinstance(self.steps[index], Home | MoveChamber):
+            return (Home(),)
         before = self.steps[:index]
         move = next((step for step in reversed(before) if isinstance(step, MoveChamber)), None)
         soak = None
+        if not isinstance(self.steps[index], Acquire | Rest):
+            return (Home(), *((move,) if move else ()))
         for step in reversed(before):
             if isinstance(step, Mount | MoveChamber | PowerOn | PowerOff):
                 break
@@ -73,9 +80,30 @@ class Plan(BaseModel):
                 break
         return (Home(), *(each for each in (move, soak) if each is not None))
 
-    def run_at(self, index: int) -> int:
+    def mounted_at(self, index: int) -> str | None:
+        """Return the position in which the units are before step `index`; None when nobody has turned them yet."""
+        mounts = [step.position for step in self.steps[:index] if isinstance(step, Mount)]
+        return mounts[-1] if mounts else None
+
+    def left_out_with(self, index: int) -> tuple[int, ...]:
+        """Return the steps that make no sense without the mounting of step `index`: its temperatures and data sets.
+
+        A switching-on among them goes too where the next mounting switches on anew.
+        """
+        mount = self.steps[index]
+        assert isinstance(mount, Mount)
+        of_it = [
+            n for n, step in enumerate(self.steps) if isinstance(step, Acquire) and step.mounting == mount.mounting
+        ]
+        end = max(of_it, default=index)
+        later = next((step for step in self.steps[end + 1 :] if isinstance(step, PowerOn | Acquire)), None)
+        kinds: tuple[type, ...] = (Acquire, Soak, MoveChamber, Rest)
+        kinds = kinds if isinstance(later, Acquire) else (*kinds, PowerOn, PowerOff)
+        return tuple(n for n in range(index + 1, end + 1) if isinstance(self.steps[n], kinds))
+
+    def run_at(self, index: int, skipped: frozenset[int] = frozenset()) -> int:
         """Return the number of the powered session in force at step `index`; 0 when the units are off."""
-        return _powered(self.steps[:index])
+        return _powered(tuple(step for n, step in enumerate(self.steps[:index]) if n not in skipped))
 
 
 def _powered(steps: tuple[Step, ...]) -> int:

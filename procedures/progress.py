@@ -32,6 +32,8 @@ class Progress:
     gyro_c: Mapping[str, float] = field(default_factory=dict)
     rate_dps: float = 0.0
     prompt: Prompt | None = None  #: the question that waits for a person
+    links: Mapping[str, str] = field(default_factory=dict)  #: devices that are not well: degraded or lost
+    dropped: Mapping[str, str] = field(default_factory=dict)  #: units that take no further part, and why
     last_event: str = ""
     last_error: str = ""
 

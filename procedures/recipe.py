@@ -27,6 +27,8 @@ GuardKind = Literal[
     "damaged_readings",
     "invalid_readings",
     "rate",  # really run against asked
+    "unit_off_air",  # a unit's own thermometer against the air, while readings are taken
+    "soak",  # a temperature that a unit does not take in time
 ]
 
 
@@ -100,15 +102,30 @@ class GuardRules(Table):
     max_rate_error_fraction: Number = Field(default=0.01, gt=0)  #: the rate really run against the one asked for
     #: What a trip does; a guard that is not named fails the campaign.
     actions: dict[GuardKind, Action] = {"invalid_readings": "warn"}
+    max_gyro_off_air_c: Number = Field(default=20.0, gt=0)  #: of a unit that has been soaked; more is no self-heating
     release_s: Number = Field(default=60.0, ge=0)  #: a suspended campaign goes on after the limits held for this long
     suspend_timeout_s: Number = Field(default=7200.0, gt=0)  #: and fails when they did not within this
+    max_suspensions: Whole = Field(default=10, ge=0)  #: of one step; once more fails
 
 
 class OnFailure(Table):
     """What is tried before a campaign gives up."""
 
     acquire_attempts: Whole = Field(default=2, ge=1)  #: a data set whose readings failed is taken again
+    link_attempts: Whole = Field(default=3, ge=1)  #: a step whose instrument fell silent is begun so often
     operator_timeout_s: Number | None = Field(default=None, gt=0)  #: absent: a question waits for ever
+    operator_remind_s: Number | None = Field(default=None, gt=0)  #: an open question is put again this often
+    #: What an unanswered mounting leads to: the end, or its data sets left out and the next mounting asked for.
+    operator_timeout: Literal["fail", "skip"] = "fail"
+
+
+class ResumeRules(Table):
+    """What is done before an interrupted campaign goes on."""
+
+    #: Unwatched for longer, a temperature is soaked again. Absent: for as long as the air takes to leave its band and
+    #: come back unseen, twice the band over the chamber's ramp.
+    soak_again_after_s: Number | None = Field(default=None, ge=0)
+    instruments_within_s: Number = Field(default=120.0, ge=0)  #: they may still be starting up after a power cut
 
 
 class Recipe(Table):
@@ -135,6 +152,7 @@ class Recipe(Table):
     mounting: Mounting = Mounting()
     guards: GuardRules = GuardRules()
     on_failure: OnFailure = OnFailure()
+    resume: ResumeRules = ResumeRules()
 
 
 def shipped_recipes() -> dict[str, Path]:

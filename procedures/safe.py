@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator
 from functools import partial
 
@@ -11,14 +12,25 @@ from instruments.table import RateTable
 from procedures.bench import Bench
 
 STANDSTILL_TIMEOUT_S = 30.0
+#: Before each further round of what could not be confirmed: a wire may come back.
+PAUSES_S = (2.0, 10.0, 30.0)
 
 
 def make_safe(bench: Bench, clock: Clock) -> tuple[str, ...]:
     """Bring the bench to its safe state; returns what could not be confirmed, empty when all is well.
 
-    Every part is tried even when another fails. An interrupt (Ctrl-C) during a part makes it be tried once more.
+    Every part is tried even when another fails; what failed is tried again, after all the others, with growing pauses.
+    An interrupt (Ctrl-C) during a part makes it be tried once more.
     """
-    return tuple(complaint for part in _parts(bench, clock) for complaint in _tried(*part))
+    open_parts = [(what, part, "") for what, part in _parts(bench, clock)]
+    for pause_s in (0.0, *PAUSES_S):
+        with contextlib.suppress(KeyboardInterrupt):  # without the pause the next try only comes earlier
+            clock.sleep(pause_s)
+        tried = [(what, part, _tried(what, part)) for what, part, _ in open_parts]
+        open_parts = [each for each in tried if each[2]]
+        if not open_parts:
+            break
+    return tuple(complaint for _, _, complaint in open_parts)
 
 
 def _parts(bench: Bench, clock: Clock) -> Iterator[tuple[str, Callable[[], str | None]]]:
@@ -28,18 +40,19 @@ def _parts(bench: Bench, clock: Clock) -> Iterator[tuple[str, Callable[[], str |
         yield f"stream of {name} closed", gyro.stop
 
 
-def _tried(what: str, part: Callable[[], str | None]) -> list[str]:
+def _tried(what: str, part: Callable[[], str | None]) -> str:
+    """Try one part; returns what is to be complained of, empty when it is confirmed."""
     for attempt in (1, 2):
         try:
             complaint = part()
         except Exception as error:  # noqa: BLE001  whatever one part does, the others are still tried
-            return [f"{what}: {error or type(error).__name__}"]
+            return f"{what}: {str(error) or type(error).__name__}"
         except KeyboardInterrupt:
             if attempt == 2:
-                return [f"{what}: interrupted twice"]
+                return f"{what}: interrupted twice"
         else:
-            return [f"{what}: {complaint}"] if complaint else []
-    return []
+            return f"{what}: {complaint}" if complaint else ""
+    return ""
 
 
 def _stop_table(table: RateTable, clock: Clock) -> str | None:

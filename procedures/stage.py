@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from instruments.clock import Clock
+from instruments.errors import InstrumentError
 from procedures.bench import Bench
 from procedures.control import Control
-from procedures.errors import Aborted, StepFailed
+from procedures.crew import Crew
+from procedures.errors import Aborted, StepFailed, Unanswered
 from procedures.guard import Trip
 from procedures.journal import CampaignState, Event
-from procedures.logbook import Logbook
+from procedures.logbook import Logbook, warning
 from procedures.operator import Answer, Operator, Prompt
 from procedures.recipe import Recipe
 from procedures.steps import Soak
@@ -21,6 +25,7 @@ CHECK_S = 1.0  #: how long the clock runs at most between two looks at what a pe
 #: From look to look. With a second of reading and a unit's reply in between, rows of the environment are never more
 #: than 10 s apart, which is what effects with a memory need.
 LOOK_S = 8.5
+UNIT_FAULTS = {"stale", "damaged_readings", "invalid_readings"}  #: a trip that is one unit's own
 
 
 @dataclass
@@ -28,12 +33,14 @@ class Stage:
     """Everything a step handler may touch."""
 
     recipe: Recipe
-    bench: Bench
+    bench: Crew
+    whole: Bench  #: with the units that dropped out
     clock: Clock
     operator: Operator
     control: Control
     log: Logbook
     watch: Watch
+    added_runs: int = 0  #: powered sessions more than the plan has
     paused_s: float = 0.0  #: how long the campaign was paused so far
     soaked: Soak | None = None  #: the soak that still holds: its temperature has not been left since
     _questions: int = field(default=0, repr=False)
@@ -74,7 +81,32 @@ class Stage:
 
     def look(self, *, glance: bool = True) -> None:
         """Look at the bench once. Raises GuardTripped for a limit that does more than warn, and InstrumentError."""
-        heed(self.watch.look(LOOK_S, glance=glance))
+        trips = self.watch.look(LOOK_S, glance=glance)
+        heed(trips if self.watch.taking else self.without_dropouts(trips))
+
+    def without_dropouts(self, trips: list[Trip]) -> list[Trip]:
+        """Let units drop out whose readings failed while others go on; returns the other trips."""
+        left = []
+        for trip in trips:
+            if trip.action == "fail" and trip.kind in UNIT_FAULTS and self.can_drop(trip.device):
+                self.drop(trip.device, trip.message)
+            else:
+                left.append(trip)
+        return left
+
+    def can_drop(self, device: str) -> bool:
+        """Return whether a device is a unit without which the campaign can go on."""
+        return device in self.bench.gyros and len(self.bench.gyros) > 1
+
+    def drop(self, gyro: str, reason: str) -> None:
+        """Let a unit take no further part; the others go on."""
+        unit = self.bench.drop(gyro, reason)
+        self.watch.forget(gyro)
+        with contextlib.suppress(InstrumentError, OSError):  # its stream is closed once more in the safe state
+            unit.stop()
+        self.log.journal.unit_dropped(gyro, reason)
+        self.log.board.update(dropped=dict(self.bench.dropped))
+        self.log.event(Event("unit_dropped", f"{gyro} takes no further part: {reason}", level="error", device=gyro))
 
     def hold(self) -> None:
         """Stay as things are while a person wants a pause; the environment is recorded and guards stay armed."""
@@ -83,7 +115,7 @@ class Stage:
         before, began_s = self.log.state, self.clock.now_s()
         self.log.change_state(CampaignState.PAUSED, self.control.wish.reason)
         next_look_s = began_s
-        with self.watch.telling(self._notice_leaving):
+        with self.watch.telling(self.notice_leaving):
             while self.control.wish.pause:
                 if self.clock.now_s() >= next_look_s:
                     self.look()
@@ -93,9 +125,11 @@ class Stage:
         self.paused_s += self.clock.now_s() - began_s
         self.log.change_state(before, self.control.wish.reason)
 
-    def _notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
+    def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
         """Forget that a temperature was taken once the air has left its band."""
         if self.soaked and abs(chamber_c - self.soaked.temperature_c) > self.soaked.band_c:
+            text = f"{self.soaked.temperature_c:g} deg C was left: the air is at {chamber_c:.2f} deg C"
+            self.log.event(Event("soak_owed", text))
             self.soaked = None
 
     def ask(self, prompt: Prompt) -> Answer:
@@ -103,6 +137,7 @@ class Stage:
 
         Raises StepFailed when the answer is no or does not come in time, and what `looks` raises.
         """
+        self.log.event(Event("operator.asked", f"{prompt.text} [question {prompt.id}]"))
         self.operator.ask(prompt)
         answer = self.operator.answer(prompt.id)
         if answer is None:
@@ -113,14 +148,20 @@ class Stage:
         return answer
 
     def _wait_for(self, prompt: Prompt) -> Answer:
-        timeout_s = self.recipe.on_failure.operator_timeout_s
+        rules = self.recipe.on_failure
+        timeout_s, remind_s = rules.operator_timeout_s, rules.operator_remind_s or math.inf
         began_s = next_look_s = self.clock.now_s()
+        remind_at_s = began_s + remind_s
         self.log.board.update(prompt=prompt)
         self.log.change_state(CampaignState.WAITING, prompt.text)
         try:
             while (answer := self.operator.answer(prompt.id)) is None:
                 if timeout_s is not None and self.clock.now_s() - began_s >= timeout_s:
-                    raise StepFailed(f"nobody answered within {timeout_s:g} s: {prompt.text}")
+                    raise Unanswered(f"nobody answered within {timeout_s:g} s: {prompt.text}")
+                if self.clock.now_s() >= remind_at_s:
+                    remind_at_s += remind_s
+                    waited = f"since {self.clock.now_s() - began_s:.0f} s"
+                    self.log.event(warning("operator.reminded", f"{prompt.text} [question {prompt.id}], open {waited}"))
                 if self.clock.now_s() >= next_look_s:
                     self.look()
                     next_look_s = self.clock.now_s() + LOOK_S

@@ -108,6 +108,6 @@ class StepResult(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    outcome: Literal["done", "failed", "interrupted"]
+    outcome: Literal["done", "failed", "interrupted", "skipped"]
     reason: str = ""
     figures: dict[str, float] = Field(default_factory=dict)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from typing import Literal
 
 from instruments.chamber import ChamberState
 from instruments.errors import InstrumentError, LinkError
@@ -11,12 +12,19 @@ from instruments.table import Spin
 from procedures.bench import Bench
 from procedures.guard import Guards, Trip
 from procedures.journal import EnvironmentSample, Event
-from procedures.logbook import Logbook, warning
+from procedures.logbook import Logbook
 from procedures.situation import Situation, Tally, gyro_temperature_c
 
 Listener = Callable[[float, float, Mapping[str, float]], None]  #: campaign time, air and unit temperatures
 
-WHILE_READING = {"chamber_deviation", "damaged_readings", "invalid_readings", "rate"}  #: armed only during a data set
+LinkState = Literal["degraded", "lost"]  #: silent for a moment; silent for too long
+WHILE_READING = {
+    "chamber_deviation",
+    "damaged_readings",
+    "invalid_readings",
+    "rate",
+    "unit_off_air",
+}  #: armed only during a data set
 
 
 class Watch:
@@ -33,7 +41,7 @@ class Watch:
         self._listeners: list[Listener] = []
         self._tripped: set[tuple[str, str]] = set()
         self._heard_s: dict[str, float] = {}
-        self._silent: set[str] = set()
+        self._links: dict[str, LinkState] = {}
         self._chamber: ChamberState | None = None
         self._gyro_c: dict[str, float] = {}
         self._spin: Spin | None = None
@@ -51,11 +59,22 @@ class Watch:
         """Take in that the units were switched on (session number) or off (0)."""
         self.run = run
         self._gyro_c = {}
-        self._silent &= {self._bench.chamber.name}
         for name in self._bench.gyros:
+            self._links.pop(name, None)
             self._heard_s.pop(name, None)
             if run:
                 self._heard_s[name] = self._log.t_s()
+
+    def forget(self, gyro: str) -> None:
+        """Take in that a unit takes no further part."""
+        self._gyro_c.pop(gyro, None)
+        self._heard_s.pop(gyro, None)
+        self._tripped = {each for each in self._tripped if each[1] != gyro}
+
+    @property
+    def taking(self) -> bool:
+        """Whether readings are taken now."""
+        return self._taking_readings
 
     @property
     def chamber_c(self) -> float:
@@ -118,6 +137,9 @@ class Watch:
     def judge(self) -> list[Trip]:
         """Hold what is known now against the guards; writes down what has changed since the last time."""
         trips = self._guards.check(self._situation())
+        for trip in trips:
+            if trip.kind == "stale":
+                self.link(trip.device, "lost", trip.message)
         tripped: set[tuple[str, str]] = {(trip.kind, trip.device) for trip in trips}
         for trip in trips:
             if (trip.kind, trip.device) not in self._tripped:
@@ -151,21 +173,35 @@ class Watch:
             self._note_silence(name, error)
             return False
         self._heard_s[name] = self._log.t_s()
-        self._silent.discard(name)
+        self.link(name, "well")
         return True
 
     def _glance(self) -> None:
         for name, gyro in self._bench.gyros.items():
             try:
+                if name in self._links:
+                    gyro.start()  # a port that broke is opened again
                 readings = gyro.glance()
             except LinkError as error:
                 self._note_silence(name, error)
                 continue
             self.heard(name, gyro_temperature_c(gyro, readings))
-            self._silent.discard(name)
+            self.link(name, "well")
 
     def _note_silence(self, device: str, error: InstrumentError) -> None:
         self._gyro_c.pop(device, None)
-        if device not in self._silent:
-            self._silent.add(device)
-            self._log.event(warning("silence", f"{error}; asked again at the next look", device))
+        self.link(device, "degraded", f"{error}; asked again at the next look")
+
+    def link(self, device: str, state: Literal["well", "degraded", "lost"], why: str = "") -> None:
+        """Take in how a device can be reached; a change is an event. What is lost is not merely degraded again."""
+        before = self._links.get(device, "well")
+        if state == before or (before == "lost" and state == "degraded"):
+            return
+        if state == "well":
+            del self._links[device]
+            self._log.event(Event("link.well", f"{device}: answers again", device=device))
+        else:
+            self._links[device] = state
+            level = "warning" if state == "degraded" else "error"
+            self._log.event(Event(f"link.{state}", why, level=level, device=device))
+        self._log.board.update(links=dict(self._links))

@@ -9,8 +9,7 @@ from fastapi import APIRouter, Header
 from fastapi.responses import StreamingResponse
 
 from labctl.api.rooms import HouseOf
-from labctl.services import campaigns as services
-from labctl.services.acts import CampaignRequest, ReasonRequest
+from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
@@ -25,7 +24,7 @@ def start(request: CampaignRequest, house: HouseOf) -> CampaignAnswer:
 @router.get("", summary="All campaigns")
 def campaigns(house: HouseOf) -> list[CampaignAnswer]:
     """Every campaign, newest first."""
-    return services.list_campaigns(house.store)
+    return house.campaigns()
 
 
 @router.get("/{campaign}", summary="One campaign")
@@ -37,18 +36,44 @@ def campaign(campaign: int, house: HouseOf) -> CampaignAnswer:
 @router.post("/{campaign}/abort", summary="End a campaign")
 def abort(campaign: int, request: ReasonRequest, house: HouseOf) -> CampaignAnswer:
     """End a running campaign now, in the safe state. What was measured is kept."""
-    return house.acts().abort_campaign(campaign, request.reason)
+    return house.acts().abort_campaign(campaign, request.text)
+
+
+@router.post("/{campaign}/pause", summary="Hold a campaign")
+def pause(campaign: int, request: ReasonRequest, house: HouseOf) -> CampaignAnswer:
+    """Hold after the present data set. `wish` says that it was asked; `state` becomes `paused` when it holds."""
+    return house.acts().pause_campaign(campaign, request)
+
+
+@router.post("/{campaign}/resume", summary="Let a campaign go on")
+def resume(campaign: int, request: ResumeRequest, house: HouseOf) -> CampaignAnswer:
+    """Let a paused campaign go on, or take up one that was interrupted, failed or aborted, safe state first."""
+    return house.acts().resume_campaign(campaign, request)
+
+
+@router.post("/{campaign}/confirm", summary="Answer a campaign's question")
+def confirm(campaign: int, request: ConfirmRequest, house: HouseOf) -> CampaignAnswer:
+    """Answer the question with this id; an answer to an older one is refused."""
+    return house.acts().confirm(campaign, request)
 
 
 @router.get("/{campaign}/events", summary="Follow a campaign", response_class=StreamingResponse)
 async def events(
     campaign: int, house: HouseOf, last_event_id: Annotated[int | None, Header()] = None
 ) -> StreamingResponse:
-    """Server-sent events from the first or, with `Last-Event-ID`, from the one after it, until the campaign ends."""
+    """Server-sent events from the first or, with `Last-Event-ID`, from the one after it, until the campaign ends.
+
+    Between them `progress`, without an id: where the campaign stands, whenever that has changed.
+    """
 
     async def stream() -> AsyncIterator[bytes]:
-        async for event in house.follow(campaign, after=last_event_id or 0):
-            yield f"id: {event.id}\nevent: {event.kind}\ndata: {event.model_dump_json()}\n\n".encode()
+        async for told in house.follow(campaign, after=last_event_id or 0):
+            if told is None:
+                yield b": alive\n\n"
+            elif isinstance(told, CampaignAnswer):  # no id: it is not resumed from
+                yield f"event: progress\ndata: {told.model_dump_json()}\n\n".encode()
+            else:
+                yield f"id: {told.id}\nevent: {told.kind}\ndata: {told.model_dump_json()}\n\n".encode()
 
     house.status(campaign)
     return StreamingResponse(stream(), media_type="text/event-stream", headers={"Cache-Control": "no-cache"})

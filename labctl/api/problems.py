@@ -13,7 +13,7 @@ from starlette.exceptions import HTTPException
 
 from instruments.errors import InstrumentError
 from labctl.errors import DiskFull, LabctlError, NotIdentified, TooLarge
-from procedures.errors import PlanRefused, ProcedureError
+from procedures.errors import PlanRefused, ProcedureError, StalePrompt
 
 TYPE_PREFIX = "urn:labctl:problem:"
 
@@ -45,6 +45,8 @@ def _of_an_instrument(request: Request, error: InstrumentError) -> JSONResponse:
 
 
 def _of_a_procedure(request: Request, error: ProcedureError) -> JSONResponse:
+    if isinstance(error, StalePrompt):
+        return problem(409, "stale-prompt", _title(type(error)), str(error), request.url.path)
     slug = "plan-refused" if isinstance(error, PlanRefused) else "recipe"
     return problem(400, slug, _title(type(error)), str(error), request.url.path)
 

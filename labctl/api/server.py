@@ -95,8 +95,11 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> None:
         signal.signal(
             signal.SIGHUP, lambda *_: setattr(server, "should_exit", True)
         )  # a lost terminal ends it in order
-        with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how it is stopped
-            server.run(sockets=[listener])
+        try:
+            with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how it is stopped
+                server.run(sockets=[listener])
+        finally:
+            house.close()  # a second Ctrl-C makes the server skip it
 
 
 def access_for(request: ServeRequest, house: House, at: str) -> Access:

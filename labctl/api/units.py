@@ -7,7 +7,9 @@ from typing import Any
 from fastapi import APIRouter
 
 from labctl.api.rooms import HouseOf
-from labctl.services.answers import UnitAnswer
+from labctl.services.acts import ClearRequest
+from labctl.services.answers import BenchStatus, UnitAnswer
+from labctl.services.benches import bench_statuses
 from labctl.services.catalogue import catalogue
 from labctl.services.units import list_units, unit
 
@@ -30,6 +32,18 @@ def one_unit(serial: str, house: HouseOf) -> UnitAnswer:
 def benches(house: HouseOf) -> list[dict[str, Any]]:
     """The bench that this service runs: its instruments, limits and what it is doing."""
     return house.benches()
+
+
+@router.get("/benches/status", summary="What could not be confirmed safe")
+def bench_states(house: HouseOf) -> list[BenchStatus]:
+    """Every bench of this database, with what its last safe state could not confirm."""
+    return bench_statuses(house.store)
+
+
+@router.post("/benches/{bench}/clear", summary="Say that a bench was looked at")
+def clear(bench: str, request: ClearRequest, house: HouseOf) -> BenchStatus:
+    """Take in that a person has looked at a bench whose safe state was not confirmed; campaigns may start again."""
+    return house.acts().clear_bench(bench, request)
 
 
 @router.get("/effects", summary="The catalogue of physical effects")

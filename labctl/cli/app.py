@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from labctl.actor import Actor, acting
-from labctl.cli import bench, calibrations, campaign, criticism, keeping, recordings, serving
+from labctl.cli import bench, calibrations, campaign, criticism, keeping, recordings, running, serving
 from labctl.config import os_user
 
 app = typer.Typer(
@@ -22,6 +22,7 @@ app = typer.Typer(
 )
 app.add_typer(bench.app, name="bench")
 app.add_typer(campaign.app, name="campaign")
+running.add_to(campaign.app)
 app.add_typer(recordings.export_app, name="export")
 app.add_typer(keeping.key_app, name="key")
 app.add_typer(keeping.audit_app, name="audit")

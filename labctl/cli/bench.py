@@ -35,6 +35,40 @@ def check(
         raise typer.Exit(1)
 
 
+@app.command("status")
+def status(as_json: Json = False, database: Database = None) -> None:
+    """Say which benches were not confirmed safe when their last campaign ended."""
+    from labctl.services.benches import bench_statuses
+    from labctl.services.opening import open_reading
+
+    with one_clear_line(), open_reading(database) as store:
+        benches = bench_statuses(store)
+    if as_json:
+        print_json(benches)
+    else:
+        for bench in benches:
+            console.print(f"{bench.name:18} {bench.unconfirmed or 'nothing is unconfirmed'}", markup=False)
+    if any(bench.unconfirmed for bench in benches):
+        raise typer.Exit(1)
+
+
+@app.command("clear")
+def clear(
+    bench: Annotated[str, typer.Argument(metavar="NAME", help="Name of the bench, as `labctl bench status` says it.")],
+    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Who has looked at it.")],
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="What was found.")] = "looked at the bench",
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Say that you have looked at a bench that was not confirmed safe; campaigns may start on it again."""
+    from labctl.services.acts import ClearRequest
+    from labctl.services.opening import open_acts
+
+    with one_clear_line(), open_acts(database) as acts:
+        answer = acts.clear_bench(bench, ClearRequest(by=by, reason=reason))
+    print_json(answer) if as_json else console.print(f"{answer.name}: nothing is unconfirmed", markup=False)
+
+
 @app.command("list")
 def list_(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001
     """List the benches that ship with labctl."""

@@ -1,8 +1,7 @@
-"""`labctl campaign`: plan, start, list, status, watch, abort."""
+"""`labctl campaign`: plan, start, list, status."""
 
 from __future__ import annotations
 
-from datetime import timedelta
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -85,6 +84,7 @@ def start(
     database: Database = None,
 ) -> None:
     """Run a recipe. A service that holds the database runs it on its bench; else it runs here, until it is over."""
+    from labctl.cli.attendant import Attendant
     from labctl.cli.progress import CampaignProgress
     from labctl.services.opening import service_url
     from labctl.services.running import StartRequest, run_here
@@ -97,11 +97,13 @@ def start(
             answer = RemoteActs(url).start_campaign(request)
         else:
             with ending_is_an_interrupt(), CampaignProgress(quiet=as_json) as progress:
-                answer = run_here(database, request, progress.update)
-    if as_json:
-        print_json(answer)
-    else:
-        print_campaign(answer)
+                answer = run_here(database, request, progress.update, Attendant().attend)
+    print_end(answer, as_json=as_json)
+
+
+def print_end(answer: CampaignAnswer, *, as_json: bool) -> None:
+    """Print how a campaign ended; exit 1 when that is not as it was meant."""
+    print_json(answer) if as_json else print_campaign(answer)
     if answer.state in {"failed", "aborted"}:
         raise typer.Exit(1)
 
@@ -121,6 +123,14 @@ def print_campaign(answer: CampaignAnswer) -> None:
             f"  chamber {figure(answer.chamber_c)} deg C, gyro {figure(answer.gyro_c)} deg C, "
             f"table {figure(answer.rate_dps)} deg/s"
         )
+    if answer.prompt is not None:
+        console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow", markup=False)
+    if answer.wish is not None:
+        console.print(f"  {answer.wish} was asked for and follows", style="yellow", markup=False)
+    for device, state in answer.links.items():
+        console.print(f"  {device}: link {state}", style="red", markup=False)
+    for unit, why in answer.dropped.items():
+        console.print(f"  {unit} takes no further part: {why}", style="red", markup=False)
     if answer.last_error:
         console.print(f"  last fault: {answer.last_error}", style="red", markup=False)
     for serial, recording in answer.recordings.items():
@@ -149,53 +159,21 @@ def list_(as_json: Json = False, database: Database = None) -> None:
 
 @app.command("status")
 def status(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
-    """Say where a campaign is."""
-    from labctl.services.campaigns import campaign_status
-    from labctl.services.opening import open_reading
+    """Say where a campaign is: live from a running service, else what the database tells."""
+    with one_clear_line():
+        answer = look(database, campaign)
+    print_json(answer) if as_json else print_campaign(answer)
 
-    with one_clear_line(), open_reading(database) as store:
+
+def look(database: str | None, campaign: int | None) -> CampaignAnswer:
+    """Return where a campaign is; without a number the newest."""
+    from labctl.services.campaigns import campaign_status
+    from labctl.services.opening import open_reading, service_url
+
+    with open_reading(database) as store:
         answer = campaign_status(store, campaign)
-    print_json(answer) if as_json else print_campaign(answer)
+    if url := service_url(database):
+        from labctl.services.remote import RemoteActs
 
-
-@app.command("watch")
-def watch(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
-    """Follow a campaign until it ends: from a running service live, else what the database tells."""
-    from instruments.clock import SystemClock
-    from labctl.cli.progress import CampaignProgress
-    from labctl.services.campaigns import campaign_status
-    from labctl.services.opening import open_reading
-
-    clock = SystemClock()
-    with one_clear_line(), CampaignProgress(quiet=as_json) as progress:
-        while True:
-            with open_reading(database) as store:
-                answer = campaign_status(store, campaign)
-            progress.update(answer)
-            if answer.abandoned or answer.state not in {"planned", "running", "paused", "waiting"}:
-                break
-            clock.sleep(1.0)
-    print_json(answer) if as_json else print_campaign(answer)
-
-
-@app.command("abort")
-def abort(
-    campaign: Annotated[int, typer.Argument(metavar="ID", help="Campaign.")],
-    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")] = "aborted from the command line",
-    as_json: Json = False,
-    database: Database = None,
-) -> None:
-    """End a running campaign now, in the safe state. What was measured is kept."""
-    from labctl.services.opening import open_acts
-
-    with one_clear_line(), open_acts(database) as acts:
-        answer = acts.abort_campaign(campaign, reason)
-    print_json(answer) if as_json else print_campaign(answer)
-
-
-def remaining(answer: CampaignAnswer) -> timedelta | None:
-    """Return how long a campaign still takes by its own clock."""
-    if answer.expected_end is None or answer.started_at is None:
-        return None
-    total = answer.expected_end - answer.started_at
-    return total * (1 - answer.progress)
+        return RemoteActs(url).campaign(answer.id)
+    return answer

@@ -6,11 +6,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported
 from procedures.errors import RecipeError
 from procedures.recipe import shipped_recipes
 
@@ -69,9 +69,41 @@ class CampaignRequest(Request):
 
 
 class ReasonRequest(Request):
-    """Why something is done to a campaign, or to a key."""
+    """Why something is done to a campaign, or to a key, and by whom."""
 
     reason: str = Field(min_length=1)
+    by: str = Field(default="", max_length=200)
+
+    @property
+    def text(self) -> str:
+        """Reason and person in one."""
+        return f"{self.reason} ({self.by})" if self.by else self.reason
+
+
+class ConfirmRequest(Request):
+    """An answer to the question with this id; an answer to an older question is refused."""
+
+    prompt: str = Field(min_length=1)
+    by: str = Field(min_length=1, max_length=200)
+    confirmed: bool = Field(default=True, description="False: it cannot be done, and the campaign ends.")
+    reason: str = ""
+
+
+class ResumeRequest(Request):
+    """How a campaign that is paused or was interrupted goes on."""
+
+    by: str = Field(default="a person", min_length=1, max_length=200)
+    reason: str = ""
+    power: Literal["lost", "kept"] | None = Field(
+        default=None, description="Whether the units were off meanwhile; absent: yes when the host was."
+    )
+
+
+class ClearRequest(Request):
+    """Who has looked at a bench whose safe state was not confirmed."""
+
+    by: str = Field(min_length=1, max_length=200)
+    reason: str = "looked at the bench"
 
 
 class BackupNote(Request):
@@ -119,4 +151,20 @@ class Acts(Protocol):
 
     def note_backup(self, note: BackupNote) -> None:
         """Write down that a backup was made."""
+        ...
+
+    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+        """Ask a running campaign to hold after the present data set."""
+        ...
+
+    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+        """Let a paused campaign go on, or take up one that was interrupted."""
+        ...
+
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+        """Answer the question that a campaign has put. Raises StalePrompt for another one."""
+        ...
+
+    def clear_bench(self, bench: str, request: ClearRequest) -> BenchStatus:
+        """Take in that a person has looked at a bench that was not confirmed safe."""
         ...

@@ -167,6 +167,15 @@ class PlanAnswer(Answer):
     visibility: list[Visibility] | None = Field(default=None, description="What the plan could and could not find.")
 
 
+class PromptAnswer(Answer):
+    """A question to a person; an answer names its id."""
+
+    id: str
+    kind: str
+    text: str
+    position: str | None = None
+
+
 class CampaignAnswer(Answer):
     """Where a campaign is."""
 
@@ -184,6 +193,10 @@ class CampaignAnswer(Answer):
     gyro_c: float | None = None
     rate_dps: float | None = None
     last_error: str | None = None
+    wish: Literal["pause", "abort"] | None = Field(default=None, description="Asked for, and not yet taken up.")
+    prompt: PromptAnswer | None = Field(default=None, description="The question that waits for a person.")
+    links: dict[str, str] = Field(default_factory=dict, description="Instruments that are degraded or lost.")
+    dropped: dict[str, str] = Field(default_factory=dict, description="Units that take no further part: name -> why.")
     abandoned: bool = Field(default=False, description="No process runs it any more, and it has no end.")
     started_at: datetime | None = None
     ended_at: datetime | None = None
@@ -199,6 +212,15 @@ class EventAnswer(Answer):
     kind: str
     level: str
     message: str
+
+
+class BenchStatus(Answer):
+    """A bench, and what its last safe state could not confirm."""
+
+    name: str
+    last_used_at: datetime
+    unconfirmed: str = Field(default="", description="Until a person has looked and clears it; empty when all is well.")
+    unconfirmed_at: datetime | None = None
 
 
 class DeviceCheck(Answer):

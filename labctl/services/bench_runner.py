@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -9,14 +10,19 @@ from typing import Any
 
 from instruments.bench import BenchFile
 from instruments.clock import Clock
-from labctl.errors import Conflict
-from labctl.services.acts import CampaignRequest
+from instruments.errors import InstrumentError
+from labctl.errors import Conflict, LabctlError
+from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import answer_of, campaign_status
+from labctl.services.resuming import prepare_resume, too_often
 from labctl.services.running import Prepared, prepare, run
 from labctl.store import CampaignRow, Store
 from procedures.control import Control
+from procedures.errors import StalePrompt
+from procedures.operator import Operator, PersonOperator
 from procedures.progress import Progress
+from procedures.shield import uninterrupted
 
 #: How long closing waits for a campaign to reach its safe state.
 SAFE_WITHIN_S = 120.0
@@ -27,6 +33,7 @@ class _Job:
     """A campaign that runs now."""
 
     row: CampaignRow
+    operator: Operator
     control: Control = field(default_factory=Control)
     progress: Progress | None = None
     thread: threading.Thread | None = None
@@ -56,16 +63,79 @@ class BenchRunner:
     def start(self, request: CampaignRequest) -> CampaignAnswer:
         """Plan, write down and begin a campaign. Raises Conflict while another runs, and whatever planning raises."""
         with self._guard:
-            if self._job is not None:
-                raise Conflict(
-                    f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
-                )
+            self._refuse_while_busy()
             prepared = prepare(self._store, request.recipe, self._bench, self._make_clock(), clip=request.clip)
-            job = _Job(self._store.campaigns.get(prepared.id))
-            job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
-            self._job = job
-            job.thread.start()
+            self._begin(prepared)
         return campaign_status(self._store, prepared.id)
+
+    def _refuse_while_busy(self) -> None:
+        if self._job is not None:
+            raise Conflict(
+                f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
+            )
+
+    def _begin(self, prepared: Prepared) -> None:
+        job = _Job(self._store.campaigns.get(prepared.id), prepared.operator)
+        job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
+        self._job = job
+        job.thread.start()
+
+    def resume(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+        """Let a paused campaign go on, or take up one that was interrupted, failed or aborted.
+
+        Raises Conflict while another runs, when it is done, or when the bench waits to be looked at.
+        """
+        with self._guard:
+            job = self._job
+            if job is not None and job.row.id == campaign:
+                if not job.control.wish.pause:
+                    raise Conflict(f"campaign {campaign} runs and is not paused")
+                job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
+            else:
+                self._refuse_while_busy()
+                make_clock = self._make_clock
+                self._begin(prepare_resume(self._store, campaign, self._bench, lambda _: make_clock(), request))
+        return self.status(campaign) or campaign_status(self._store, campaign)
+
+    def take_up_left(self) -> None:
+        """Take up the campaign that an earlier process left on this bench; what hinders it becomes its reason."""
+        for row in self._store.campaigns.unfinished():
+            if row.bench_name != self._bench.name:
+                continue
+            why_not = too_often(self._store.interruptions.standing(row.id))
+            try:
+                if why_not is None:
+                    self.resume(row.id, ResumeRequest(by="the service at its start"))
+                    return
+            except (LabctlError, InstrumentError) as error:
+                why_not = f"not taken up: {error}"
+            self._store.campaigns.close_unfinished(row.id, why_not, self._make_clock().utc())
+
+    def pause(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+        """Ask the running campaign to hold after the present data set. Raises Conflict when it does not run here."""
+        self._running(campaign).control.pause(request.text)
+        answer = self.status(campaign)
+        return answer or campaign_status(self._store, campaign)
+
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+        """Answer the open question. Raises StalePrompt for any other one, Conflict when nothing is asked here."""
+        operator = self._running(campaign).operator
+        if not isinstance(operator, PersonOperator):
+            raise StalePrompt(
+                f"question {request.prompt!r} is not asked: this bench turns and switches units by itself"
+            )
+        if request.confirmed:
+            operator.confirm(request.prompt, request.by)
+        else:
+            operator.decline(request.prompt, request.by, request.reason or "no reason given")
+        return self.status(campaign) or campaign_status(self._store, campaign)
+
+    def _running(self, campaign: int) -> _Job:
+        job = self._job
+        if job is None or job.row.id != campaign:
+            state = self._store.campaigns.get(campaign).state
+            raise Conflict(f"campaign {campaign} does not run on bench {self._bench.name} now; it is {state}")
+        return job
 
     def _run(self, job: _Job, prepared: Prepared) -> None:
         def seen(progress: Progress) -> None:
@@ -80,19 +150,28 @@ class BenchRunner:
 
     def _ring(self) -> None:
         for listener in tuple(self._listeners):
-            listener()
+            try:
+                listener()
+            except RuntimeError:  # its loop has ended: nobody listens there any more
+                with contextlib.suppress(ValueError):
+                    self._listeners.remove(listener)
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
         self._listeners.append(listener)
-        return lambda: self._listeners.remove(listener)
+
+        def stop() -> None:
+            with contextlib.suppress(ValueError):
+                self._listeners.remove(listener)
+
+        return stop
 
     def status(self, campaign: int) -> CampaignAnswer | None:
         """Return the live picture of a campaign that runs here."""
         job = self._job
         if job is None or job.row.id != campaign or job.progress is None:
             return None
-        return answer_of(self._store.campaigns.get(campaign), job.progress)
+        return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.wish)
 
     def abort(self, campaign: int, reason: str) -> CampaignAnswer:
         """End the running campaign in the safe state; returns once it is there."""
@@ -111,6 +190,7 @@ class BenchRunner:
             "latitude_deg": self._bench.latitude_deg,
             "units": [{"name": g.name, "serial": g.serial, "driver": g.driver} for g in self._bench.gyros],
             "campaign": job.row.id if job is not None else None,
+            "unconfirmed": self._store.benches.unconfirmed(self._bench.name),
         }
 
     def close(self) -> None:
@@ -118,4 +198,5 @@ class BenchRunner:
         job = self._job
         if job is not None and job.thread is not None:
             job.control.abort("the service stops")
-            job.thread.join(SAFE_WITHIN_S)
+            with uninterrupted():  # an impatient Ctrl-C must not leave the bench as it is
+                job.thread.join(SAFE_WITHIN_S)

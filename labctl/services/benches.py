@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,9 @@ from instruments.clock import ScaledClock, SystemClock, VirtualClock
 from instruments.open import check
 from instruments.ports import serve_simulation
 from labctl.errors import BadInput
-from labctl.services.answers import DeviceCheck
+from labctl.services.answers import BenchStatus, DeviceCheck
 from labctl.services.planning import load_bench
+from labctl.store import BenchRow, Store
 
 
 def check_bench(source: str) -> list[DeviceCheck]:
@@ -30,6 +32,16 @@ def shipped() -> list[dict[str, Any]]:
         units = ", ".join(f"{gyro.serial} ({gyro.driver})" for gyro in bench.gyros)
         found.append({"name": name, "text": f"{bench.table.driver}, {bench.chamber.driver}, {units}"})
     return found
+
+
+def bench_status(row: BenchRow) -> BenchStatus:
+    """Return a bench as it leaves the house."""
+    return BenchStatus(**asdict(row))
+
+
+def bench_statuses(store: Store) -> list[BenchStatus]:
+    """Return every bench that was used, and what its last safe state could not confirm."""
+    return [bench_status(row) for row in store.benches.all()]
 
 
 def serve_simulator(source: str, out: Path | None, speed: float, ready: Callable[[dict[str, str]], None]) -> None:

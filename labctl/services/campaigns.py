@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from labctl.services.answers import CampaignAnswer, EventAnswer
+from dataclasses import asdict
+from datetime import timedelta
+from typing import Literal
+
+from labctl.services.answers import CampaignAnswer, EventAnswer, PromptAnswer
 from labctl.store import CampaignRow, EventRow, Store
+from procedures.control import Wish
 from procedures.progress import Progress
 
 ENDED = frozenset({"done", "aborted", "failed"})
 
 
-def answer_of(row: CampaignRow, progress: Progress) -> CampaignAnswer:
-    """Return a campaign as its engine sees it."""
+def answer_of(row: CampaignRow, progress: Progress, wish: Wish | None = None) -> CampaignAnswer:
+    """Return a campaign as its engine sees it, with what a person asked for and the engine has not yet done."""
+    state, prompt = progress.state.value, progress.prompt
     return CampaignAnswer(
         id=row.id,
         recipe=row.recipe_name,
         bench=row.bench_name,
-        state=progress.state.value,
+        state=state,
         reason=progress.reason,
         step=progress.step,
         steps=progress.steps,
@@ -26,10 +32,20 @@ def answer_of(row: CampaignRow, progress: Progress) -> CampaignAnswer:
         gyro_c=next(iter(progress.gyro_c.values()), None),
         rate_dps=progress.rate_dps,
         last_error=progress.last_error or None,
+        wish=None if wish is None or state in ENDED else _open_wish(wish, state),
+        prompt=None if prompt is None else PromptAnswer(**asdict(prompt)),
+        links=dict(progress.links),
+        dropped=dict(progress.dropped),
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
     )
+
+
+def _open_wish(wish: Wish, state: str) -> Literal["pause", "abort"] | None:
+    if wish.abort:
+        return "abort"
+    return "pause" if wish.pause and state != "paused" else None
 
 
 def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
@@ -39,7 +55,10 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
     done_s = sum(step.expected_s for step in steps if step.state == "done")
     there = store.campaigns.last_environment(row.id) or {}
     current = begun[-1] if begun else None
-    faults = [event for event in store.campaigns.events(row.id, limit=100_000) if event.level == "error"]
+    left_s = sum(step.expected_s for step in steps if step.state in {"planned", "running"})
+    events = store.campaigns.events(row.id, limit=1_000_000)
+    faults = [event for event in events if event.level == "error"]
+    over = row.state in ENDED
     return CampaignAnswer(
         id=row.id,
         recipe=row.recipe_name,
@@ -50,10 +69,12 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
         steps=len(steps),
         step_text="" if current is None else current.kind.replace("_", " "),
         progress=1.0 if row.state == "done" else min(done_s / max(row.expected_s, 1e-9), 1.0),
+        expected_end=None if over or not events else events[-1].at + timedelta(seconds=left_s),
         chamber_c=there.get("chamber_c"),
         gyro_c=there.get("temperature_c"),
         rate_dps=None if current is None else current.body.get("rate_dps", 0.0),
         last_error=faults[-1].message if faults else None,
+        dropped=store.interruptions.standing(row.id).dropped,
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
@@ -62,20 +83,23 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
 
 def list_campaigns(store: Store) -> list[CampaignAnswer]:
     """Return every campaign, newest first."""
-    return [_looked_after(store, from_rows(store, row)) for row in store.campaigns.all()]
+    return [looked_after(from_rows(store, row), by_somebody=store.is_held) for row in store.campaigns.all()]
 
 
 def campaign_status(store: Store, campaign: int | None) -> CampaignAnswer:
     """Return where a campaign is; without a number the newest. Raises NotFound."""
     row = store.campaigns.newest() if campaign is None else store.campaigns.get(campaign)
-    return _looked_after(store, from_rows(store, row))
+    return looked_after(from_rows(store, row), by_somebody=store.is_held)
 
 
-def _looked_after(store: Store, answer: CampaignAnswer) -> CampaignAnswer:
+def looked_after(answer: CampaignAnswer, *, by_somebody: bool) -> CampaignAnswer:
     """Say so when no process runs a campaign that has not ended."""
-    if answer.state in ENDED or store.is_held:
+    if answer.state in ENDED or by_somebody:
         return answer
-    reason = "no process runs it any more: look after the bench; the next start of labctl on this database closes it"
+    reason = (
+        "no process runs it any more: look after the bench; `labctl campaign resume` or a service on its bench takes "
+        "it up where it was, `labctl campaign abort` ends it"
+    )
     return answer.model_copy(update={"reason": reason, "abandoned": True})
 
 

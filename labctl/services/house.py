@@ -11,9 +11,10 @@ from typing import Any
 from instruments.clock import Clock
 from labctl.actor import ITSELF, acting
 from labctl.errors import Conflict
+from labctl.services.acts import ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer, EventAnswer
 from labctl.services.bench_runner import BenchRunner
-from labctl.services.campaigns import ENDED, campaign_status, event_answer
+from labctl.services.campaigns import ENDED, event_answer, from_rows, looked_after
 from labctl.services.opening import LocalActs
 from labctl.store import Store
 
@@ -35,6 +36,31 @@ class ServiceActs(LocalActs):
             return self._runner.abort(campaign, reason)
         return super().abort_campaign(campaign, reason)
 
+    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+        """Ask a running campaign to hold after the present data set."""
+        if self._runner is None:
+            return super().pause_campaign(campaign, request)
+        answer = self._runner.pause(campaign, request)
+        self._note_campaign("pause", campaign, request.text)
+        return answer
+
+    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+        """Let a paused campaign go on, or take up one that was interrupted."""
+        if self._runner is None:
+            raise Conflict("this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`")
+        answer = self._runner.resume(campaign, request)
+        self._note_campaign("resume", campaign, request.reason)
+        return answer
+
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+        """Answer the question that a campaign has put."""
+        if self._runner is None:
+            return super().confirm(campaign, request)
+        answer = self._runner.confirm(campaign, request)
+        said = f"{request.prompt}: {'done' if request.confirmed else 'cannot be done'}; {request.by}; {request.reason}"
+        self._note_campaign("confirm", campaign, said)
+        return answer
+
 
 class House:
     """What a running service serves."""
@@ -44,15 +70,19 @@ class House:
         self.clock = clock
         self._runner = runner
         self._opened_at = clock.utc()
+        self._closed = False
 
     def start(self) -> None:
-        """Make the house ready: campaigns that an earlier process left are marked as such."""
-        with acting(ITSELF):  # nobody asked for it
-            for row in self.store.campaigns.unfinished():
-                self.store.campaigns.close_unfinished(row.id, "the process that ran it ended", self.clock.utc())
+        """Make the house ready: a campaign that an earlier process left on this bench is taken up, safe state first."""
+        if self._runner is not None:
+            with acting(ITSELF):  # nobody asked for it
+                self._runner.take_up_left()
 
     def close(self) -> None:
-        """End what runs, leave the bench safe, close the store."""
+        """End what runs, leave the bench safe, close the store. Safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
         if self._runner is not None:
             self._runner.close()
         self.store.close()
@@ -74,15 +104,28 @@ class House:
     def status(self, campaign: int) -> CampaignAnswer:
         """Return where a campaign is: live when it runs here, else as the database tells."""
         live = self._runner.status(campaign) if self._runner is not None else None
-        return live or campaign_status(self.store, campaign)
+        if live is not None:
+            return live
+        runs = self._runner is not None and self._runner.runs(campaign)
+        return looked_after(from_rows(self.store, self.store.campaigns.get(campaign)), by_somebody=runs)
 
-    async def follow(self, campaign: int, after: int) -> AsyncIterator[EventAnswer]:
-        """Yield a campaign's events from the one after number `after`, until the campaign ends."""
+    def campaigns(self) -> list[CampaignAnswer]:
+        """Return every campaign, newest first."""
+        return [self.status(row.id) for row in self.store.campaigns.all()]
+
+    async def follow(self, campaign: int, after: int) -> AsyncIterator[EventAnswer | CampaignAnswer | None]:
+        """Yield a campaign's events after number `after`, where it stands whenever that has changed, and None to show
+        that the stream lives, until the campaign ends.
+
+        Whoever reads slowly gets the newest picture next, never a queue of old ones; the bench only rings a bell.
+        """
         bell = asyncio.Event()
         loop = asyncio.get_running_loop()
+        shown: CampaignAnswer | None = None
 
         def ring() -> None:
-            loop.call_soon_threadsafe(bell.set)
+            if not bell.is_set():
+                loop.call_soon_threadsafe(bell.set)
 
         stop = self._runner.listen(ring) if self._runner is not None else None
         try:
@@ -93,12 +136,16 @@ class House:
                 for row in await asyncio.to_thread(self.store.campaigns.events, campaign, after):
                     after = row.id
                     yield event_answer(row)
+                now = await asyncio.to_thread(self.status, campaign)
+                if now != shown:
+                    shown = now
+                    yield now
                 if state in ENDED:
                     return
                 try:
                     await asyncio.wait_for(bell.wait(), HEARTBEAT_S)
                 except TimeoutError:
-                    continue
+                    yield None
         finally:
             if stop is not None:
                 stop()
@@ -109,8 +156,10 @@ class House:
 
     def health(self) -> dict[str, Any]:
         """Return whether the service is well."""
+        unconfirmed = any(row.unconfirmed for row in self.store.benches.all())
         return {
             **self.pulse(),
+            **({"status": "look at the bench"} if unconfirmed else {}),
             "database": Path(self.store.location).name,  # a folder, or a password in a URL, is nobody's business here
             "since": self._opened_at.isoformat(),
             "bench": self._runner.describe() if self._runner is not None else None,

@@ -10,8 +10,19 @@ from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.services import calibrations, criticism, keys, recordings
-from labctl.services.acts import Acts, BackupNote, CertifyRequest, FitRequest, ImproveRequest
-from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.acts import (
+    Acts,
+    BackupNote,
+    CertifyRequest,
+    ClearRequest,
+    ConfirmRequest,
+    FitRequest,
+    ImproveRequest,
+    ReasonRequest,
+    ResumeRequest,
+)
+from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.benches import bench_status
 from labctl.services.campaigns import campaign_status
 from labctl.store import Store, holder_of, open_store
 
@@ -68,6 +79,26 @@ class LocalActs:
         """Write down that a backup was made."""
         detail = {"bytes": note.bytes, "sha256": note.sha256}
         self._store.audit.record(self._clock.utc(), "backup", note.file, detail)
+
+    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+        """Raise Conflict: what this process could pause would hold the database."""
+        raise self._not_here(campaign, f"pause it ({request.reason})")
+
+    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+        """Raise Conflict: a campaign is taken up by a process that stays."""
+        raise self._not_here(campaign, f"let it go on ({request.by})")
+
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+        """Raise Conflict: nobody here has put a question."""
+        raise self._not_here(campaign, f"answer question {request.prompt}")
+
+    def _not_here(self, campaign: int, what: str) -> Conflict:
+        state = self._store.campaigns.get(campaign).state
+        return Conflict(f"campaign {campaign} is {state} and no process runs it; there is nobody to {what}")
+
+    def clear_bench(self, bench: str, request: ClearRequest) -> BenchStatus:
+        """Take in that a person has looked at a bench."""
+        return bench_status(self._store.benches.clear(bench, request.by, request.reason, self._clock.utc()))
 
 
 def service_url(database: str | None) -> str | None:

@@ -11,8 +11,18 @@ import httpx
 
 from labctl.config import KEY_VARIABLE, key, os_user
 from labctl.errors import Conflict, LabctlError, NotCertified, StoreError
-from labctl.services.acts import BackupNote, CertifyRequest, FitRequest, ImproveRequest
-from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.acts import (
+    BackupNote,
+    CertifyRequest,
+    ClearRequest,
+    ConfirmRequest,
+    FitRequest,
+    ImproveRequest,
+    ReasonRequest,
+    Request,
+    ResumeRequest,
+)
+from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported
 from labctl.services.keys import KeyAnswer, KeyRequest, NewKeyAnswer
 from labctl.services.planning import load_recipe
 from labctl.services.recordings import FILE_NAMES
@@ -104,6 +114,35 @@ class RemoteActs:
         return CampaignAnswer.model_validate(
             self._post("/api/campaigns", json={"recipe": recipe, "clip": request.clip})
         )
+
+    def _campaign(self, campaign: int, act: str, request: Request) -> CampaignAnswer:
+        return CampaignAnswer.model_validate(self._post(f"/api/campaigns/{campaign}/{act}", json=request.model_dump()))
+
+    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+        """Ask for a pause."""
+        return self._campaign(campaign, "pause", request)
+
+    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+        """Ask that a campaign go on."""
+        return self._campaign(campaign, "resume", request)
+
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+        """Answer a question."""
+        return self._campaign(campaign, "confirm", request)
+
+    def clear_bench(self, bench: str, request: ClearRequest) -> BenchStatus:
+        """Say that a bench was looked at."""
+        return BenchStatus.model_validate(self._post(f"/api/benches/{bench}/clear", json=request.model_dump()))
+
+    def campaign(self, campaign: int) -> CampaignAnswer:
+        """Return a campaign as the service sees it now."""
+        try:
+            response = self._client.get(f"/api/campaigns/{campaign}")
+        except httpx.HTTPError as error:
+            raise StoreError(f"the service at {self._client.base_url} does not answer ({error})") from error
+        if response.is_error:
+            raise ServiceRefused(response.json().get("detail", response.text))
+        return CampaignAnswer.model_validate(response.json())
 
     def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
         """Ask for the end of a campaign."""

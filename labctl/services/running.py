@@ -13,12 +13,13 @@ from instruments.gyro import Gyro
 from instruments.hand import NoHand
 from instruments.open import Bench, open_bench
 from labctl.config import default_database
-from labctl.errors import BadInput
+from labctl.errors import BadInput, Conflict
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.acts import Request
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import answer_of
 from labctl.services.planning import bench_for, load_bench, load_recipe
+from labctl.services.power import boot_id
 from labctl.store import NewCampaign, NewUnit, Store, open_store
 from procedures.control import Control
 from procedures.engine import Engine
@@ -26,6 +27,7 @@ from procedures.limits import BenchLimits
 from procedures.operator import HandOperator, Operator, PersonOperator
 from procedures.plan import Plan, make_plan
 from procedures.progress import Progress
+from procedures.takeup import Restart
 
 Observe = Callable[[CampaignAnswer], None]
 
@@ -51,6 +53,22 @@ class Prepared:
     bench: Bench
     clock: Clock
     operator: Operator
+    start_at: int = 0
+    restart: Restart | None = None  #: what is known of the interruption that it is taken up after
+    start_s: float | None = None  #: the clock's time of campaign time 0; absent: when it begins
+
+
+def operator_of(bench: Bench) -> Operator:
+    """Return who turns and switches the units of a bench."""
+    return PersonOperator() if isinstance(bench.hand, NoHand) else HandOperator(bench.hand)
+
+
+def refuse_unconfirmed(store: Store, bench: str) -> None:
+    """Raise Conflict while nobody has looked at a bench whose safe state was not confirmed."""
+    if text := store.benches.unconfirmed(bench):
+        raise Conflict(
+            f"bench {bench} was not confirmed safe: {text}. Look at it, then `labctl bench clear {bench} --by NAME`"
+        )
 
 
 def seeded(bench: BenchFile, seed: int | None) -> BenchFile:
@@ -74,13 +92,18 @@ def clock_for(bench: BenchFile, speed: float | None) -> Clock:
     return VirtualClock() if speed is None else ScaledClock(speed)
 
 
-def prepare(store: Store, recipe_source: str, bench_file: BenchFile, clock: Clock, *, clip: bool) -> Prepared:
+def prepare(
+    store: Store, recipe_source: str, bench_file: BenchFile, clock: Clock, *, clip: bool, opened: Bench | None = None
+) -> Prepared:
     """Open the bench, plan, and write the whole campaign down; nothing has moved when this returns.
+
+    `opened` is the bench where it is open already.
 
     Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe.
     """
     recipe = load_recipe(recipe_source)
-    bench = open_bench(bench_file, clock)
+    refuse_unconfirmed(store, bench_file.name)
+    bench = opened or open_bench(bench_file, clock)
     try:
         bench.table.identify()
         bench.chamber.identify()
@@ -95,9 +118,9 @@ def prepare(store: Store, recipe_source: str, bench_file: BenchFile, clock: Cloc
             expected_s=plan.expected_s,
             steps=[step.model_dump(mode="json") for step in plan.steps],
             units=units,
+            boot_id=boot_id(),
         )
-        operator = PersonOperator() if isinstance(bench.hand, NoHand) else HandOperator(bench.hand)
-        return Prepared(store.campaigns.create(new, clock.utc()), plan, bench, clock, operator)
+        return Prepared(store.campaigns.create(new, clock.utc()), plan, bench, clock, operator_of(bench))
     except BaseException:
         bench.close()
         raise
@@ -136,21 +159,32 @@ def run(
         prepared.operator,
         control=control or Control(),
         observer=observe,
+        start_s=prepared.start_s,
     )
     try:
-        engine.run()
+        engine.run(prepared.start_at, prepared.restart)
     finally:
+        if engine.complaints:
+            bench = store.campaigns.get(prepared.id).bench_name
+            store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
         prepared.bench.close()
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
 
 
-def run_here(database: str | None, request: StartRequest, observe: Observe | None = None) -> CampaignAnswer:
-    """Run a campaign in this process, until it is over."""
+def run_here(
+    database: str | None,
+    request: StartRequest,
+    observe: Observe | None = None,
+    attend: Callable[[Operator], None] | None = None,
+) -> CampaignAnswer:
+    """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks."""
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
     with open_store(database or default_database(), write=True) as store:
         clock = clock_for(bench_file, request.speed)
         prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip)
         row = store.campaigns.get(prepared.id)
+        if attend is not None:
+            attend(prepared.operator)
 
         def seen(progress: Progress) -> None:
             if observe is not None:

@@ -7,10 +7,12 @@ from contextlib import contextmanager
 
 from labctl.store.audit import Audit, Broken, Head
 from labctl.store.backup import Copy, copy_database
+from labctl.store.benches import Benches, BenchRow
 from labctl.store.calibrations import Calibrations, NewCalibration
 from labctl.store.campaigns import Campaigns, NewCampaign
 from labctl.store.check import Checked, Finding, Progress, check
 from labctl.store.database import Database, Holder, holder_of, is_url
+from labctl.store.interruptions import Interruptions, Standing, TakeUp
 from labctl.store.journal import StoreJournal
 from labctl.store.keys import Keys
 from labctl.store.recordings import Recordings
@@ -31,6 +33,8 @@ from labctl.store.units import Units
 __all__ = [
     "Audit",
     "AuditRow",
+    "BenchRow",
+    "Benches",
     "Broken",
     "CalibrationRecord",
     "Calibrations",
@@ -43,6 +47,7 @@ __all__ = [
     "Finding",
     "Head",
     "Holder",
+    "Interruptions",
     "KeyRow",
     "Keys",
     "NewCalibration",
@@ -51,9 +56,11 @@ __all__ = [
     "Progress",
     "RecordingRow",
     "Recordings",
+    "Standing",
     "StepRow",
     "Store",
     "StoreJournal",
+    "TakeUp",
     "Unit",
     "Units",
     "check",
@@ -71,6 +78,8 @@ class Store:
         self.units = Units(database)
         self.recordings = Recordings(database)
         self.campaigns = Campaigns(database)
+        self.interruptions = Interruptions(database)
+        self.benches = Benches(database)
         self.calibrations = Calibrations(database)
         self.audit = Audit(database)
         self.keys = Keys(database)

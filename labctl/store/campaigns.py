@@ -31,6 +31,7 @@ class NewCampaign:
     expected_s: float
     steps: Sequence[Mapping[str, Any]]  #: JSON of every step, in order; `kind` and `expected_s` among the keys
     units: Sequence[NewUnit]
+    boot_id: str | None = None  #: of the host that runs it
 
 
 class Campaigns:
@@ -53,6 +54,7 @@ class Campaigns:
                 state="planned",
                 reason="",
                 created_at=at,
+                boot_id=new.boot_id,
             )
             number = int(connection.scalar(row.returning(tables.campaigns.c.id)) or 0)
             connection.execute(

@@ -38,13 +38,11 @@ class StoreJournal:
         r = tables.recordings.c
         with database.reading() as connection:
             rows = connection.execute(sa.select(r.gyro, r.id, r.channels).where(r.campaign_id == campaign)).all()
-            kinds = connection.execute(
-                sa.select(tables.steps.c.number, tables.steps.c.kind).where(tables.steps.c.campaign_id == campaign)
-            ).all()
+            self._power_on_s: float | None = connection.scalar(
+                sa.select(tables.campaigns.c.powered_on_s).where(tables.campaigns.c.id == campaign)
+            )
         self._recordings = {gyro: recording for gyro, recording, _ in rows}
         self._channels = {gyro: channels for gyro, _, channels in rows}
-        self._kinds: dict[int, str] = {row[0]: row[1] for row in kinds}
-        self._power_on_s: float | None = None
         #: What the open data sets' blocks hold, so that closing one need not read it back.
         self._open: dict[tuple[int, str], list[dict[str, NDArray[Any]]]] = {}
 
@@ -69,8 +67,6 @@ class StoreJournal:
 
     def step_started(self, index: int, t_s: float, at: datetime) -> None:
         """Record that a step begins."""
-        if self._kinds.get(index) == "power_on":
-            self._power_on_s = t_s
         self._mark(index, state="running", started_s=t_s, started_at=at)
 
     def step_ended(self, index: int, result: StepResult, t_s: float, at: datetime) -> None:
@@ -83,6 +79,19 @@ class StoreJournal:
             connection.execute(
                 sa.update(s).where(s.c.campaign_id == self._campaign, s.c.number == index).values(**values)
             )
+
+    def session_began(self, run: int, t_s: float) -> None:  # noqa: ARG002  the number is the plan's and what was added
+        """Record that the units were switched on."""
+        self._power_on_s = t_s
+        c = tables.campaigns
+        with self._database.writing() as connection:
+            connection.execute(sa.update(c).where(c.c.id == self._campaign).values(powered_on_s=t_s))
+
+    def unit_dropped(self, gyro: str, reason: str) -> None:
+        """Record that a unit takes no further part."""
+        r = tables.recordings
+        with self._database.writing() as connection:
+            connection.execute(sa.update(r).where(r.c.id == self._recordings[gyro]).values(dropped=reason))
 
     def dataset_opened(self, header: DataSetHeader) -> int:
         """Record a data set of every unit before its first reading; returns its number."""
@@ -101,7 +110,7 @@ class StoreJournal:
                         "state": DataSetState.OPEN.value,
                         "reason": "",
                         "position": s.position,
-                        "run": s.run,
+                        "run": header.run,
                         "mounting": s.mounting,
                         "table_rate_dps": header.rate_dps,
                         "asked_dps": header.asked_dps,
@@ -111,8 +120,9 @@ class StoreJournal:
                         "gate_until_s": header.gate_until_s,
                         "power_on_s": self._power_on_s,
                         "n": 0,
+                        "planned": s.dataset,
                     }
-                    for recording in self._recordings.values()
+                    for recording in (self._recordings[gyro] for gyro in header.gyros)
                 ],
             )
         return number
@@ -140,9 +150,14 @@ class StoreJournal:
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
         """Record that no more readings follow: figures are derived and blocks packed into one, in one transaction."""
         with self._database.writing() as connection:
+            d = tables.data_sets.c
+            mine = d.recording_id.in_(self._recordings.values())
+            this_one = (mine, d.number == dataset, d.state == DataSetState.OPEN.value)
+            there = set(connection.scalars(sa.select(d.recording_id).where(*this_one)))
             for gyro, recording in self._recordings.items():
-                raw = self._raw_of(connection, gyro, recording, dataset)
-                self._close_one(connection, gyro, recording, dataset, state, reason, raw)
+                if recording in there:
+                    raw = self._raw_of(connection, gyro, recording, dataset)
+                    self._close_one(connection, gyro, recording, dataset, state, reason, raw)
 
     def _raw_of(
         self, connection: sa.Connection, gyro: str, recording: int, dataset: int

@@ -69,6 +69,10 @@ benches = sa.Table(
     sa.Column("name", sa.String(200), primary_key=True),
     sa.Column("file", sa.JSON, nullable=False),
     sa.Column("last_used_at", Instant, nullable=False),
+    sa.Column(
+        "unconfirmed", sa.Text, nullable=False, server_default=""
+    ),  #: of the safe state; until a person clears it
+    sa.Column("unconfirmed_at", Instant),
 )
 
 campaigns = sa.Table(
@@ -86,6 +90,9 @@ campaigns = sa.Table(
     sa.Column("created_at", Instant, nullable=False),
     sa.Column("started_at", Instant),
     sa.Column("ended_at", Instant),
+    sa.Column("added_runs", sa.Integer, nullable=False, server_default="0"),  #: powered sessions beyond the plan's
+    sa.Column("powered_on_s", sa.Float),  #: when the present session began, campaign time
+    sa.Column("boot_id", sa.String(64)),  #: of the host that runs it: another one means that the power failed
 )
 
 steps = sa.Table(
@@ -132,6 +139,7 @@ recordings = sa.Table(
     sa.Column("info", sa.JSON, nullable=False),
     sa.Column("channels", sa.JSON, nullable=False),
     sa.Column("created_at", Instant, nullable=False),
+    sa.Column("dropped", sa.Text),  #: why the unit took no further part; absent while it does
     sa.Index(None, "serial", "id"),
 )
 
@@ -155,6 +163,7 @@ data_sets = sa.Table(
     sa.Column("n", sa.Integer, nullable=False, default=0),
     sa.Column("lost", sa.Integer, nullable=False, default=0),
     sa.Column("damaged", sa.Integer, nullable=False, default=0),
+    sa.Column("planned", sa.Integer),  #: its number in the plan: one that is redone has the same again
 )
 
 data_set_means = sa.Table(

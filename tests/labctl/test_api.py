@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -139,17 +140,26 @@ def test_a_bad_upload_leaves_nothing(client: TestClient) -> None:
     assert evil.status_code == 400
 
 
+def followed(client: TestClient, number: int, **headers: str) -> tuple[list[Any], list[Any]]:
+    """Return a campaign's events, which have ids, and the pictures of where it stood in between, which have none."""
+    with client.stream("GET", f"/api/campaigns/{number}/events", headers=headers) as stream:
+        messages = "\n".join(stream.iter_lines()).split("\n\n")
+    said = [dict(line.split(": ", 1) for line in message.splitlines()) for message in messages if "data: " in message]
+    events = [json.loads(each["data"]) for each in said if "id" in each]
+    return events, [json.loads(each["data"]) for each in said if each["event"] == "progress"]
+
+
 def test_a_campaign_runs_and_can_be_followed(client: TestClient) -> None:
     started = client.post("/api/campaigns", json={"recipe": "short"}).json()
     number = started["id"]
-    with client.stream("GET", f"/api/campaigns/{number}/events") as stream:
-        events = [json.loads(line[6:]) for line in stream.iter_lines() if line.startswith("data: ")]
+    events, pictures = followed(client, number)
     assert events[0]["message"].startswith("campaign running")
     assert events[-1]["message"].startswith("campaign done")
     resumed = events[1]["id"]
-    with client.stream("GET", f"/api/campaigns/{number}/events", headers={"Last-Event-ID": str(resumed)}) as stream:
-        later = [json.loads(line[6:])["id"] for line in stream.iter_lines() if line.startswith("data: ")]
-    assert later == [event["id"] for event in events[2:]]
+    later, _ = followed(client, number, **{"Last-Event-ID": str(resumed)})
+    assert [event["id"] for event in later] == [event["id"] for event in events[2:]]
+    assert pictures[-1]["state"] == "done"
+    assert {"step", "progress", "expected_end", "chamber_c", "gyro_c", "rate_dps", "last_error"} <= set(pictures[0])
     answer = client.get(f"/api/campaigns/{number}").json()
     assert answer["state"] == "done"
     assert answer["progress"] == 1.0
@@ -167,5 +177,13 @@ def test_a_service_that_starts_again_says_what_was_left(tmp_path: Path) -> None:
     prepare(store, "short", load_bench("single-axis-sim"), VirtualClock(), clip=False).bench.close()
     with TestClient(create_app(House(store, SystemClock()))) as client:
         answer = client.get("/api/campaigns").json()
-        assert answer[0]["state"] == "failed"
-        assert "process that ran it ended" in answer[0]["reason"]
+        assert (answer[0]["state"], answer[0]["abandoned"]) == ("planned", True)
+        assert "no process runs it any more" in answer[0]["reason"]
+    store = Store(Database(location, write=True))
+    runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
+    with TestClient(create_app(House(store, SystemClock(), runner))) as client:
+        events, _ = followed(client, 1)
+        assert "taken_up" in [event["kind"] for event in events]
+        assert client.get("/api/campaigns/1").json()["state"] == "done"
+        again = client.post("/api/campaigns/1/resume", json={"by": "Ada"})
+        assert (again.status_code, "cannot be finished twice" in again.json()["detail"]) == (409, True)

@@ -20,6 +20,7 @@ from procedures.limits import BenchLimits
 from procedures.operator import HandOperator
 from procedures.plan import Plan, make_plan
 from procedures.recipe import Recipe
+from procedures.takeup import Restart
 
 TABLE = TableLimits(max_rate_dps=450, max_acceleration_dps2=200, step_deg=0.225)
 CHAMBER = ChamberLimits(min_c=-70, max_c=150, resolution_c=0.1, ramp_c_per_min=10)
@@ -205,6 +206,8 @@ class RecordingJournal:
         self.blocks: list[tuple[int, str, Readings, float]] = []
         self.samples: list[Any] = []
         self.events: list[Any] = []
+        self.sessions: list[int] = []
+        self.dropped: list[tuple[str, str]] = []
         self.hooks: list[Callable[[str, Any], None]] = []
 
     def _told(self, what: str, detail: Any) -> None:
@@ -224,6 +227,14 @@ class RecordingJournal:
     def step_ended(self, index: int, result: Any, t_s: float, at: Any) -> None:
         self.steps.append(("ended", index, result))
         self._told("step_ended", index)
+
+    def session_began(self, run: int, t_s: float) -> None:
+        self.sessions.append(run)
+        self._told("session_began", run)
+
+    def unit_dropped(self, gyro: str, reason: str) -> None:
+        self.dropped.append((gyro, reason))
+        self._told("unit_dropped", gyro)
 
     def dataset_opened(self, header: Any) -> int:
         self.headers.append(header)
@@ -302,8 +313,10 @@ class Rig:
         )
         return self.engine
 
-    def run(self, recipe: Recipe | None = None, start_at: int = 0, **options: Any) -> Any:
-        return self.make(recipe, **options).run(start_at)
+    def run(
+        self, recipe: Recipe | None = None, start_at: int = 0, restart: Restart | None = None, **options: Any
+    ) -> Any:
+        return self.make(recipe, **options).run(start_at, restart)
 
     def when_step(self, kind: str, act: Callable[[], None]) -> None:
         """Do something once, when the first step of that kind begins."""

@@ -35,6 +35,7 @@ TRIPS = [
     ("damaged_readings", {"tallies": {"imu": Tally(1000, damaged=30)}}, "imu", 3.0, 2.0, "%"),
     ("invalid_readings", {"tallies": {"imu": Tally(1000, invalid=600)}}, "imu", 60.0, 50.0, "%"),
     ("rate", {"rate_dps": 98.5}, "table", 1.5, 1.0, "deg/s"),
+    ("unit_off_air", {"gyro_c": {"imu": 45.0}}, "imu", 25.0, 20.0, "deg C"),
 ]
 
 

@@ -1,0 +1,140 @@
+"""Taking up an interrupted campaign: by itself after a crash or a power cut, by a person's word after a fault."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from instruments.bench import BenchFile
+from instruments.clock import Clock, VirtualClock
+from instruments.open import Bench, open_bench
+from labctl.config import default_database
+from labctl.errors import Conflict
+from labctl.services.acts import ResumeRequest
+from labctl.services.answers import CampaignAnswer
+from labctl.services.campaigns import answer_of
+from labctl.services.planning import load_bench
+from labctl.services.power import boot_id, power_failed
+from labctl.services.running import Observe, Prepared, clock_for, operator_of, refuse_unconfirmed, run
+from labctl.store import CampaignRow, Standing, Store, TakeUp, open_store
+from procedures.control import Control
+from procedures.operator import Operator
+from procedures.plan import Plan
+from procedures.progress import Progress
+from procedures.recipe import Recipe
+from procedures.takeup import Restart
+
+#: A campaign that was taken up so often without finishing a step needs a person.
+MOST_TRIES = 5
+
+
+def plan_of(store: Store, row: CampaignRow) -> Plan:
+    """Return the plan of a campaign as it was written down."""
+    return Plan.model_validate(
+        {
+            "recipe": Recipe.model_validate(dict(row.recipe)),
+            "steps": [step.body for step in store.campaigns.steps(row.id)],
+        }
+    )
+
+
+def prepare_resume(
+    store: Store,
+    campaign: int,
+    bench_file: BenchFile,
+    make_clock: Callable[[Standing], Clock],
+    request: ResumeRequest,
+    opened: Bench | None = None,
+) -> Prepared:
+    """Mark a campaign as taken up, and return it ready to run; nothing has moved when this returns.
+
+    `opened` is the bench where it is open already. Raises Conflict when the campaign is done, when the bench carries
+    other units, or when it waits to be looked at.
+    """
+    row = store.campaigns.get(campaign)
+    if row.state == "done":
+        raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
+    _refuse_other_units(row, bench_file)
+    refuse_unconfirmed(store, bench_file.name)
+    standing, plan = store.interruptions.standing(campaign), plan_of(store, row)
+    clock = make_clock(standing)
+    new_world = bench_file.is_simulated and opened is None  # a simulated bench ends with its process
+    lost = request.power == "lost" or (
+        request.power is None and (new_world or power_failed(standing.boot_id, boot_id()))
+    )
+    new_session = lost and plan.run_at(standing.start_at, standing.skipped) > 0
+    since_s = (clock.utc() - row.started_at).total_seconds() if row.started_at else 0.0
+    t_s = max(standing.last_t_s, since_s)
+    gap_s = t_s - standing.last_t_s
+    added = standing.added_runs + int(new_session)
+    power = "the power failed meanwhile" if lost else "the units stayed on"
+    reason = f"taken up by {request.by} after {gap_s:.0f} s unwatched; {power}"
+    bench = opened or open_bench(bench_file, clock)
+    try:
+        store.interruptions.take_up(campaign, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
+        if new_world and (position := plan.mounted_at(standing.start_at)):
+            bench.hand.mount(position)
+    except BaseException:
+        bench.close()
+        raise
+    restart = Restart(
+        gap_s=float("inf") if standing.soak_owed else gap_s,
+        power_lost=lost,
+        added_runs=added,
+        dropped=standing.dropped,
+        skipped=standing.skipped,
+    )
+    return Prepared(campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, clock.now_s() - t_s)
+
+
+def _refuse_other_units(row: CampaignRow, bench_file: BenchFile) -> None:
+    here = {gyro.serial for gyro in bench_file.gyros}
+    if set(row.recordings) != here:
+        raise Conflict(
+            f"campaign {row.id} measures {', '.join(sorted(row.recordings))}, bench {bench_file.name} carries "
+            f"{', '.join(sorted(here))}; name the campaign's own bench with --bench"
+        )
+
+
+def too_often(standing: Standing) -> str | None:
+    """Return why a campaign is not taken up by itself any more, or None."""
+    if standing.tries < MOST_TRIES:
+        return None
+    return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
+
+
+def resume_here(
+    database: str | None,
+    campaign: int | None,
+    bench: str | None,
+    speed: float | None,
+    request: ResumeRequest,
+    observe: Observe | None = None,
+    attend: Callable[[Operator], None] | None = None,
+) -> CampaignAnswer:
+    """Take up a campaign in this process and run it to its end; without a number the newest that is not over."""
+    with open_store(database or default_database(), write=True) as store:
+        row = store.campaigns.get(campaign) if campaign is not None else _newest_unfinished(store)
+        bench_file = load_bench(bench) if bench else BenchFile.model_validate(dict(row.bench))
+
+        def make_clock(standing: Standing) -> Clock:
+            clock = clock_for(bench_file, speed)
+            return VirtualClock(standing.last_at) if isinstance(clock, VirtualClock) else clock
+
+        prepared = prepare_resume(store, row.id, bench_file, make_clock, request)
+        if attend is not None:
+            attend(prepared.operator)
+
+        def seen(progress: Progress) -> None:
+            if observe is not None:
+                observe(answer_of(row, progress))
+
+        return run(store, prepared, Control(), seen)
+
+
+def _newest_unfinished(store: Store) -> CampaignRow:
+    rows = store.campaigns.unfinished()
+    if not rows:
+        raise Conflict(
+            "no campaign was interrupted; `labctl campaign resume ID` takes up one that failed or was aborted"
+        )
+    return rows[0]

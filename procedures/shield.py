@@ -1,0 +1,33 @@
+"""Signals that must not cut short what leaves a bench safe."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def uninterrupted(noted: Callable[[int], None] = lambda _: None) -> Iterator[None]:
+    """Let nobody interrupt the block by Ctrl-C or a signal; `noted` hears of each.
+
+    Every part of the safe state has an end of its own, so the block ends. Only a process's main thread gets signals;
+    in another thread there is nothing to hold back.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def note(number: int, _frame: Any) -> None:
+        noted(number)
+
+    before = {number: signal.signal(number, note) for number in ENDING}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
