@@ -191,11 +191,11 @@ def ask(data: Compressed, designs: Mapping[str, Design]) -> dict[str, dict[str, 
     for view in ("means", "rows"):
         tables = [table_of(data, design, axis, means=view == "means") for axis, design in designs.items()]
         for tool in TOOLS:
-            begun = time.perf_counter()
+            begun = time.process_time()
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # collinear columns and eliminated ones are what is studied here
                 found = [tool(table) for table in tables]
-            seconds = time.perf_counter() - begun
+            seconds = time.process_time() - begun
             for name in found[0]:
                 named = _together([picks[name] for picks in found])
                 answers[f"{name}, {view}"] = {"named": named, "seconds": round(seconds, 3)}

@@ -10,9 +10,10 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
+
 from instruments.ports import hidden_defaults
-from labctl.errors import BadInput
-from labctl.services.sizing import Sizing
+from labctl.services.sizing import CLOSE, Sizing
 from studies.campaigns import PROTOCOLS, protocol
 
 FILE = Path(__file__).with_name("sizes.json")
@@ -24,6 +25,7 @@ LEAST_VISIBLE = 0.15
 STRAIGHT = 0.03
 #: A size may be this many times what a person would notice, or as much less.
 FARTHEST = 1e3
+ROUNDS = 16
 #: What is known and taken off (the Earth), what a mean of many noisy readings hides whatever its size, or what changes
 #: the thermometer and so everything.
 NOT_DRAWN = frozenset(
@@ -52,25 +54,43 @@ def sizing_of(name: str) -> Sizing:
 
 
 def sizes_of(sizing: Sizing, effect: str, default: float) -> dict[str, float]:
-    """Return z -> size of one effect; nothing where the protocol cannot show it.
+    """Return z -> size of one effect; levels that no size gives are left out.
 
     Most effects are proportional to their size: three simulations tell, and the rest is a rule of three.
     """
     at, share = sizing.z_of(effect, default)
     if share < LEAST_VISIBLE or at <= 0:
         return {}
-    low, high = (default * min(z / at, FARTHEST) for z in (Z_LEVELS[0], Z_LEVELS[-1]))
-    ends = {size: sizing.z_of(effect, size)[0] for size in (low, high)}
-    if all(abs(found / (at * size / default) - 1) < STRAIGHT for size, found in ends.items()):
+    factors = [min(z / at, FARTHEST) for z in (Z_LEVELS[0], Z_LEVELS[-1])]
+    seen = {1.0: at} | {factor: sizing.z_of(effect, default * factor)[0] for factor in factors}
+    if all(abs(found / (at * factor) - 1) < STRAIGHT for factor, found in seen.items()):
         return {f"{z:g}": float(f"{default * z / at:.5g}") for z in Z_LEVELS}
-    found, start = {}, low
-    for z in Z_LEVELS:
-        try:
-            start = sizing.size_of(effect, z, start)
-        except BadInput:  # no size gives this z here: the effect is not drawn at all
-            return {}
-        found[f"{z:g}"] = float(f"{start:.5g}")
-    return found
+    found = {z: _factor(sizing, effect, default, z, seen) for z in Z_LEVELS}
+    return {f"{z:g}": float(f"{default * factor:.5g}") for z, factor in found.items() if factor is not None}
+
+
+def _factor(sizing: Sizing, effect: str, default: float, z: float, seen: dict[float, float]) -> float | None:
+    """Return by how much a size must be multiplied for z, or None; what is simulated on the way is added to `seen`.
+
+    Between two sizes by a straight line in logarithms and by their middle in turn: some effects stand still in between.
+    """
+    for attempt in range(ROUNDS):
+        nearest = min(seen, key=lambda factor: abs(seen[factor] / z - 1))
+        if abs(seen[nearest] / z - 1) < CLOSE:
+            return nearest
+        below = max((factor for factor, found in seen.items() if found < z), default=None)
+        above = min((factor for factor, found in seen.items() if found > z), default=None)
+        if above is None or below is None or below > above:
+            guess = max(seen) * 3.0 if above is None else min(seen) / 3.0
+        elif attempt % 2:
+            guess = float(np.sqrt(below * above))
+        else:
+            share = np.log(z / max(seen[below], 1e-3)) / np.log(seen[above] / max(seen[below], 1e-3))
+            guess = float(below * (above / below) ** np.clip(share, 0.05, 0.95))
+        if not 1 / FARTHEST <= guess <= FARTHEST:
+            return None
+        seen[guess] = sizing.z_of(effect, default * guess)[0]
+    return None
 
 
 def make(name: str) -> Sizes:
@@ -82,7 +102,7 @@ def make(name: str) -> Sizes:
         for effect, default in sorted(hidden_defaults().items())
         if effect not in NOT_DRAWN and not (one_axis and effect in ONE_AXIS_NOT)
     }
-    return {effect: by_z for effect, by_z in made.items() if by_z}
+    return {effect: by_z for effect, by_z in made.items() if len(by_z) == len(Z_LEVELS)}
 
 
 def main() -> None:

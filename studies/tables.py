@@ -55,9 +55,14 @@ def right_or_group(answer: Answer) -> bool:
     return truth(answer) in answer["named"]
 
 
+def single(answer: Answer) -> bool:
+    """Whether one thing was named: by one name, or by several of which the catalogue says that they are one."""
+    return bool(answer["named"]) and (answer["nodes"] == 1 or set(answer["named"]) <= names(answer["named"][0]))
+
+
 def right_alone(answer: Answer) -> bool:
     """Whether what is hidden was named, and nothing else but its exact likes."""
-    return right_or_group(answer) and answer["nodes"] == 1
+    return right_or_group(answer) and single(answer)
 
 
 def wrong_claim(answer: Answer) -> bool:
@@ -67,7 +72,7 @@ def wrong_claim(answer: Answer) -> bool:
 
 def wrong_single(answer: Answer) -> bool:
     """Whether one thing was named, and it was another."""
-    return answer["nodes"] == 1 and not right_or_group(answer)
+    return single(answer) and not right_or_group(answer)
 
 
 def one_too_many(answer: Answer) -> bool:

@@ -42,6 +42,12 @@ def test_a_group_with_the_truth_is_right_and_not_alone() -> None:
     assert not tables.wrong_claim(group)
 
 
+def test_likes_by_the_catalogue_are_one_name() -> None:
+    turning = answer(truth="earth_rate_tilt", named=["earth_rate_tilt", "magnetic_sensitivity", "table_tilt"], nodes=2)
+    assert tables.right_alone(turning)
+    assert tables.wrong_single({**turning, "hidden": {"warm_up": 1.0}})
+
+
 def test_another_name_is_wrong_alone_and_in_a_group() -> None:
     single = answer(named=["thermal_lag"])
     group = answer(verdict="ambiguous", named=["thermal_lag", "warm_up"], nodes=2)
