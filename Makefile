@@ -23,7 +23,7 @@ lint: $(VENV)/.tested
 bench: $(VENV)/.tested
 	@$(BIN)/python -m benchmarks
 
-study: $(VENV)/.tested
+study: $(VENV)/.studied
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m studies
 
 $(VENV)/bin/python:
@@ -38,10 +38,15 @@ $(VENV)/.tested: requirements/dev.txt $(VENV)/.installed
 	$(PIP) install --require-hashes -r requirements/dev.txt
 	@touch $@
 
+$(VENV)/.studied: requirements/study.txt $(VENV)/.installed
+	$(PIP) install --require-hashes -r requirements/study.txt
+	@touch $@
+
 # Versions move only here. The lock files carry hashes and no registry address.
 lock:
 	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt
 	uv pip compile pyproject.toml --extra build --extra dev --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/dev.txt
+	uv pip compile pyproject.toml --extra build --extra study --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/study.txt
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

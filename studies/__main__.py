@@ -17,8 +17,7 @@ def main(names: list[str]) -> int:
     for name in names or STUDIES:
         module = importlib.import_module(f"studies.{name}")
         print(f"\n== {name}: {(module.__doc__ or '').splitlines()[0]}", flush=True)
-        for key, value in module.run().items():
-            print(f"   {key:28} {value:.4g}", flush=True)
+        print(module.run(), flush=True)
     return 0
 
 

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = sorted(
     path
-    for folder in ("instruments", "procedures", "labctl", "tests", "benchmarks", "examples")
+    for folder in ("instruments", "procedures", "labctl", "tests", "benchmarks", "examples", "studies")
     for path in (ROOT / folder).rglob("*.py")
 )
 RUNTIME = [path for path in SOURCES if path.relative_to(ROOT).parts[0] in {"instruments", "procedures", "labctl"}]
