@@ -14,6 +14,8 @@ from labctl.fitting.model import FittedModel
 
 #: Coverage factor of the expanded uncertainty: about 95 % for a normal distribution (GUM 6.2).
 COVERAGE = 2.0
+#: No gyro turns faster, in deg/s, or is warmer, in deg C.
+MOST = 1e5
 #: Step of the numerical derivative of the error along the rate.
 STEP_DPS = 0.01
 
@@ -31,11 +33,11 @@ class RateUncertainty:
 def rate_uncertainty(calibration: Calibration, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
     """Return axis -> the uncertainty of a corrected rate of `rate_dps` about that axis, the other axes at rest.
 
-    Raises BadInput for a number that is not finite, and where the model needs more than rate and temperature.
+    Raises BadInput for a number that no gyro sees, and where the model needs more than rate and temperature.
     """
     for name, value, unit in (("rate_dps", rate_dps, "deg/s"), ("temperature_c", temperature_c, "deg C")):
-        if not math.isfinite(value):
-            raise BadInput(f"{name} = {value} {unit}: must be a finite number")
+        if not abs(value) <= MOST:  # also what is not a number
+            raise BadInput(f"{name} = {value} {unit}: must be a number between {-MOST:g} and {MOST:g} {unit}")
     fitted = calibration.fitted
     if fitted.model.needs:
         raise BadInput(

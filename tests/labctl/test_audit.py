@@ -20,8 +20,11 @@ from labctl.api import create_app
 from labctl.cli.app import app
 from labctl.config import os_user
 from labctl.errors import BadInput
+from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest
+from labctl.services.answers import CampaignAnswer
 from labctl.services.audit import anchor_of, verify_audit
 from labctl.services.bench_runner import BenchRunner
+from labctl.services.campaigns import campaign_status
 from labctl.services.house import House
 from labctl.services.planning import load_bench
 from labctl.services.running import prepare, run
@@ -203,6 +206,15 @@ PERSON = {"by": "A", "reason": "B"}
 NOTE = {"file": "x", "bytes": 1, "sha256": "0" * 64}
 #: Every operation that changes something, in an order in which each succeeds, and the act that it leaves in the trail.
 ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
+    "/api/benches/{bench}/clear": (
+        "bench clear", lambda c: c.post("/api/benches/single-axis-sim/clear", json={"by": "A. Person"}),
+    ),
+    "/api/campaigns/{campaign}/pause": (
+        "campaign pause", lambda c: c.post("/api/campaigns/1/pause", json={"reason": "tea"}),
+    ),
+    "/api/campaigns/{campaign}/confirm": (
+        "campaign confirm", lambda c: c.post("/api/campaigns/1/confirm", json={"prompt": "1-mount", "by": "A"}),
+    ),
     "/api/recordings": ("import", upload),
     "/api/units/{serial}/calibrations": ("fit", lambda c: c.post(UNIT, json={"effects": ["bias", "scale_factor"]})),
     "/api/units/{serial}/calibrations/{version}/improve": (
@@ -215,6 +227,7 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
     "/api/campaigns/{campaign}/abort": (
         "campaign abort", lambda c: c.post("/api/campaigns/1/abort", json={"reason": "tea"}),
     ),
+    "/api/campaigns/{campaign}/resume": ("campaign resume", lambda c: c.post("/api/campaigns/1/resume", json={})),
     "/api/campaigns": ("campaign start", lambda c: c.post("/api/campaigns", json={"recipe": "short"})),
     "/api/keys": ("key create", lambda c: c.post("/api/keys", json={"name": "robot", "role": "viewer"})),
     "/api/keys/{name}/revoke": ("key revoke", lambda c: c.post("/api/keys/robot/revoke", json={"reason": "lost"})),
@@ -222,16 +235,32 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
 }  # fmt: skip
 
 
+class AlwaysThere(BenchRunner):
+    """A runner for which no campaign is too fast to be paused or to be answered."""
+
+    def pause(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+        return campaign_status(self._store, campaign)
+
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+        return campaign_status(self._store, campaign)
+
+    def start(self, request: CampaignRequest) -> CampaignAnswer:
+        while self._job is not None:  # the one that was taken up before
+            self._job.thread.join()
+        return super().start(request)
+
+
 def test_every_act_over_http_leaves_its_row(location: str) -> None:
     """A new operation fails this test until it says here which row it leaves."""
     store = Store(Database(location, write=True))
     bench = load_bench("single-axis-sim")
-    house = House(store, SystemClock(), BenchRunner(store, bench, VirtualClock))
+    house = House(store, SystemClock(), AlwaysThere(store, bench, VirtualClock))
     application = create_app(house)
     acting_paths = {path for path, item in application.openapi()["paths"].items() if set(item) - {"get", "head"}}
     assert acting_paths == set(ACTS)
     with TestClient(application, headers={"Labctl-User": "A. Person"}) as client:
         prepare(store, "short", bench, VirtualClock(), clip=False).bench.close()  # one that nobody runs
+        store.benches.mark(bench.name, "the chamber did not answer", SystemClock().utc())
         for path, (action, act) in ACTS.items():
             before = store.audit.rows()
             answer = act(client)

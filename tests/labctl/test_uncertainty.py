@@ -70,10 +70,10 @@ def test_it_grows_outside_and_says_so(make_points: Callable[..., Recording], gri
     assert inside.expanded_dps == pytest.approx(2 * inside.combined_dps)
 
 
-@pytest.mark.parametrize(("rate", "warm"), [(np.nan, 35.0), (0.0, np.inf)])
+@pytest.mark.parametrize(("rate", "warm"), [(np.nan, 35.0), (0.0, np.inf), (1e157, 35.0)])
 def test_a_number_that_is_none_is_refused(
     make_points: Callable[..., Recording], grid_11_by_11: Any, rate: float, warm: float
 ) -> None:
     calibration = calibrated(make_points, grid_11_by_11, "bias_scale")
-    with pytest.raises(BadInput, match="must be a finite number"):
+    with pytest.raises(BadInput, match="must be a number between"):
         rate_uncertainty(calibration, rate, warm)
