@@ -17,8 +17,14 @@ def main(names: list[str]) -> int:
     for name in names or STUDIES:
         module = importlib.import_module(f"studies.{name}")
         print(f"\n== {name}: {(module.__doc__ or '').splitlines()[0]}", flush=True)
-        print(module.run(), flush=True)
+        found = module.run()
+        print(found if isinstance(found, str) else figures(found), flush=True)
     return 0
+
+
+def figures(found: dict[str, float]) -> str:
+    """Return figures as lines."""
+    return "\n".join(f"   {key:28} {value:.4g}" for key, value in found.items())
 
 
 if __name__ == "__main__":
