@@ -114,6 +114,10 @@ class AxisFit:
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(self.values.shape)
 
 
+#: A step this many times the one before does not lead to a rate.
+DIVERGING = 3.0
+
+
 class NotConverged(LabctlError):
     """The model's error changes faster than the rate itself; it cannot be inverted."""
 
@@ -148,15 +152,20 @@ class FittedModel:
         if self.model.argument == "output":
             seen = channels.with_rates(outputs)
             return {axis: outputs[axis] - self.error_dps(seen, axis) for axis in outputs}
-        rates = dict(outputs)
+        rates, change = dict(outputs), 0.0
         for _ in range(60):
             seen = channels.with_rates(rates)
             nearer = {axis: outputs[axis] - self.error_dps(seen, axis) for axis in outputs}
-            change = max(float(np.max(np.abs(nearer[axis] - rates[axis]), initial=0.0)) for axis in outputs)
+            before, change = (
+                change,
+                max(float(np.max(np.abs(nearer[axis] - rates[axis]), initial=0.0)) for axis in outputs),
+            )
             rates = nearer
             if change < 1e-12:
                 return rates
-        return self._enclosed(outputs, channels, rates)
+            if before and change > DIVERGING * before:
+                break
+        return self._enclosed(outputs, channels, dict(outputs))
 
     def _enclosed(self, outputs: Mapping[str, Array], channels: Channels, rates: dict[str, Array]) -> dict[str, Array]:
         """Solve by halving intervals, axis by axis: slower, and right where an error has a steep flank."""

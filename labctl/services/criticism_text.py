@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from labctl.fitting.criticism import Criticism
 from labctl.fitting.criticism.criticise import LARGE_DRIFT, Suspect, failing, pictures, worst
+from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.effects import CATALOGUE, kind_of
 from labctl.services.answers import CriticismAnswer
 
@@ -99,7 +100,8 @@ def sentences(found: Criticism) -> list[str]:
     verdict = found.verdict
     said = [_first(found)]
     if verdict.form == "ambiguous":
-        said += [f"To tell: {CATALOGUE[e].experiment}." for e in verdict.named[:3] if e in CATALOGUE]
+        wanted = dict.fromkeys(CATALOGUE[e].experiment for e in verdict.untold[:3] if e in CATALOGUE)
+        said += [f"To tell: {experiment}." for experiment in wanted]
     factor = found.drift_over_datasheet
     if verdict.form == "adequate" and factor is not None and factor >= LARGE_DRIFT:
         said.append(f"The drift is larger than specified: {factor:.1f} times what the data sheet lets expect.")
@@ -110,21 +112,28 @@ def sentences(found: Criticism) -> list[str]:
 
 def _first(found: Criticism) -> str:
     verdict = found.verdict
-    names = [_word(effect_id) for effect_id in verdict.named]
+    words = [" or ".join(map(_word, group)) for group in verdict.groups]
     match verdict.form:
         case "adequate":
             return "Nothing is missing: what is left is noise."
         case "missing":
-            return f"Missing: {' and '.join(names)}."
-        case "ambiguous" if len(names) == 1:
-            return f"Something like {names[0]} is missing, but it explains only a part of what is left."
+            return f"Missing: {' and '.join(words)}."
         case "ambiguous":
-            return f"Missing is one of these, and this recording cannot tell which: {'; '.join(names)}."
+            return _ambiguous(verdict, words)
         case "unexplained":
             channel = verdict.depends_on[0] if verdict.depends_on else "an unknown channel"
             return f"Something that no effect of the catalogue describes hangs on {channel}."
         case _:
             return f"Too little data for a verdict: {verdict.reason}."
+
+
+def _ambiguous(verdict: Verdict, words: list[str]) -> str:
+    if len(words) > 1:
+        return f"Missing: {'; and '.join(words)}; this recording cannot tell which of those joined by or."
+    if not verdict.untold:
+        return f"Something like {words[0]} is missing, but it explains only a part of what is left."
+    names = "; ".join(map(_word, verdict.untold))
+    return f"Missing is one of these, and this recording cannot tell which: {names}."
 
 
 def _word(effect_id: str) -> str:

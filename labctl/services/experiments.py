@@ -26,15 +26,18 @@ PAIRS, SHOWN = 6, 4
 
 
 def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict[str, Any]]:
-    """Return changed recipes that would separate what a verdict could not, best separation per hour first."""
-    if found.verdict.form != "ambiguous" or found.weighed is None or len(found.verdict.named) < 2:
+    """Return changed recipes that would separate what a verdict could not.
+
+    First come those that tell the leader from most rivals, among them those that do so best per hour.
+    """
+    if found.weighed is None or not found.verdict.untold:
         return []
     base = _recipe_of(store, recording, found)
     if base is None:
         return []
     recipe, bench = base
     signal = _signal(found)
-    rivals = [name for name in found.verdict.named[1 : 1 + PAIRS] if name in signal.others]
+    rivals = [name for name in found.verdict.untold[1 : 1 + PAIRS] if name in signal.others]
     ranked: list[dict[str, Any]] = []
     for text, changes in menu(recipe):
         try:
@@ -60,7 +63,7 @@ def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict
                 "per_hour": delta / hours,
             }
         )
-    return sorted(ranked, key=lambda e: -e["per_hour"])[:SHOWN]
+    return sorted(ranked, key=lambda e: (-len(e["separates"]), -e["per_hour"]))[:SHOWN]
 
 
 def menu(recipe: Recipe) -> list[tuple[str, dict[str, Any]]]:
@@ -104,7 +107,7 @@ class _Signal:
 def _signal(found: Criticism) -> _Signal:
     weighed = found.weighed
     assert weighed is not None
-    leader = next(c for c in weighed.candidates if c.id == found.verdict.named[0] and not c.smooth)
+    leader = next(c for c in weighed.candidates if c.id == found.verdict.untold[0] and not c.smooth)
     assert leader.term is not None
     values = {}
     for axis, index in leader.option.items():
@@ -119,17 +122,31 @@ def separation(schedule: Schedule, leader: Term, coefficients: Mapping[str, np.n
         if axis not in schedule.designs:
             continue
         options = schedule.options(axis)
-        own = [where for option, where in options if option.candidate == leader.effect and option.term is not None
-               and option.term.parameters == leader.parameters and option.term.order == leader.order]  # fmt: skip
-        if not own or own[0].stop - own[0].start != len(values):
+        own = [
+            (_apart(option.term, leader), where)
+            for option, where in options
+            if option.candidate == leader.effect and where.stop - where.start == len(values)
+        ]
+        if not own:
             continue
+        _, signal = min(own, key=lambda pair: pair[0])
         left = schedule.left[axis]
-        size = float(values @ left.gram[own[0], own[0]] @ values)
+        size = float(values @ left.gram[signal, signal] @ values)
         shared = max(
-            (_shared(left, own[0], values, where) for o, where in options if o.candidate == rival), default=0.0
+            (_shared(left, signal, values, where) for o, where in options if o.candidate == rival), default=0.0
         )
         total += max(size - shared, 0.0)
     return total
+
+
+def _apart(term: Term | None, leader: Term) -> float:
+    """Return how far a shape of the grid is from the refined one that was found."""
+    if term is None or term.order != leader.order or set(term.parameters) != set(leader.parameters):
+        return np.inf
+    return sum(
+        abs(float(np.log((term.parameters[name] + 1e-9) / (leader.parameters[name] + 1e-9))))
+        for name in leader.parameters
+    )
 
 
 def _shared(left: Schur, signal: slice, values: np.ndarray, by: slice) -> float:
@@ -158,6 +175,8 @@ def _like(found: Criticism) -> Recipe:
     warm = data.nodes["chamber_setpoint_c"] if "chamber_setpoint_c" in data.nodes else data.nodes.temperature_c("")
     levels = np.unique(np.round(data.at_sets(np.asarray(warm, dtype=np.float64))))
     rates = np.unique(np.round(data.at_sets(data.nodes.table_rate_dps()), 1))
+    past = data.nodes.past
+    each = 1 < len(past.numbers("mounting")) <= len(past.numbers("run"))
     lasted = data.nodes.durations_s().reshape(len(data), -1).sum(axis=1)
     return Recipe.model_validate(
         {
@@ -165,6 +184,7 @@ def _like(found: Criticism) -> Recipe:
             "temperatures_c": levels[:: max(len(levels) // 12, 1)].tolist(),
             "rates_dps": rates[:: max(len(rates) // 25, 1)].tolist(),
             "positions": sorted(there for there, _ in data.nodes.positions()),
+            "mounting": {"repower_each": each},
             "acquire": {"duration_s": float(np.clip(np.median(lasted), 1.0, 120.0))},
         }
     )

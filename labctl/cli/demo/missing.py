@@ -35,6 +35,8 @@ def _walk(stage: Stage, serial: str) -> CriticismAnswer:
         added = answer.named[0]
         better = improve_unit(stage.store, serial, ImproveRequest(add=[added]), VirtualClock().utc())
         before, after = (better.model_extra or {})["before"], better.error
+        if answer.verdict == "ambiguous":
+            stage.say(f"adding the first of them, to see how far it leads (not that it is the cause): {added}")
         stage.say(
             f"added {added}: RMS {before['rms_dps']:.4f} -> {after.rms_dps:.4f} deg/s, held-out temperatures "
             f"{before['heldout_rms_dps']:.4f} -> {after.heldout_rms_dps:.4f}, noise floor {after.noise_floor_dps:.4f}"

@@ -38,7 +38,9 @@ STEADY = 0.3
 APART = 0.1
 #: A reading further than this many robust standard deviations from its data set's middle is left out, and counted ...
 OUTLIER = 6.0
-#: ... unless there are more of them than this share: then it is how the data set is, as with a line of the steps.
+#: ... or from what nine tenths of them keep within, where a line of the steps takes a few values only; ...
+BEYOND = 3.0
+#: ... unless there are more of them than this share: then it is how the data set is.
 FEW = 0.05
 
 #: A data set longer than this many usual ones is taken in pieces.
@@ -227,7 +229,8 @@ def _inside(values: NDArray[np.float64], there: NDArray[np.float64]) -> NDArray[
     masked = np.where(there > 0, values, np.nan)
     middle = np.nanmedian(masked, axis=1, keepdims=True)
     spread = 1.4826 * np.nanmedian(np.abs(masked - middle), axis=1, keepdims=True)
-    far = (np.abs(values - middle) > OUTLIER * np.maximum(spread, 1e-12)) & (there > 0)
+    most = np.nanquantile(np.abs(masked - middle), 1.0 - 2 * FEW, axis=1, keepdims=True)
+    far = (np.abs(values - middle) > np.maximum(OUTLIER * spread, BEYOND * most)) & (there > 0)
     few = far.sum(axis=1, keepdims=True) <= FEW * there.sum(axis=1, keepdims=True)
     return np.where(far & few, 0.0, 1.0)
 

@@ -20,6 +20,8 @@ from labctl.fitting.criticism.verdict import (
     ENOUGH,
     LEAD,
     NEXT_SHARE,
+    NEXT_SHARE_UNTOLD,
+    Form,
     Step,
     Verdict,
     alias_group,
@@ -112,7 +114,7 @@ def criticise(
     base = fit_context(context, changed(model)) if full else None
     forward, _ = changed(model).build(context)
     if (short := _too_little(data, forward)) is not None:
-        return Criticism(Verdict("insufficient_data", (), reason=short), data, base, None, None)
+        return Criticism(Verdict("insufficient_data", reason=short), data, base, None, None)
     weighed = weigh(data, forward, catalogue)
     verdict, explained = _ask(data, forward, weighed, catalogue)
     if not full:
@@ -130,7 +132,7 @@ def criticise(
 def _shapes(data: Compressed, model: ErrorModel, catalogue: Mapping[str, Effect]) -> Verdict:
     weighed = weigh(data, model, catalogue)
     terms = {c.id: refined(weighed, c) for c in weighed.candidates if not c.smooth and c.term is not None}
-    return Verdict("adequate", (), terms=terms)
+    return Verdict("adequate", terms=terms)
 
 
 def _direct(model: ErrorModel) -> Any:
@@ -155,29 +157,34 @@ def _too_little(data: Compressed, model: ErrorModel) -> str | None:
 
 def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> tuple[Verdict, float]:
     """Ask, add what is named, and ask again, until nothing more is."""
-    named: list[str] = []
-    terms: dict[str, Term] = {}
-    weighed, depends = first, channels_behind(first)
+    depends = channels_behind(first)
     weighed, step = _judged(first, catalogue)
-    first = weighed
-    if step.form == "unexplained" and (pair := _pair(data, model, first, catalogue)) is not None:
-        return replace(pair, depends_on=depends), _explained(first, first)
-    verdict = Verdict(step.form, step.group, step.depends_on or depends)
-    for _ in range(STEPS):
-        if step.form != "missing" or step.leader is None or step.leader.term is None:
+    explained = _explained(weighed)
+    if step.form == "unexplained":
+        pair = _pair(data, model, weighed, catalogue)
+        found = replace(pair, depends_on=depends) if pair else Verdict(step.form, depends_on=step.depends_on or depends)
+        return found, explained
+    form: Form = step.form
+    groups: list[tuple[str, ...]] = []
+    terms: dict[str, Term] = {}
+    while step.form in {"missing", "ambiguous"} and len(groups) < STEPS:
+        leader = step.leader
+        if leader is None or leader.term is None:
             break
-        term = refined(weighed, step.leader)
-        named.append(step.leader.id)
-        terms[step.leader.id] = term
-        model = model.with_terms((*model.terms, replace(term, steady=True)))
-        before = step.leader.gain
+        groups.append(step.group)
+        terms[leader.id] = refined(weighed, leader)
+        model = model.with_terms((*model.terms, replace(terms[leader.id], steady=True)))
+        least = leader.gain * (NEXT_SHARE if len(step.group) == 1 else NEXT_SHARE_UNTOLD)
         weighed, step = _judged(weigh(data, model, catalogue), catalogue, first=False)
-        if step.leader is not None and (step.leader.gain < NEXT_SHARE * before or set(named) & set(step.group)):
-            step = replace(step, form="adequate")  # what is left of a named effect is its shape, not another cause
-        verdict = Verdict("missing", tuple(named), depends, terms=dict(terms))
-    if verdict.form == "ambiguous" and step.leader is not None and step.leader.term is not None:
-        verdict = replace(verdict, terms={step.leader.id: refined(weighed, step.leader)})
-    return replace(verdict, depends_on=depends if verdict.form != "adequate" else ()), _explained(first, weighed)
+        if step.leader is not None and (step.leader.gain < least or _known(groups) & set(step.group)):
+            break  # what is left of a named effect is its shape, not another cause
+    if len(groups) > 1:
+        form = "missing" if all(len(group) == 1 for group in groups) else "ambiguous"
+    return Verdict(form, tuple(groups), depends if groups else (), terms=terms), explained
+
+
+def _known(groups: list[tuple[str, ...]]) -> set[str]:
+    return {name for group in groups for name in group}
 
 
 def _judged(weighed: Weighed, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Weighed, Step]:
@@ -206,12 +213,11 @@ def _pair(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mappin
     both = beside.with_terms((*beside.terms, replace(terms[second.id], steady=True)))
     if _judged(weigh(data, both, catalogue), catalogue, first=False)[1].form != "adequate":
         return None
-    return Verdict("missing", tuple(terms), terms=terms)
+    return Verdict("missing", tuple((name,) for name in terms), terms=terms)
 
 
-def _explained(first: Weighed, last: Weighed) -> float:
+def _explained(first: Weighed) -> float:
     """Return which share of the raw excess the base explains, 0 to 1."""
-    del last
     excess = raw = 0.0
     for axis, found in first.axes.items():
         freedom = found.rows - found.base_columns

@@ -35,6 +35,8 @@ EXPLAINED_TIME = 0.75
 SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
 #: The next effect is only named when it takes off at least this share of what the first did: less is shape error.
 NEXT_SHARE = 0.04
+#: The same after effects that could not be told apart: one of the others may fit better than the one that was added.
+NEXT_SHARE_UNTOLD = 0.2
 #: An effect that takes off less than this share of the excess chi2 is not named alone at the first step.
 LEAST_SHARE = 0.3
 #: Columns that are the same up to rounding have the same evidence within this.
@@ -59,10 +61,20 @@ class Verdict:
     """The answer."""
 
     form: Form
-    named: tuple[str, ...]
+    groups: tuple[tuple[str, ...], ...] = ()  #: one per cause: its name, or those that cannot be told apart, best first
     depends_on: tuple[str, ...] = ()
     reason: str = ""
     terms: Mapping[str, Term] = field(default_factory=dict)  #: effect id -> the shape that fits best
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Every effect that the verdict stands on."""
+        return tuple(name for group in self.groups for name in group)
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """The first group of effects that cannot be told apart; empty where all can."""
+        return next((group for group in self.groups if len(group) > 1), ())
 
 
 def judge(weighed: Weighed, *, first: bool = True) -> Step:
