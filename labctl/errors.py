@@ -10,6 +10,7 @@ LabctlError              exit 2, HTTP 400
 │   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
 ├── Conflict             somebody else holds it, or it is already so               HTTP 409
+│   └── BenchBusy        a campaign runs on the bench now                          HTTP 409
 └── StoreError           the database cannot be used: newer, damaged, locked, full     HTTP 503
 """
 
@@ -80,6 +81,12 @@ class Conflict(LabctlError):
 
     status = 409
     slug = "conflict"
+
+
+class BenchBusy(Conflict):
+    """A campaign runs on the bench now."""
+
+    slug = "bench-busy"
 
 
 class StoreError(LabctlError):

@@ -10,6 +10,7 @@ from labctl.store.calibrations import Calibrations, NewCalibration
 from labctl.store.campaigns import Campaigns, NewCampaign
 from labctl.store.database import Database, Holder, holder_of, is_url
 from labctl.store.journal import StoreJournal
+from labctl.store.leases import LeaseRow, Leases
 from labctl.store.recordings import Recordings
 from labctl.store.records import (
     CalibrationRecord,
@@ -21,6 +22,7 @@ from labctl.store.records import (
     StepRow,
     Unit,
 )
+from labctl.store.starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.units import Units
 
 __all__ = [
@@ -31,11 +33,17 @@ __all__ = [
     "CertificationRow",
     "EventRow",
     "Holder",
+    "LeaseRow",
+    "Leases",
     "NewCalibration",
     "NewCampaign",
+    "NewStart",
     "NewUnit",
     "RecordingRow",
     "Recordings",
+    "StartEventRow",
+    "StartRow",
+    "Starts",
     "StepRow",
     "Store",
     "StoreJournal",
@@ -55,6 +63,8 @@ class Store:
         self.recordings = Recordings(database)
         self.campaigns = Campaigns(database)
         self.calibrations = Calibrations(database)
+        self.starts = Starts(database)
+        self.leases = Leases(database)
 
     @property
     def location(self) -> str:
@@ -65,6 +75,11 @@ class Store:
     def is_held(self) -> bool:
         """Whether a process, perhaps this one, holds the database for writing."""
         return self._database.writes or is_url(self.location) or holder_of(self.location) is not None
+
+    @property
+    def is_sole_writer(self) -> bool:
+        """Whether no other process can write to the database as long as this one holds it."""
+        return self._database.writes and not is_url(self.location)
 
     def announce(self, url: str) -> None:
         """Say at which address the holder of this database can be asked to write."""
