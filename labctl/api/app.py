@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 
-from labctl.api import calibrations, campaigns, health, problems, recordings, units
+from labctl.api import calibrations, campaigns, health, problems, recordings, schedule, units
 from labctl.services.house import House
 
 DESCRIPTION = """
@@ -17,7 +17,8 @@ Calibrations of gyroscopes by serial number, the campaigns that measured them, a
 * `GET /api/units/{serial}/calibration` is what a robot loads: the certified calibration, immutable bytes with a strong
   ETag, as JSON or in the format of a consumer.
 * `POST /api/recordings` takes data measured on any bench; `POST /api/units/{serial}/calibrations` fits it.
-* `POST /api/campaigns` runs a recipe on this service's bench; `GET /api/campaigns/{id}/events` follows it.
+* `POST /api/campaigns` runs a recipe on this service's bench, now, at a time or on a cron line;
+  `GET /api/campaigns/{id}/events` follows it, `GET /api/schedule` says what begins when.
 
 Rates are deg/s, temperatures deg C, times s, instants UTC. Errors are problem documents (RFC 9457).
 """
@@ -37,6 +38,13 @@ def create_app(house: House) -> FastAPI:
     app = FastAPI(title="labctl", version=version("labctl"), description=DESCRIPTION, lifespan=lifespan)
     app.state.house = house
     problems.install(app)
-    for router in (health.router, units.router, calibrations.router, campaigns.router, recordings.router):
+    for router in (
+        health.router,
+        units.router,
+        calibrations.router,
+        campaigns.router,
+        schedule.router,
+        recordings.router,
+    ):
         app.include_router(router)
     return app

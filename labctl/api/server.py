@@ -17,6 +17,7 @@ from labctl.config import default_database
 from labctl.errors import BadInput
 from labctl.services.bench_runner import BenchRunner
 from labctl.services.house import House
+from labctl.services.leases import hold_bench
 from labctl.services.planning import load_bench
 from labctl.services.running import clock_for
 from labctl.store import Store
@@ -50,7 +51,7 @@ def open_house(request: ServeRequest, url: str | None) -> House:
                 own_pace = request.speed == 0 or not bench.is_simulated
                 return clock_for(bench, None if own_pace else request.speed)
 
-            runner = BenchRunner(store, bench, make_clock)
+            runner = BenchRunner(store, bench, make_clock, hold_bench(store, bench))
         return House(store, SystemClock(), runner)
     except BaseException:
         store.close()

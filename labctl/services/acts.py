@@ -10,7 +10,7 @@ from typing import Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
 
 
 class Request(BaseModel):
@@ -53,6 +53,22 @@ class CampaignRequest(Request):
 
     recipe: str = Field(description="Name of a shipped recipe, or the recipe itself as TOML text.")
     clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
+    at: str | None = Field(
+        default=None,
+        max_length=64,
+        description="When to begin, ISO 8601; without offset in `time_zone`. `now`: as soon as the bench is free.",
+    )
+    cron: str | None = Field(default=None, max_length=200, description="Begin again and again: five fields of cron.")
+    time_zone: str | None = Field(
+        default=None, max_length=100, description="Of `at` and `cron`, such as Europe/Berlin; default: the local one."
+    )
+    priority: int = Field(default=0, ge=-100, le=100, description="Of starts that are due, the highest goes first.")
+    late_limit_s: float | None = Field(
+        default=None,
+        ge=0,
+        le=1e9,
+        description="How much later than due it may begin; 0: a missed start is skipped; absent: any time, once.",
+    )
 
 
 class ReasonRequest(Request):
@@ -86,4 +102,12 @@ class Acts(Protocol):
 
     def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
         """End a campaign now, in the safe state."""
+        ...
+
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+        """Enter a campaign into the schedule of a bench."""
+        ...
+
+    def cancel_start(self, start: int) -> ScheduledAnswer:
+        """Take an entry out of the schedule."""
         ...

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from instruments.bench import BenchFile
 from instruments.clock import Clock
-from labctl.errors import Conflict
+from labctl.errors import BenchBusy
 from labctl.services.acts import CampaignRequest
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import answer_of, campaign_status
+from labctl.services.leases import BenchHold
 from labctl.services.running import Prepared, prepare, run
 from labctl.store import CampaignRow, Store
 from procedures.control import Control
@@ -27,7 +28,7 @@ class _Job:
     """A campaign that runs now."""
 
     row: CampaignRow
-    control: Control = field(default_factory=Control)
+    control: Control
     progress: Progress | None = None
     thread: threading.Thread | None = None
 
@@ -35,13 +36,21 @@ class _Job:
 class BenchRunner:
     """The one that drives this service's bench."""
 
-    def __init__(self, store: Store, bench: BenchFile, make_clock: Callable[[], Clock]) -> None:
+    def __init__(
+        self, store: Store, bench: BenchFile, make_clock: Callable[[], Clock], hold: BenchHold | None = None
+    ) -> None:
         self._store = store
+        self._hold = hold
         self._bench = bench
         self._make_clock = make_clock
         self._guard = threading.Lock()
         self._job: _Job | None = None
         self._listeners: list[Callable[[], None]] = []
+
+    @property
+    def bench(self) -> BenchFile:
+        """The bench that is driven."""
+        return self._bench
 
     @property
     def busy(self) -> bool:
@@ -54,14 +63,20 @@ class BenchRunner:
         return job is not None and job.row.id == campaign
 
     def start(self, request: CampaignRequest) -> CampaignAnswer:
-        """Plan, write down and begin a campaign. Raises Conflict while another runs, and whatever planning raises."""
+        """Plan, write down and begin a campaign.
+
+        Raises BenchBusy while another runs, Conflict without the lease on the bench, and whatever planning raises.
+        """
         with self._guard:
             if self._job is not None:
-                raise Conflict(
+                raise BenchBusy(
                     f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
                 )
+            if self._hold is not None:
+                self._hold.check()
             prepared = prepare(self._store, request.recipe, self._bench, self._make_clock(), clip=request.clip)
-            job = _Job(self._store.campaigns.get(prepared.id))
+            control = Control() if self._hold is None else self._hold.control()
+            job = _Job(self._store.campaigns.get(prepared.id), control)
             job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
             self._job = job
             job.thread.start()
@@ -114,8 +129,10 @@ class BenchRunner:
         }
 
     def close(self) -> None:
-        """End what runs, in the safe state."""
+        """End what runs, in the safe state, and let the bench go."""
         job = self._job
         if job is not None and job.thread is not None:
             job.control.abort("the service stops")
             job.thread.join(SAFE_WITHIN_S)
+        if self._hold is not None and not (job and job.thread and job.thread.is_alive()):
+            self._hold.close()

@@ -9,14 +9,18 @@ from typing import Any
 
 from instruments.clock import Clock
 from labctl.errors import Conflict
-from labctl.services.answers import CampaignAnswer, EventAnswer
+from labctl.services import scheduling
+from labctl.services.acts import CampaignRequest
+from labctl.services.answers import CampaignAnswer, EventAnswer, ScheduledAnswer
 from labctl.services.bench_runner import BenchRunner
 from labctl.services.campaigns import ENDED, campaign_status, event_answer
 from labctl.services.opening import LocalActs
+from labctl.services.scheduler import Scheduler
 from labctl.store import Store
 
 #: An open event stream says that it is alive after this long without an event.
 HEARTBEAT_S = 10.0
+NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`"
 
 
 class ServiceActs(LocalActs):
@@ -32,6 +36,18 @@ class ServiceActs(LocalActs):
             return self._runner.abort(campaign, reason)
         return super().abort_campaign(campaign, reason)
 
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+        """Enter a campaign into the schedule of this service's bench."""
+        if self._runner is None:
+            raise Conflict(NO_BENCH)
+        if bench is not None and bench != self._runner.bench.name:
+            raise Conflict(f"this service runs bench {self._runner.bench.name}, not {bench}; leave the bench out")
+        return scheduling.add_start(self._store, request, self._runner.bench, self._clock.utc(), "service")
+
+    def cancel_start(self, start: int) -> ScheduledAnswer:
+        """Take an entry out of the schedule."""
+        return scheduling.cancel_start(self._store, start, self._clock.utc(), "service")
+
 
 class House:
     """What a running service serves."""
@@ -40,15 +56,20 @@ class House:
         self.store = store
         self.clock = clock
         self._runner = runner
+        self.scheduler = None if runner is None else Scheduler(store, clock, runner, runner.bench.name)
         self._opened_at = clock.utc()
 
     def start(self) -> None:
-        """Make the house ready: campaigns that an earlier process left are marked as such."""
+        """Make the house ready: campaigns that an earlier process left are marked as such, then the schedule runs."""
         for row in self.store.campaigns.unfinished():
             self.store.campaigns.close_unfinished(row.id, "the process that ran it ended", self.clock.utc())
+        if self.scheduler is not None:
+            self.scheduler.start()
 
     def close(self) -> None:
-        """End what runs, leave the bench safe, close the store."""
+        """Begin nothing more, end what runs, leave the bench safe, close the store."""
+        if self.scheduler is not None:
+            self.scheduler.close()
         if self._runner is not None:
             self._runner.close()
         self.store.close()
@@ -60,7 +81,7 @@ class House:
     def bench_runner(self) -> BenchRunner:
         """Return the runner of this service's bench; raises Conflict when it has none."""
         if self._runner is None:
-            raise Conflict("this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`")
+            raise Conflict(NO_BENCH)
         return self._runner
 
     def benches(self) -> list[dict[str, Any]]:
@@ -107,6 +128,7 @@ class House:
             "database": self.store.location,
             "since": self._opened_at.isoformat(),
             "bench": self._runner.describe() if self._runner is not None else None,
+            "schedule_trouble": self.scheduler.trouble if self.scheduler is not None else "",
         }
 
     def metrics(self) -> dict[str, float]:

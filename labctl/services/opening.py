@@ -9,10 +9,11 @@ from pathlib import Path
 from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
-from labctl.services import calibrations, criticism, recordings
-from labctl.services.acts import Acts, CertifyRequest, FitRequest, ImproveRequest
-from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services import calibrations, criticism, recordings, scheduling
+from labctl.services.acts import Acts, CampaignRequest, CertifyRequest, FitRequest, ImproveRequest
+from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
 from labctl.services.campaigns import campaign_status
+from labctl.services.planning import bench_for, load_bench, load_recipe, own_text
 from labctl.store import Store, holder_of, open_store
 
 
@@ -50,6 +51,18 @@ class LocalActs:
             raise Conflict(f"campaign {campaign} is over already: {answer.state}")
         self._store.campaigns.close_unfinished(campaign, f"left unfinished; {reason}", self._clock.utc())
         return campaign_status(self._store, campaign)
+
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+        """Enter a campaign into the schedule of a bench; a service that holds this bench and database begins it."""
+        file = load_bench(bench or bench_for(load_recipe(request.recipe)))
+        request = request.model_copy(update={"recipe": own_text(request.recipe)})  # a file may be gone by then
+        answer = scheduling.add_start(self._store, request, file, self._clock.utc(), "command line")
+        said = "; ".join(filter(None, (scheduling.NOBODY.format(bench=file.name), answer.note)))
+        return answer.model_copy(update={"note": said})
+
+    def cancel_start(self, start: int) -> ScheduledAnswer:
+        """Take an entry out of the schedule."""
+        return scheduling.cancel_start(self._store, start, self._clock.utc(), "command line")
 
 
 def service_url(database: str | None) -> str | None:

@@ -34,6 +34,14 @@ def load_recipe(source: str) -> Recipe:
     return read_recipe(source)
 
 
+def own_text(source: str) -> str:
+    """Return the text of a recipe file, for somebody who does not read it himself or later; a name stays as it is."""
+    if "\n" in source or not Path(source).is_file():
+        return source
+    load_recipe(source)
+    return Path(source).read_text(encoding="utf-8")
+
+
 def load_bench(source: str) -> BenchFile:
     """Return a bench by shipped name or path; raises BadBench naming the file and the key."""
     try:

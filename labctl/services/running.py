@@ -18,8 +18,9 @@ from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.acts import Request
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import answer_of
+from labctl.services.leases import holding, open_for
 from labctl.services.planning import bench_for, load_bench, load_recipe
-from labctl.store import NewCampaign, NewUnit, Store, open_store
+from labctl.store import NewCampaign, NewUnit, Store
 from procedures.control import Control
 from procedures.engine import Engine
 from procedures.limits import BenchLimits
@@ -147,7 +148,7 @@ def run(
 def run_here(database: str | None, request: StartRequest, observe: Observe | None = None) -> CampaignAnswer:
     """Run a campaign in this process, until it is over."""
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
-    with open_store(database or default_database(), write=True) as store:
+    with open_for(bench_file, database or default_database()) as store, holding(store, bench_file) as control:
         clock = clock_for(bench_file, request.speed)
         prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip)
         row = store.campaigns.get(prepared.id)
@@ -156,4 +157,4 @@ def run_here(database: str | None, request: StartRequest, observe: Observe | Non
             if observe is not None:
                 observe(answer_of(row, progress))
 
-        return run(store, prepared, observe=seen)
+        return run(store, prepared, control, seen)

@@ -73,7 +73,9 @@ class Starts:
         """Return one entry; raises NotFound."""
         found = self._rows(tables.scheduled_starts.c.id == start)
         if not found:
-            raise NotFound(f"scheduled start {start} is not in this database; `labctl campaign schedule list` shows them")
+            raise NotFound(
+                f"scheduled start {start} is not in this database; `labctl campaign schedule list` shows them"
+            )
         return found[0]
 
     def all(self, *, ended: bool) -> list[StartRow]:
@@ -94,7 +96,8 @@ class Starts:
             s.id, s.state, s.created_at,
         )  # fmt: skip
         with self._database.reading() as connection:
-            return [StartRow(*row) for row in connection.execute(query.where(condition).order_by(*order))]
+            rows = connection.execute(query.where(condition).order_by(*order)).mappings().all()
+        return [StartRow(**dict(row)) for row in rows]
 
     def take(
         self, row: StartRow, due_at: datetime, next_due: datetime | None, at: datetime, outcome: Outcome, message: str
