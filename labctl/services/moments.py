@@ -33,12 +33,12 @@ def time_zone(name: str | None) -> ZoneInfo:
 
 
 def moment(text: str, zone: ZoneInfo, now: datetime) -> datetime:
-    """Return a time as aware instant in `zone`; one without zone of its own is meant in `zone`.
+    """Return a time as UTC; one without zone of its own is meant in `zone`.
 
     A time that comes twice is the first of the two. Raises BadInput for one that does not exist or is past.
     """
     if text == NOW:
-        return now.astimezone(zone)
+        return now
     try:
         said = datetime.fromisoformat(text)
         meant = said.replace(tzinfo=zone) if said.tzinfo is None else said.astimezone(zone)
@@ -55,7 +55,7 @@ def moment(text: str, zone: ZoneInfo, now: datetime) -> datetime:
             f"time {text!r} ({meant:%Y-%m-%d %H:%M %z}) is past, it is {here:%Y-%m-%d %H:%M %z} in {zone.key}; "
             "name a later one, or now"
         )
-    return meant
+    return there
 
 
 def next_due(line: str, zone: ZoneInfo, after: datetime) -> datetime | None:

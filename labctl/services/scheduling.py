@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import datetime
 
 from instruments.bench import BenchFile
 from labctl.errors import BadInput
@@ -38,7 +38,7 @@ def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: dat
         due = moments.check_cron(request.cron, zone, now)
     else:
         assert request.at is not None
-        due = moments.moment(request.at, zone, now).astimezone(UTC)
+        due = moments.moment(request.at, zone, now)
     recipe = load_recipe(request.recipe)
     make_plan(recipe, limits_of(bench), clip=request.clip)
     new = NewStart(
