@@ -107,13 +107,16 @@ def start(
     from labctl.cli.progress import CampaignProgress
     from labctl.services.acts import CampaignRequest
     from labctl.services.opening import service_url
+    from labctl.services.planning import own_text
     from labctl.services.running import StartRequest, run_here
     from labctl.services.scheduling import is_scheduled
 
     with one_clear_line():
         wanted = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s}
         given = {name: value for name, value in wanted.items() if value is not None}
-        later = CampaignRequest(recipe=recipe, clip=clip, **given, **({"priority": priority} if priority else {}))
+        later = CampaignRequest(
+            recipe=own_text(recipe), clip=clip, **given, **({"priority": priority} if priority else {})
+        )
         if is_scheduled(later):
             schedule.enter(later, bench, database, as_json=as_json, pace=speed, seed=seed)
             return

@@ -105,7 +105,7 @@ class Acts(Protocol):
         ...
 
     def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
-        """Enter a campaign into the schedule of a bench."""
+        """Enter a campaign into the schedule of a bench; a recipe in a file is given by its own text."""
         ...
 
     def cancel_start(self, start: int) -> ScheduledAnswer:

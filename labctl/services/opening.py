@@ -13,7 +13,7 @@ from labctl.services import calibrations, criticism, recordings, scheduling
 from labctl.services.acts import Acts, CampaignRequest, CertifyRequest, FitRequest, ImproveRequest
 from labctl.services.answers import CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
 from labctl.services.campaigns import campaign_status
-from labctl.services.planning import bench_for, load_bench, load_recipe, own_text
+from labctl.services.planning import bench_for, load_bench, load_recipe
 from labctl.store import Store, holder_of, open_store
 
 
@@ -55,7 +55,6 @@ class LocalActs:
     def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
         """Enter a campaign into the schedule of a bench; a service that holds this bench and database begins it."""
         file = load_bench(bench or bench_for(load_recipe(request.recipe)))
-        request = request.model_copy(update={"recipe": own_text(request.recipe)})  # a file may be gone by then
         answer = scheduling.add_start(self._store, request, file, self._clock.utc(), "command line")
         said = "; ".join(filter(None, (scheduling.NOBODY.format(bench=file.name), answer.note)))
         return answer.model_copy(update={"note": said})

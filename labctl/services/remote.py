@@ -104,8 +104,7 @@ class RemoteActs:
     def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
         """Ask for a campaign on the service's bench, later."""
         self._refuse_options(("--bench", bench))
-        asked = request.model_copy(update={"recipe": own_text(request.recipe)})
-        return ScheduledAnswer.model_validate(self._post("/api/campaigns", json=asked.model_dump(exclude_unset=True)))
+        return ScheduledAnswer.model_validate(self._post("/api/campaigns", json=request.model_dump(exclude_unset=True)))
 
     def cancel_start(self, start: int) -> ScheduledAnswer:
         """Ask for an entry to be taken out of the schedule."""

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from instruments.bench import BenchFile, SimulationSettings
 from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
+from instruments.errors import InstrumentError
 from instruments.gyro import Gyro
 from instruments.hand import NoHand
 from instruments.open import Bench, open_bench
@@ -27,6 +28,7 @@ from procedures.limits import BenchLimits
 from procedures.operator import HandOperator, Operator, PersonOperator
 from procedures.plan import Plan, make_plan
 from procedures.progress import Progress
+from procedures.safe import stop_table
 
 Observe = Callable[[CampaignAnswer], None]
 
@@ -76,7 +78,7 @@ def clock_for(bench: BenchFile, speed: float | None) -> Clock:
 
 
 def prepare(store: Store, recipe_source: str, bench_file: BenchFile, clock: Clock, *, clip: bool) -> Prepared:
-    """Open the bench, plan, and write the whole campaign down; nothing has moved when this returns.
+    """Open the bench, plan, and write the whole campaign down; the table is at rest when this returns.
 
     Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe.
     """
@@ -85,6 +87,8 @@ def prepare(store: Store, recipe_source: str, bench_file: BenchFile, clock: Cloc
     try:
         bench.table.identify()
         bench.chamber.identify()
+        if bench.table.is_moving():  # whoever drove it before was killed: a move goes on without him
+            _rest(bench, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
         units = tuple(_unit(gyro, bench_file, clock) for gyro in bench.gyros.values())
         new = NewCampaign(
@@ -102,6 +106,11 @@ def prepare(store: Store, recipe_source: str, bench_file: BenchFile, clock: Cloc
     except BaseException:
         bench.close()
         raise
+
+
+def _rest(bench: Bench, clock: Clock) -> None:
+    if complaint := stop_table(bench.table, clock):
+        raise InstrumentError(bench.table.name, complaint)
 
 
 def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:

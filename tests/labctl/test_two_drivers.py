@@ -1,0 +1,132 @@
+"""Two real processes, one bench on real ports: the second is refused, takes over after a kill, never do both move."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+
+from instruments.bench import read_bench
+
+SPEED = 40.0
+#: The rates tell on the wire which of the two drives: each has its own divisor of the step clock.
+FIRST_DPS, SECOND_DPS = 40, 30
+RECIPE = """
+format = "labctl-recipe/1"
+name = "drive-{rate}"
+temperatures_c = [25]
+rates_dps = [-{rate}, {rate}]
+positions = ["z"]
+[soak]
+hold_s = 30
+max_drift_c = 2.0
+drift_window_s = 30
+timeout_s = 1800
+[acquire]
+duration_s = {duration}
+settle_s = 2
+"""
+WAIT_S = 100
+
+
+def bench_toml() -> str:
+    """A gyro on two serial lines, and a chamber on the network."""
+    bench = read_bench("single-axis-sim").model_dump(exclude_none=True)
+    bench["chamber"] = read_bench("triaxial-sim").model_dump(exclude_none=True)["chamber"]
+    return tomli_w.dumps(bench)
+
+
+class Simulator:
+    """`labctl simulator` in a process of its own, and what its instruments hear as it comes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.bench = folder / "far.toml"
+        near, pipe = folder / "near.toml", folder / "log"
+        near.write_text(bench_toml())
+        os.mkfifo(pipe)
+        command = [sys.executable, "-m", "labctl", "simulator", str(near), "--out", str(self.bench)]
+        self.process = subprocess.Popen(
+            [*command, "--speed", str(SPEED), "--log", str(pipe), "--json"], stdout=subprocess.PIPE, text=True
+        )
+        self.heard: list[dict[str, Any]] = []
+        self._table: queue.Queue[dict[str, Any]] = queue.Queue()
+        self._reader = threading.Thread(target=self._read, args=(pipe,), daemon=True)
+        self._reader.start()
+        assert self.process.stdout is not None
+        json.loads(self.process.stdout.readline())
+
+    def _read(self, pipe: Path) -> None:
+        with pipe.open() as lines:
+            for line in lines:
+                said = json.loads(line)
+                self.heard.append(said)
+                if said["device"] == "table":
+                    self._table.put(said)
+
+    def wait_for(self, begin: str) -> None:
+        """Wait until the table hears a command."""
+        while not self._table.get(timeout=WAIT_S)["heard"].startswith(begin):
+            pass
+
+    def close(self) -> None:
+        self.process.terminate()
+        self.process.wait()
+        self._reader.join(WAIT_S)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+
+@pytest.fixture
+def simulator(tmp_path: Path) -> Iterator[Simulator]:
+    made = Simulator(tmp_path)
+    yield made
+    made.close()
+
+
+def drive(folder: Path, bench: Path, rate_dps: int, database: str, duration_s: int) -> subprocess.Popen[str]:
+    recipe = folder / f"drive-{rate_dps}.toml"
+    recipe.write_text(RECIPE.format(rate=rate_dps, duration=duration_s))
+    command = [sys.executable, "-m", "labctl", "campaign", "start", str(recipe), "--bench", str(bench), "--json"]
+    return subprocess.Popen(
+        [*command, "--database", str(folder / database)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+@pytest.mark.timeout(400)
+def test_the_second_is_refused_and_takes_over_when_the_first_is_killed(simulator: Simulator, tmp_path: Path) -> None:
+    first = drive(tmp_path, simulator.bench, FIRST_DPS, "lab.sqlite", 20_000)
+    simulator.wait_for("!1m1")  # the first one turns the table now, for longer than the test lasts
+    _, said = drive(tmp_path, simulator.bench, SECOND_DPS, "lab.sqlite", 20).communicate(timeout=WAIT_S)
+    assert f"bench single-axis-sim is held by process {first.pid} on " in said
+    # another database knows nothing of that lease, but the ports are taken
+    _, said = drive(tmp_path, simulator.bench, SECOND_DPS, "other.sqlite", 20).communicate(timeout=WAIT_S)
+    assert "table: port /dev/" in said
+    assert "exclusively lock" in said
+    refused = len(simulator.heard)
+    first.send_signal(signal.SIGKILL)
+    first.communicate(timeout=WAIT_S)
+    second = drive(tmp_path, simulator.bench, SECOND_DPS, "lab.sqlite", 20)
+    answer, said = second.communicate(timeout=WAIT_S)
+    assert json.loads(answer)["state"] == "done", said
+    simulator.close()
+    speeds = [f"!1sp1,{round(2_000_000 * 0.225 / rate)}" for rate in (FIRST_DPS, SECOND_DPS)]
+    table = [line for line in simulator.heard if line["device"] == "table"]
+    first_to_last = [
+        [index for index, line in enumerate(simulator.heard) if line["heard"].startswith(speed)] for speed in speeds
+    ]
+    assert first_to_last[0]
+    assert first_to_last[1]
+    assert max(first_to_last[0]) < refused <= min(first_to_last[1])
+    assert any(line["heard"].startswith("!1a") and line["table_turns"] for line in table)  # the killed one's last move
+    moves = [line for line in table if line["heard"].startswith(("!1m1", "!1h1"))]
+    assert not any(line["table_turns"] for line in moves), moves
