@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import uvicorn
 
-from instruments.clock import Clock, SystemClock
+from instruments.clock import Clock, WallClock
 from labctl.api.app import create_app
 from labctl.config import default_database
 from labctl.errors import BadInput
@@ -52,7 +52,7 @@ def open_house(request: ServeRequest, url: str | None) -> House:
                 return clock_for(bench, None if own_pace else request.speed)
 
             runner = BenchRunner(store, bench, make_clock, hold_bench(store, bench))
-        return House(store, SystemClock(), runner)
+        return House(store, WallClock(), runner)
     except BaseException:
         store.close()
         raise

@@ -20,7 +20,7 @@ from pathlib import Path
 from uuid import uuid4
 
 from instruments.bench import BenchFile
-from instruments.clock import Clock, SystemClock
+from instruments.clock import Clock, WallClock
 from labctl.errors import Conflict, LabctlError
 from labctl.store import LeaseRow, Store, open_store
 from labctl.store.database import Database
@@ -159,7 +159,7 @@ def hold_bench(store: Store, bench: BenchFile, clock: Clock | None = None) -> Be
     """Take the lease on a bench and keep it; None for one that exists in this process only. Raises Conflict."""
     if bench.is_simulated:
         return None
-    hold = BenchHold(store, bench.name, clock or SystemClock())
+    hold = BenchHold(store, bench.name, clock or WallClock())
     hold.take()
     hold.keep()
     return hold

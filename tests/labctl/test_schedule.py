@@ -198,6 +198,31 @@ def test_what_was_cancelled_does_not_begin(lab: Lab) -> None:
         cancel_start(lab.store, start, lab.clock.utc(), "a person")
 
 
+class SetClock(VirtualClock):
+    """A virtual clock that somebody sets."""
+
+    def __init__(self) -> None:
+        super().__init__(START)
+        self.set_by = timedelta(0)
+
+    def utc(self) -> datetime:
+        return super().utc() + self.set_by
+
+
+def test_setting_the_clock_back_begins_nothing_twice_and_forward_leaves_nothing_out(lab: Lab) -> None:
+    lab.clock = clock = SetClock()
+    lab.scheduler = lab.service()
+    lab.enter(cron="0 10 * * *", time_zone="UTC")
+    lab.live(timedelta(hours=2, minutes=5))
+    assert len(lab.begun) == 1
+    clock.set_by = timedelta(hours=-1)
+    lab.live(timedelta(hours=2))
+    assert len(lab.begun) == 1
+    clock.set_by = timedelta(hours=23)
+    lab.live(timedelta(minutes=5))
+    assert len(lab.begun) == 2
+
+
 def test_a_bench_takes_only_its_own_starts(lab: Lab) -> None:
     lab.enter(at="now")
     Scheduler(lab.store, lab.clock, lab, "another-bench").tick()

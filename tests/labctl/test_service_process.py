@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -38,16 +39,24 @@ class Service:
         return done
 
 
+@contextmanager
+def running(database: Path) -> Iterator[Service]:
+    made = Service(database)
+    try:
+        yield made
+    finally:
+        made.http.close()
+        made.process.kill()
+        made.process.wait()
+        for stream in (made.process.stdout, made.process.stderr):
+            assert stream is not None
+            stream.close()
+
+
 @pytest.fixture
 def service(tmp_path: Path) -> Iterator[Service]:
-    made = Service(tmp_path / "lab.sqlite")
-    yield made
-    made.http.close()
-    made.process.kill()
-    made.process.wait()
-    for stream in (made.process.stdout, made.process.stderr):
-        assert stream is not None
-        stream.close()
+    with running(tmp_path / "lab.sqlite") as made:
+        yield made
 
 
 def test_commands_ask_the_service_that_holds_the_database(service: Service) -> None:
@@ -79,6 +88,30 @@ def test_a_campaign_is_aborted_from_the_command_line(service: Service) -> None:
     assert json.loads(service.run("campaign", "status", str(campaign), "--json").stdout)["state"] == "aborted"
     again = service.run("campaign", "abort", str(campaign), status=2)
     assert "aborted" in again.stderr
+
+
+def test_a_service_begins_what_was_entered_before_it_ran_and_while_it_runs(tmp_path: Path) -> None:
+    database = tmp_path / "lab.sqlite"
+    command = [sys.executable, "-m", "labctl", "campaign", "start", "short", "--at", "now", "--json"]
+    bench = ["--bench", "single-axis-sim", "--database", str(database)]
+    before = json.loads(subprocess.run([*command, *bench], capture_output=True, text=True, check=True).stdout)
+    assert (before["state"], "no service runs" in before["note"]) == ("waiting", True)
+    with running(database) as service:
+        assert begun(service, before["id"])["campaign"] == 1
+        queued = json.loads(service.run("campaign", "start", "short", "--at", "now", "--json").stdout)
+        assert "no service" not in queued["note"]
+        assert service.http.get(f"/api/schedule/{queued['id']}").json()["history"] == []
+        service.run("campaign", "abort", "1", status=0)
+        assert begun(service, queued["id"])["campaign"] == 2
+
+
+def begun(service: Service, start: int) -> Any:
+    """Wait until an entry's first start was begun."""
+    while True:
+        history = service.http.get(f"/api/schedule/{start}").json()["history"]
+        if history and history[0]["outcome"] != "claimed":
+            assert history[0]["outcome"] == "started", history
+            return history[0]
 
 
 def test_sigterm_ends_the_campaign_in_the_safe_state(service: Service) -> None:
