@@ -18,7 +18,7 @@ import tomli_w
 
 from instruments.bench import read_bench
 
-SPEED = 40.0
+SPEED = 20.0
 #: The rates tell on the wire which of the two drives: each has its own divisor of the step clock.
 FIRST_DPS, SECOND_DPS = 40, 30
 RECIPE = """
@@ -33,7 +33,7 @@ max_drift_c = 2.0
 drift_window_s = 30
 timeout_s = 1800
 [acquire]
-duration_s = {duration}
+duration_s = 20000
 settle_s = 2
 """
 WAIT_S = 100
@@ -93,40 +93,58 @@ def simulator(tmp_path: Path) -> Iterator[Simulator]:
     made.close()
 
 
-def drive(folder: Path, bench: Path, rate_dps: int, database: str, duration_s: int) -> subprocess.Popen[str]:
+def speed_command(rate_dps: float) -> str:
+    """What the table hears before it turns so fast."""
+    return f"!1sp1,{round(2_000_000 * 0.225 / rate_dps)}"
+
+
+def drive(folder: Path, bench: Path, rate_dps: int, database: str) -> subprocess.Popen[str]:
+    """Start a campaign that turns the table for longer than the test lasts."""
     recipe = folder / f"drive-{rate_dps}.toml"
-    recipe.write_text(RECIPE.format(rate=rate_dps, duration=duration_s))
+    recipe.write_text(RECIPE.format(rate=rate_dps))
     command = [sys.executable, "-m", "labctl", "campaign", "start", str(recipe), "--bench", str(bench), "--json"]
     return subprocess.Popen(
         [*command, "--database", str(folder / database)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
 
 
+def refused(folder: Path, bench: Path, database: str) -> str:
+    """Let the second one try; returns what it says."""
+    second = drive(folder, bench, SECOND_DPS, database)
+    _, said = second.communicate(timeout=WAIT_S)
+    assert second.returncode == 2, said
+    return said
+
+
 @pytest.mark.timeout(400)
 def test_the_second_is_refused_and_takes_over_when_the_first_is_killed(simulator: Simulator, tmp_path: Path) -> None:
-    first = drive(tmp_path, simulator.bench, FIRST_DPS, "lab.sqlite", 20_000)
-    simulator.wait_for("!1m1")  # the first one turns the table now, for longer than the test lasts
-    _, said = drive(tmp_path, simulator.bench, SECOND_DPS, "lab.sqlite", 20).communicate(timeout=WAIT_S)
-    assert f"bench single-axis-sim is held by process {first.pid} on " in said
+    first = drive(tmp_path, simulator.bench, FIRST_DPS, "lab.sqlite")
+    simulator.wait_for("!1m1")
+    first.send_signal(signal.SIGSTOP)  # it hangs, while its table turns: nothing that it could do ends this by itself
+    held = f"bench single-axis-sim is held by process {first.pid} on "
+    assert held in refused(tmp_path, simulator.bench, "lab.sqlite")
     # another database knows nothing of that lease, but the ports are taken
-    _, said = drive(tmp_path, simulator.bench, SECOND_DPS, "other.sqlite", 20).communicate(timeout=WAIT_S)
+    said = refused(tmp_path, simulator.bench, "other.sqlite")
     assert "table: port /dev/" in said
     assert "exclusively lock" in said
-    refused = len(simulator.heard)
+    heard_before_the_kill = len(simulator.heard)
     first.send_signal(signal.SIGKILL)
     first.communicate(timeout=WAIT_S)
-    second = drive(tmp_path, simulator.bench, SECOND_DPS, "lab.sqlite", 20)
-    answer, said = second.communicate(timeout=WAIT_S)
-    assert json.loads(answer)["state"] == "done", said
+    second = drive(tmp_path, simulator.bench, SECOND_DPS, "lab.sqlite")
+    simulator.wait_for(speed_command(SECOND_DPS))
+    simulator.wait_for("!1m1")
+    second.send_signal(signal.SIGTERM)
+    second.communicate(timeout=WAIT_S)
+    assert second.returncode == 130
     simulator.close()
-    speeds = [f"!1sp1,{round(2_000_000 * 0.225 / rate)}" for rate in (FIRST_DPS, SECOND_DPS)]
-    table = [line for line in simulator.heard if line["device"] == "table"]
-    first_to_last = [
-        [index for index, line in enumerate(simulator.heard) if line["heard"].startswith(speed)] for speed in speeds
+    by = [
+        [at for at, line in enumerate(simulator.heard) if line["heard"].startswith(speed_command(rate))]
+        for rate in (FIRST_DPS, SECOND_DPS)
     ]
-    assert first_to_last[0]
-    assert first_to_last[1]
-    assert max(first_to_last[0]) < refused <= min(first_to_last[1])
-    assert any(line["heard"].startswith("!1a") and line["table_turns"] for line in table)  # the killed one's last move
+    assert max(by[0]) < heard_before_the_kill <= min(by[1])
+    table = [line for line in simulator.heard if line["device"] == "table"]
+    aborts = [line for line in table if line["heard"].startswith("!1a")]
+    assert [line["table_turns"] for line in aborts[:2]] == [True, True]  # the killed one's last move, then its own
     moves = [line for line in table if line["heard"].startswith(("!1m1", "!1h1"))]
+    assert moves
     assert not any(line["table_turns"] for line in moves), moves
