@@ -50,7 +50,8 @@ class Simulator:
     """`labctl simulator` in a process of its own, and what its instruments hear as it comes."""
 
     def __init__(self, folder: Path) -> None:
-        self.bench = folder / "far.toml"
+        self.folder, self.bench = folder, folder / "far.toml"
+        self._drivers: list[subprocess.Popen[str]] = []
         near, pipe = folder / "near.toml", folder / "log"
         near.write_text(bench_toml())
         os.mkfifo(pipe)
@@ -78,10 +79,45 @@ class Simulator:
         while not self._table.get(timeout=WAIT_S)["heard"].startswith(begin):
             pass
 
+    def drive(self, rate_dps: int, database: str) -> subprocess.Popen[str]:
+        """Start a campaign that turns the table for longer than the test lasts."""
+        recipe = self.folder / f"drive-{rate_dps}.toml"
+        recipe.write_text(RECIPE.format(rate=rate_dps))
+        command = [
+            sys.executable,
+            "-m",
+            "labctl",
+            "campaign",
+            "start",
+            str(recipe),
+            "--bench",
+            str(self.bench),
+            "--json",
+        ]
+        driver = subprocess.Popen(
+            [*command, "--database", str(self.folder / database)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self._drivers.append(driver)
+        return driver
+
+    def refused(self, database: str) -> str:
+        """Let the second one try; returns what it says."""
+        second = self.drive(SECOND_DPS, database)
+        _, said = second.communicate(timeout=WAIT_S)
+        assert second.returncode == 2, said
+        return said
+
     def close(self) -> None:
+        for driver in self._drivers:
+            driver.kill()  # those that a failed test has left
+            driver.communicate()
         self.process.terminate()
         self.process.wait()
         self._reader.join(WAIT_S)
+        self._drivers.clear()
         assert self.process.stdout is not None
         self.process.stdout.close()
 
@@ -98,44 +134,25 @@ def speed_command(rate_dps: float) -> str:
     return f"!1sp1,{round(2_000_000 * 0.225 / rate_dps)}"
 
 
-def drive(folder: Path, bench: Path, rate_dps: int, database: str) -> subprocess.Popen[str]:
-    """Start a campaign that turns the table for longer than the test lasts."""
-    recipe = folder / f"drive-{rate_dps}.toml"
-    recipe.write_text(RECIPE.format(rate=rate_dps))
-    command = [sys.executable, "-m", "labctl", "campaign", "start", str(recipe), "--bench", str(bench), "--json"]
-    return subprocess.Popen(
-        [*command, "--database", str(folder / database)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-
-
-def refused(folder: Path, bench: Path, database: str) -> str:
-    """Let the second one try; returns what it says."""
-    second = drive(folder, bench, SECOND_DPS, database)
-    _, said = second.communicate(timeout=WAIT_S)
-    assert second.returncode == 2, said
-    return said
-
-
 @pytest.mark.timeout(400)
-def test_the_second_is_refused_and_takes_over_when_the_first_is_killed(simulator: Simulator, tmp_path: Path) -> None:
-    first = drive(tmp_path, simulator.bench, FIRST_DPS, "lab.sqlite")
+def test_the_second_is_refused_and_takes_over_when_the_first_is_killed(simulator: Simulator) -> None:
+    first = simulator.drive(FIRST_DPS, "lab.sqlite")
     simulator.wait_for("!1m1")
     first.send_signal(signal.SIGSTOP)  # it hangs, while its table turns: nothing that it could do ends this by itself
     held = f"bench single-axis-sim is held by process {first.pid} on "
-    assert held in refused(tmp_path, simulator.bench, "lab.sqlite")
+    assert held in simulator.refused("lab.sqlite")
     # another database knows nothing of that lease, but the ports are taken
-    said = refused(tmp_path, simulator.bench, "other.sqlite")
+    said = simulator.refused("other.sqlite")
     assert "table: port /dev/" in said
     assert "exclusively lock" in said
     heard_before_the_kill = len(simulator.heard)
     first.send_signal(signal.SIGKILL)
-    first.communicate(timeout=WAIT_S)
-    second = drive(tmp_path, simulator.bench, SECOND_DPS, "lab.sqlite")
+    first.wait(timeout=WAIT_S)
+    second = simulator.drive(SECOND_DPS, "lab.sqlite")
     simulator.wait_for(speed_command(SECOND_DPS))
     simulator.wait_for("!1m1")
     second.send_signal(signal.SIGTERM)
-    second.communicate(timeout=WAIT_S)
-    assert second.returncode == 130
+    assert second.wait(timeout=WAIT_S) == 130
     simulator.close()
     by = [
         [at for at, line in enumerate(simulator.heard) if line["heard"].startswith(speed_command(rate))]
