@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sqlite3
-import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -21,15 +20,16 @@ from labctl.api import create_app
 from labctl.cli.app import app
 from labctl.config import os_user
 from labctl.errors import BadInput
-from labctl.services import running
+from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest
+from labctl.services.answers import CampaignAnswer
 from labctl.services.audit import anchor_of, verify_audit
 from labctl.services.bench_runner import BenchRunner
+from labctl.services.campaigns import campaign_status
 from labctl.services.house import House
 from labctl.services.planning import load_bench
 from labctl.services.running import prepare, run
 from labctl.store import Store, migrations, open_store
 from labctl.store.database import Database
-from procedures.operator import PersonOperator
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -201,30 +201,6 @@ def upload(client: TestClient) -> Any:
     return client.post("/api/recordings", files=files)
 
 
-def question(client: TestClient) -> str:
-    """Wait until the running campaign asks something; returns the question's id."""
-    for _ in range(2000):
-        if prompt := client.get("/api/campaigns/2").json()["prompt"]:
-            return str(prompt["id"])
-        time.sleep(0.01)
-    raise AssertionError("nothing was ever asked")
-
-
-def confirm(client: TestClient) -> Any:
-    """Answer the first question; the campaign then waits at its second."""
-    first = question(client)
-    answer = client.post("/api/campaigns/2/confirm", json={"prompt": first, "by": "A"})
-    while question(client) == first:
-        pass
-    return answer
-
-
-def clear(client: TestClient) -> Any:
-    house: House = client.app.state.house  # type: ignore[attr-defined]
-    house.store.benches.mark("single-axis-sim", "table to rest: no answer", AT)
-    return client.post("/api/benches/single-axis-sim/clear", json={"by": "A"})
-
-
 def cancel(client: TestClient) -> Any:
     later = client.post("/api/campaigns", json={"recipe": "short", "at": "2199-01-01T00:00Z"})
     return client.delete(f"/api/schedule/{later.json()['id']}")
@@ -235,6 +211,15 @@ PERSON = {"by": "A", "reason": "B"}
 NOTE = {"file": "x", "bytes": 1, "sha256": "0" * 64}
 #: Every operation that changes something, in an order in which each succeeds, and the act that it leaves in the trail.
 ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
+    "/api/benches/{bench}/clear": (
+        "bench clear", lambda c: c.post("/api/benches/single-axis-sim/clear", json={"by": "A. Person"}),
+    ),
+    "/api/campaigns/{campaign}/pause": (
+        "campaign pause", lambda c: c.post("/api/campaigns/1/pause", json={"reason": "tea"}),
+    ),
+    "/api/campaigns/{campaign}/confirm": (
+        "campaign confirm", lambda c: c.post("/api/campaigns/1/confirm", json={"prompt": "1-mount", "by": "A"}),
+    ),
     "/api/recordings": ("import", upload),
     "/api/units/{serial}/calibrations": ("fit", lambda c: c.post(UNIT, json={"effects": ["bias", "scale_factor"]})),
     "/api/units/{serial}/calibrations/{version}/improve": (
@@ -247,13 +232,8 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
     "/api/campaigns/{campaign}/abort": (
         "campaign abort", lambda c: c.post("/api/campaigns/1/abort", json={"reason": "tea"}),
     ),
+    "/api/campaigns/{campaign}/resume": ("campaign resume", lambda c: c.post("/api/campaigns/1/resume", json={})),
     "/api/campaigns": ("campaign start", lambda c: c.post("/api/campaigns", json={"recipe": "short"})),
-    "/api/campaigns/{campaign}/confirm": ("campaign confirm", confirm),
-    "/api/campaigns/{campaign}/pause": (
-        "campaign pause", lambda c: c.post("/api/campaigns/2/pause", json={"reason": "tea"}),
-    ),
-    "/api/campaigns/{campaign}/resume": ("campaign resume", lambda c: c.post("/api/campaigns/2/resume", json={})),
-    "/api/benches/{bench}/clear": ("bench clear", clear),
     "/api/schedule/{start}": ("schedule cancel", cancel),
     "/api/keys": ("key create", lambda c: c.post("/api/keys", json={"name": "robot", "role": "viewer"})),
     "/api/keys/{name}/revoke": ("key revoke", lambda c: c.post("/api/keys/robot/revoke", json={"reason": "lost"})),
@@ -261,17 +241,32 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
 }  # fmt: skip
 
 
-def test_every_act_over_http_leaves_its_row(location: str, monkeypatch: pytest.MonkeyPatch) -> None:
+class AlwaysThere(BenchRunner):
+    """A runner for which no campaign is too fast to be paused or to be answered."""
+
+    def pause(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+        return campaign_status(self._store, campaign)
+
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+        return campaign_status(self._store, campaign)
+
+    def start(self, request: CampaignRequest) -> CampaignAnswer:
+        while self._job is not None:  # the one that was taken up before
+            self._job.thread.join()
+        return super().start(request)
+
+
+def test_every_act_over_http_leaves_its_row(location: str) -> None:
     """A new operation fails this test until it says here which row it leaves."""
-    monkeypatch.setattr(running, "operator_of", lambda _: PersonOperator())  # a campaign that waits to be answered
     store = Store(Database(location, write=True))
     bench = load_bench("single-axis-sim")
-    house = House(store, SystemClock(), BenchRunner(store, bench, VirtualClock))
+    house = House(store, SystemClock(), AlwaysThere(store, bench, VirtualClock))
     application = create_app(house)
     acting_paths = {path for path, item in application.openapi()["paths"].items() if set(item) - {"get", "head"}}
     assert acting_paths == set(ACTS)
     with TestClient(application, headers={"Labctl-User": "A. Person"}) as client:
         prepare(store, "short", bench, VirtualClock(), clip=False).bench.close()  # one that nobody runs
+        store.benches.mark(bench.name, "the chamber did not answer", SystemClock().utc())
         for path, (action, act) in ACTS.items():
             before = store.audit.rows()
             answer = act(client)
