@@ -71,6 +71,13 @@ class SystemClock(ScaledClock):
         super().__init__(1.0)
 
 
+class WallClock(SystemClock):
+    """The wall's own time, and `utc` follows when the wall's clock is set: for appointments, not for measuring."""
+
+    def utc(self) -> datetime:
+        return datetime.now(UTC)
+
+
 class VirtualClock:
     """Time that passes only when somebody sleeps, and then at once."""
 

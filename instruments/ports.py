@@ -45,11 +45,17 @@ def open_simulation(bench: BenchFile, clock: Clock) -> Simulation:
     return SimulatedBench(bench, clock)
 
 
-def serve_simulation(bench: BenchFile, clock: Clock, out: Path | None, ready: Callable[[dict[str, str]], None]) -> None:
+def serve_simulation(
+    bench: BenchFile,
+    clock: Clock,
+    out: Path | None,
+    ready: Callable[[dict[str, str]], None],
+    log: Path | None = None,
+) -> None:
     """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until interrupted."""
     from instruments.simulators.server import serve  # noqa: PLC0415  a real bench never loads the simulators
 
-    serve(bench, clock, out, ready)
+    serve(bench, clock, out, ready, log)
 
 
 class Ports:
@@ -60,15 +66,17 @@ class Ports:
         self.simulation = simulation
 
     def serial(self, url: str, *, device: str, baudrate: int, timeout_s: float) -> serial.SerialBase:
-        """Open a serial port, 8 data bits, no parity, one stop bit; raises LinkError naming port and remedy."""
+        """Open a serial port for this process alone, 8 data bits, no parity, one stop bit.
+
+        Raises LinkError naming port and remedy, also while another process has the port open.
+        """
         if url.startswith(SIMULATED):
             from instruments.simulators.sim_serial import SimSerial  # noqa: PLC0415
 
             return SimSerial(self._simulated(url, device), self.clock, baudrate=baudrate, timeout=timeout_s)
         try:
-            return serial.serial_for_url(
-                url, baudrate=baudrate, timeout=self.clock.wall_s(timeout_s), write_timeout=self.clock.wall_s(timeout_s)
-            )
+            wall_s = self.clock.wall_s(timeout_s)
+            return serial.serial_for_url(url, baudrate=baudrate, timeout=wall_s, write_timeout=wall_s, exclusive=True)
         except (serial.SerialException, OSError, ValueError) as error:
             raise LinkError(
                 device, f"port {url} cannot be opened ({error}); check the cable, the port's name and who else uses it"

@@ -12,6 +12,7 @@ class Wish:
 
     pause: bool = False
     abort: bool = False
+    taken_up: bool = False  #: after an abort: the campaign is not over, somebody takes it up
     reason: str = ""
 
 
@@ -39,7 +40,13 @@ class Control:
         """Ask for the end, now and in the safe state."""
         self._change(abort=True, reason=reason)
 
-    def _change(self, *, reason: str, pause: bool | None = None, abort: bool | None = None) -> None:
+    def interrupt(self, reason: str) -> None:
+        """Ask to let the bench go, now and in the safe state; the campaign is to be taken up."""
+        self._change(abort=True, taken_up=True, reason=reason)
+
+    def _change(
+        self, *, reason: str, pause: bool | None = None, abort: bool | None = None, taken_up: bool = False
+    ) -> None:
         with self._lock:
             if self._wish.abort:
                 return
@@ -47,5 +54,5 @@ class Control:
             if pause is not None:
                 wish = replace(wish, pause=pause)
             if abort is not None:
-                wish = replace(wish, abort=abort)
+                wish = replace(wish, abort=abort, taken_up=taken_up)
             self._wish = wish

@@ -9,7 +9,7 @@ from instruments.errors import InstrumentError, LinkError
 from procedures.bench import Bench
 from procedures.control import Control
 from procedures.crew import Crew
-from procedures.errors import Aborted, GuardTripped, ProcedureError, StepFailed, Unanswered
+from procedures.errors import Aborted, GuardTripped, Interrupted, ProcedureError, StepFailed, Unanswered
 from procedures.guard import Guards
 from procedures.handlers import HANDLERS, Figures
 from procedures.journal import CampaignState, Event, Journal
@@ -94,6 +94,8 @@ class Engine:
             for index in range(start_at, len(self.plan.steps)):
                 self._run_step(index)
             state, reason = CampaignState.DONE, self._all_done()
+        except Interrupted as error:
+            state, reason = CampaignState.INTERRUPTED, f"interrupted: {error}"
         except Aborted as error:
             state, reason = CampaignState.ABORTED, f"aborted: {error}"
         except (InstrumentError, ProcedureError) as error:

@@ -9,6 +9,7 @@ ProcedureError
 │   ├── GuardTripped     a limit that is watched was passed
 │   └── Unanswered       nobody answered a question in time
 ├── Aborted              a person asked for the end
+│   └── Interrupted      the bench had to be let go; somebody takes the campaign up
 └── StalePrompt          an answer to a question that is no longer asked
 """
 
@@ -69,6 +70,10 @@ class Unanswered(StepFailed):
 
 class Aborted(ProcedureError):
     """A person asked for the end."""
+
+
+class Interrupted(Aborted):
+    """The bench had to be let go; the campaign is to be taken up."""
 
 
 class StalePrompt(ProcedureError):

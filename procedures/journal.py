@@ -19,19 +19,23 @@ class CampaignState(StrEnum):
     RUNNING = "running"
     PAUSED = "paused"
     WAITING = "waiting"  #: for a person: a mounting to confirm
+    INTERRUPTED = "interrupted"  #: whoever ran it had to let the bench go; to be taken up
     DONE = "done"
     ABORTED = "aborted"
     FAILED = "failed"
 
 
 _S = CampaignState
-#: Which state may follow which. Only `done` is final: what failed or was aborted goes on by a person's word, what a
-#: dying process left as it was by itself. A suspension inside a pause is a pause for another reason.
+#: Ways to stop before the end of the plan.
+_ENDS = frozenset({_S.INTERRUPTED, _S.ABORTED, _S.FAILED})
+#: Which state may follow which. Only `done` is final: what failed or was aborted goes on by a person's word, what was
+#: interrupted or a dying process left as it was by itself. A suspension inside a pause is a pause for another reason.
 NEXT: Mapping[CampaignState, frozenset[CampaignState]] = {
-    _S.PLANNED: frozenset({_S.RUNNING, _S.ABORTED, _S.FAILED}),
-    _S.RUNNING: frozenset({_S.RUNNING, _S.PAUSED, _S.WAITING, _S.DONE, _S.ABORTED, _S.FAILED}),
-    _S.PAUSED: frozenset({_S.RUNNING, _S.PAUSED, _S.ABORTED, _S.FAILED}),
-    _S.WAITING: frozenset({_S.RUNNING, _S.ABORTED, _S.FAILED}),
+    _S.PLANNED: frozenset({_S.RUNNING, *_ENDS}),
+    _S.RUNNING: frozenset({_S.RUNNING, _S.PAUSED, _S.WAITING, _S.DONE, *_ENDS}),
+    _S.PAUSED: frozenset({_S.RUNNING, _S.PAUSED, *_ENDS}),
+    _S.WAITING: frozenset({_S.RUNNING, *_ENDS}),
+    _S.INTERRUPTED: frozenset({_S.RUNNING, _S.FAILED}),
     _S.DONE: frozenset(),
     _S.ABORTED: frozenset({_S.RUNNING}),
     _S.FAILED: frozenset({_S.RUNNING}),

@@ -34,7 +34,7 @@ def make_safe(bench: Bench, clock: Clock) -> tuple[str, ...]:
 
 
 def _parts(bench: Bench, clock: Clock) -> Iterator[tuple[str, Callable[[], str | None]]]:
-    yield "table to rest", partial(_stop_table, bench.table, clock)
+    yield "table to rest", partial(stop_table, bench.table, clock)
     yield "chamber to its safe set point", partial(_make_chamber_safe, bench.chamber)
     for name, gyro in bench.gyros.items():
         yield f"stream of {name} closed", gyro.stop
@@ -55,7 +55,8 @@ def _tried(what: str, part: Callable[[], str | None]) -> str:
     return ""
 
 
-def _stop_table(table: RateTable, clock: Clock) -> str | None:
+def stop_table(table: RateTable, clock: Clock) -> str | None:
+    """Bring the table to rest and look until it stands; returns what could not be confirmed. Raises InstrumentError."""
     table.stop()
     until_s = clock.now_s() + STANDSTILL_TIMEOUT_S
     while table.is_moving():

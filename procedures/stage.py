@@ -12,7 +12,7 @@ from instruments.errors import InstrumentError
 from procedures.bench import Bench
 from procedures.control import Control
 from procedures.crew import Crew
-from procedures.errors import Aborted, StepFailed, Unanswered
+from procedures.errors import Aborted, Interrupted, StepFailed, Unanswered
 from procedures.guard import Trip
 from procedures.journal import CampaignState, Event
 from procedures.logbook import Logbook, warning
@@ -49,7 +49,7 @@ class Stage:
         """Obey a wish to abort. Raises Aborted."""
         wish = self.control.wish
         if wish.abort:
-            raise Aborted(wish.reason)
+            raise Interrupted(wish.reason) if wish.taken_up else Aborted(wish.reason)
 
     def pass_time(self, duration_s: float, *, pausing: bool = True) -> None:
         """Let the clock run, looking at least once a second at what a person wants. Raises Aborted."""

@@ -5,14 +5,16 @@ One world, one lock; a control port takes the orders of the hand that turns and 
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 import threading
 import tty
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import tomli_w
 
@@ -28,8 +30,8 @@ TICK_S = 0.005  #: wall time between looks at what an instrument has to say
 class Server:
     """Carries bytes between real ports and simulated instruments."""
 
-    def __init__(self, bench: BenchFile, clock: Clock) -> None:
-        self._bench, self._clock = bench, clock
+    def __init__(self, bench: BenchFile, clock: Clock, log: TextIO | None = None) -> None:
+        self._bench, self._clock, self._log = bench, clock, log
         self._simulated = SimulatedBench(bench, clock)
         self._lock = threading.Lock()
         self._over = threading.Event()
@@ -49,11 +51,11 @@ class Server:
                     continue
                 device = self._simulated.device(url)
                 if key == "port":
-                    place["port"] = self.addresses[name] = self._pty(device)
+                    place["port"] = self.addresses[name] = self._pty(name, device)
                 else:
                     place["host"], place["tcp_port"] = (
                         "127.0.0.1",
-                        self._tcp(partial(self._talk, device)),
+                        self._tcp(partial(self._talk, name, device)),
                     )
                     self.addresses[name] = f"127.0.0.1:{place['tcp_port']}"
         control = self._tcp(self._obey)
@@ -80,16 +82,16 @@ class Server:
         self._threads.append(thread)
         thread.start()
 
-    def _pty(self, device: SimulatedDevice) -> str:
+    def _pty(self, name: str, device: SimulatedDevice) -> str:
         ours, theirs = os.openpty()
         tty.setraw(theirs)
         os.set_blocking(ours, False)
         self._open.append(os.fdopen(theirs, "rb", buffering=0))
         self._open.append(os.fdopen(os.dup(ours), "rb", buffering=0))
-        self._run(self._pump, ours, device)
+        self._run(self._pump, ours, name, device)
         return os.ttyname(theirs)
 
-    def _pump(self, ours: int, device: SimulatedDevice) -> None:
+    def _pump(self, ours: int, name: str, device: SimulatedDevice) -> None:
         waiting = b""
         while not self._over.wait(TICK_S):
             try:
@@ -99,6 +101,7 @@ class Server:
             with self._lock:
                 now = self._clock.now_s()
                 if heard:
+                    self._note(name, heard, now)
                     device.receive(heard, now)
                 waiting += device.transmit(now)
             try:
@@ -106,6 +109,14 @@ class Server:
             except BlockingIOError:
                 waiting = waiting[-4096:]  # nobody reads: a port keeps its last bytes
         os.close(ours)
+
+    def _note(self, name: str, heard: bytes, t_s: float) -> None:
+        """Write down what an instrument hears, and whether the table turned at that time."""
+        if self._log is not None:
+            turning = self._simulated.world.table.moving(t_s)
+            line = {"t_s": round(t_s, 3), "device": name, "heard": heard.decode("latin-1"), "table_turns": turning}
+            self._log.write(json.dumps(line) + "\n")
+            self._log.flush()
 
     def _tcp(self, serve: Callable[[socket.socket], None]) -> int:
         listener = socket.create_server(("127.0.0.1", 0))
@@ -124,7 +135,7 @@ class Server:
                 return
             self._run(serve, link)
 
-    def _talk(self, device: SimulatedDevice, link: socket.socket) -> None:
+    def _talk(self, name: str, device: SimulatedDevice, link: socket.socket) -> None:
         link.settimeout(0.2)
         with link:
             while not self._over.is_set():
@@ -138,6 +149,7 @@ class Server:
                     return
                 with self._lock:
                     now = self._clock.now_s()
+                    self._note(name, heard, now)
                     device.receive(heard, now)
                     said = device.transmit(now)
                 link.sendall(said)
@@ -156,9 +168,19 @@ class Server:
                 lines.flush()
 
 
-def serve(bench: BenchFile, clock: Clock, out: Path | None, ready: Callable[[dict[str, str]], None]) -> None:
-    """Serve a bench until interrupted; `out` gets a bench file that points here."""
-    server = Server(bench, clock)
+def serve(
+    bench: BenchFile,
+    clock: Clock,
+    out: Path | None,
+    ready: Callable[[dict[str, str]], None],
+    log: Path | None = None,
+) -> None:
+    """Serve a bench until interrupted; `out` gets a bench file that points here, `log` what the instruments hear."""
+    with nullcontext() if log is None else log.open("w", encoding="utf-8") as lines:
+        _serve(Server(bench, clock, lines), out, ready)
+
+
+def _serve(server: Server, out: Path | None, ready: Callable[[dict[str, str]], None]) -> None:
     try:
         real = server.start()
         if out is not None:

@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 
-from labctl.api import calibrations, campaigns, health, keys, problems, recordings, units, watchdog
+from labctl.api import calibrations, campaigns, health, keys, problems, recordings, schedule, units, watchdog
 from labctl.api.door import Access, Door
 from labctl.services.house import House
 
@@ -18,7 +18,8 @@ Calibrations of gyroscopes by serial number, the campaigns that measured them, a
 * `GET /api/units/{serial}/calibration` is what a robot loads: the certified calibration, immutable bytes with a strong
   ETag, as JSON or in the format of a consumer.
 * `POST /api/recordings` takes data measured on any bench; `POST /api/units/{serial}/calibrations` fits it.
-* `POST /api/campaigns` runs a recipe on this service's bench; `GET /api/campaigns/{id}/events` follows it.
+* `POST /api/campaigns` runs a recipe on this service's bench, now, at a time or on a cron line;
+  `GET /api/campaigns/{id}/events` follows it, `GET /api/schedule` says what begins when.
 
 Rates are deg/s, temperatures deg C, times s, instants UTC. Errors are problem documents (RFC 9457).
 Where keys are asked for, they travel as `Authorization: Bearer`: reading asks for a viewer's, acting for an operator's,
@@ -52,7 +53,7 @@ def create_app(house: House, access: Access | None = None) -> FastAPI:
     )
     app.state.house = house
     problems.install(app)
-    rooms = (health, units, calibrations, campaigns, recordings, keys)
+    rooms = (health, units, calibrations, campaigns, schedule, recordings, keys)
     for room in rooms:
         app.include_router(room.router)
     app.add_middleware(Door, house=house, access=access or Access())

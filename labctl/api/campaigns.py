@@ -5,19 +5,26 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Header
+from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
 from labctl.api.rooms import HouseOf
 from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
-from labctl.services.answers import CampaignAnswer
+from labctl.services.answers import CampaignAnswer, ScheduledAnswer
+from labctl.services.scheduling import is_scheduled
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
 
 
-@router.post("", summary="Run a recipe", status_code=201)
-def start(request: CampaignRequest, house: HouseOf) -> CampaignAnswer:
-    """Run a recipe on this service's bench. Refused when the bench or a unit cannot do it, naming the limit."""
+@router.post("", summary="Run a recipe", status_code=201, responses={202: {"model": ScheduledAnswer}})
+def start(request: CampaignRequest, house: HouseOf, response: Response) -> CampaignAnswer | ScheduledAnswer:
+    """Run a recipe on this service's bench, now (201) or, with `at` or `cron`, later (202: an entry of the schedule).
+
+    Refused when the bench or a unit cannot do it, naming the limit.
+    """
+    if is_scheduled(request):
+        response.status_code = 202
+        return house.acts().schedule_campaign(request)
     return house.bench_runner().start(request)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import uvicorn
 
-from instruments.clock import Clock, SystemClock
+from instruments.clock import Clock, WallClock
 from labctl.api import watchdog
 from labctl.api.app import create_app
 from labctl.api.door import LOOPBACK_NAMES, MIB, Access
@@ -20,6 +20,7 @@ from labctl.errors import BadInput
 from labctl.services.bench_runner import BenchRunner
 from labctl.services.house import House
 from labctl.services.keys import refuse_open_doors
+from labctl.services.leases import hold_bench
 from labctl.services.planning import load_bench
 from labctl.services.running import clock_for
 from labctl.store import Store
@@ -55,8 +56,8 @@ def open_house(request: ServeRequest, url: str | None) -> House:
                 own_pace = request.speed == 0 or not bench.is_simulated
                 return clock_for(bench, None if own_pace else request.speed)
 
-            runner = BenchRunner(store, bench, make_clock)
-        return House(store, SystemClock(), runner)
+            runner = BenchRunner(store, bench, make_clock, hold_bench(store, bench))
+        return House(store, WallClock(), runner)
     except BaseException:
         store.close()
         raise

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labctl.cli import schedule
 from labctl.cli.errors import ending_is_an_interrupt, one_clear_line
 from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import console, figure, print_json, table
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from labctl.services.answers import CampaignAnswer, PlanAnswer
 
 app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units.")
+app.add_typer(schedule.app, name="schedule")
 
 Recipe = Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")]
 Clip = Annotated[bool, typer.Option("--clip", help="Leave out points beyond the bench or a unit, and say which.")]
@@ -80,16 +82,44 @@ def start(
         typer.Option("--speed", metavar="X", help="A simulated bench, X times as fast; default: as fast as it can."),
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Seed of the simulated bench.")] = None,
+    at: Annotated[
+        str | None, typer.Option("--at", metavar="TIME", help="Begin then: 2026-03-28T22:00, or now: when it is free.")
+    ] = None,
+    cron: Annotated[
+        str | None, typer.Option("--cron", metavar="LINE", help="Begin again and again: '30 22 * * FRI'.")
+    ] = None,
+    time_zone: Annotated[
+        str | None, typer.Option("--time-zone", metavar="NAME", help="Of TIME and LINE; default: the local one.")
+    ] = None,
+    priority: Annotated[
+        int | None, typer.Option("--priority", metavar="N", help="The highest goes first; default: 0.")
+    ] = None,
+    late_limit_s: Annotated[
+        float | None,
+        typer.Option("--late-limit-s", metavar="S", help="Later it is not begun; 0 skips a missed start."),
+    ] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Run a recipe. A service that holds the database runs it on its bench; else it runs here, until it is over."""
+    """Run a recipe. A service that holds the database runs it on its bench; else it runs here, until it is over.
+
+    With --at or --cron it is entered into the schedule, which only a service (`labctl serve`) carries out.
+    """
     from labctl.cli.attendant import Attendant
     from labctl.cli.progress import CampaignProgress
+    from labctl.services.acts import CampaignRequest
     from labctl.services.opening import service_url
+    from labctl.services.planning import own_text
     from labctl.services.running import StartRequest, run_here
+    from labctl.services.scheduling import is_scheduled
 
     with one_clear_line():
+        wanted = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}
+        given = {name: value for name, value in wanted.items() if value is not None}
+        later = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **given})
+        if is_scheduled(later):
+            schedule.enter(later, bench, database, as_json=as_json, pace=speed, seed=seed)
+            return
         request = StartRequest(recipe=recipe, bench=bench, clip=clip, speed=speed, seed=seed)
         if url := service_url(database):
             from labctl.services.remote import RemoteActs
@@ -104,7 +134,7 @@ def start(
 def print_end(answer: CampaignAnswer, *, as_json: bool) -> None:
     """Print how a campaign ended; exit 1 when that is not as it was meant."""
     print_json(answer) if as_json else print_campaign(answer)
-    if answer.state in {"failed", "aborted"}:
+    if answer.state in {"failed", "aborted", "interrupted"}:
         raise typer.Exit(1)
 
 

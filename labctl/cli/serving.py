@@ -50,6 +50,10 @@ def simulator(
         Path | None, typer.Option("--out", metavar="FILE", help="Write a bench file that points at the simulator here.")
     ] = None,
     speed: Annotated[float, typer.Option("--speed", metavar="X", help="X times as fast as the wall.")] = 1.0,
+    log: Annotated[
+        Path | None,
+        typer.Option("--log", metavar="FILE", help="Write what every instrument hears here, as JSON lines."),
+    ] = None,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
@@ -66,7 +70,7 @@ def simulator(
             console.print(f"bench file: {out}", markup=False)
 
     with one_clear_line():
-        serve_simulator(bench, out, speed, ready)
+        serve_simulator(bench, out, speed, ready, log)
 
 
 def demo(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
 from procedures.errors import RecipeError
 from procedures.recipe import shipped_recipes
 
@@ -58,6 +58,22 @@ class CampaignRequest(Request):
 
     recipe: str = Field(description="Name of a shipped recipe, or the recipe itself as TOML text.")
     clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
+    at: str | None = Field(
+        default=None,
+        max_length=64,
+        description="When to begin, ISO 8601; without offset in `time_zone`. `now`: as soon as the bench is free.",
+    )
+    cron: str | None = Field(default=None, max_length=200, description="Begin again and again: five fields of cron.")
+    time_zone: str | None = Field(
+        default=None, max_length=100, description="Of `at` and `cron`, such as Europe/Berlin; default: the local one."
+    )
+    priority: int = Field(default=0, ge=-100, le=100, description="Of starts that are due, the highest goes first.")
+    late_limit_s: float | None = Field(
+        default=None,
+        ge=0,
+        le=1e9,
+        description="How much later than due it may begin; 0: a missed start is skipped; absent: any time, once.",
+    )
 
     @field_validator("recipe")
     @classmethod
@@ -167,4 +183,12 @@ class Acts(Protocol):
 
     def clear_bench(self, bench: str, request: ClearRequest) -> BenchStatus:
         """Take in that a person has looked at a bench that was not confirmed safe."""
+        ...
+
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+        """Enter a campaign into the schedule of a bench; a recipe in a file is given by its own text."""
+        ...
+
+    def cancel_start(self, start: int) -> ScheduledAnswer:
+        """Take an entry out of the schedule."""
         ...

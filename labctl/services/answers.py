@@ -223,6 +223,34 @@ class BenchStatus(Answer):
     unconfirmed_at: datetime | None = None
 
 
+class StartEventAnswer(Answer):
+    """What became of one start that fell due."""
+
+    at: datetime
+    due_at: datetime
+    outcome: Literal["claimed", "started", "refused", "missed"]
+    message: str
+    campaign: int | None = None
+
+
+class ScheduledAnswer(Answer):
+    """A campaign that is to begin later."""
+
+    id: int
+    bench: str
+    recipe: str
+    state: str = Field(description="waiting, ended or cancelled.")
+    due_at: datetime | None = Field(description="When it begins next, in its time zone; null when it is over.")
+    time_zone: str
+    cron: str | None
+    priority: int
+    clip: bool
+    late_limit_s: float | None
+    created_at: datetime
+    note: str = ""
+    history: list[StartEventAnswer] = Field(default_factory=list)
+
+
 class DeviceCheck(Answer):
     """What one instrument of a bench answered."""
 

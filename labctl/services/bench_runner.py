@@ -5,21 +5,23 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from instruments.bench import BenchFile
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
-from labctl.errors import Conflict, LabctlError
+from labctl.errors import BenchBusy, Conflict, LabctlError
 from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import answer_of, campaign_status
+from labctl.services.leases import BenchHold
 from labctl.services.resuming import prepare_resume, too_often
 from labctl.services.running import Prepared, prepare, run
 from labctl.store import CampaignRow, Store
 from procedures.control import Control
 from procedures.errors import StalePrompt
+from procedures.journal import CampaignState
 from procedures.operator import Operator, PersonOperator
 from procedures.progress import Progress
 from procedures.shield import uninterrupted
@@ -34,7 +36,7 @@ class _Job:
 
     row: CampaignRow
     operator: Operator
-    control: Control = field(default_factory=Control)
+    control: Control
     progress: Progress | None = None
     thread: threading.Thread | None = None
 
@@ -42,18 +44,36 @@ class _Job:
 class BenchRunner:
     """The one that drives this service's bench."""
 
-    def __init__(self, store: Store, bench: BenchFile, make_clock: Callable[[], Clock]) -> None:
+    def __init__(
+        self, store: Store, bench: BenchFile, make_clock: Callable[[], Clock], hold: BenchHold | None = None
+    ) -> None:
         self._store = store
+        self._hold = hold
         self._bench = bench
         self._make_clock = make_clock
         self._guard = threading.Lock()
         self._job: _Job | None = None
+        self._left = False  #: a campaign was left half done here, and nobody has taken it up yet
         self._listeners: list[Callable[[], None]] = []
+
+    @property
+    def bench(self) -> BenchFile:
+        """The bench that is driven."""
+        return self._bench
 
     @property
     def busy(self) -> bool:
         """Whether a campaign runs now."""
         return self._job is not None
+
+    @property
+    def free(self) -> bool:
+        """Whether a campaign may begin now: nothing runs, or waits to be taken up, and the bench may be driven."""
+        return self._job is None and not self._left and self._may_drive
+
+    @property
+    def _may_drive(self) -> bool:
+        return self._hold is None or self._hold.held
 
     def runs(self, campaign: int) -> bool:
         """Whether this campaign runs here now."""
@@ -61,21 +81,27 @@ class BenchRunner:
         return job is not None and job.row.id == campaign
 
     def start(self, request: CampaignRequest) -> CampaignAnswer:
-        """Plan, write down and begin a campaign. Raises Conflict while another runs, and whatever planning raises."""
+        """Plan, write down and begin a campaign.
+
+        Raises BenchBusy while another runs or without the lease on the bench, and whatever planning raises.
+        """
         with self._guard:
-            self._refuse_while_busy()
+            self._refuse_unless_free()
             prepared = prepare(self._store, request.recipe, self._bench, self._make_clock(), clip=request.clip)
             self._begin(prepared)
         return campaign_status(self._store, prepared.id)
 
-    def _refuse_while_busy(self) -> None:
+    def _refuse_unless_free(self) -> None:
         if self._job is not None:
-            raise Conflict(
+            raise BenchBusy(
                 f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
             )
+        if self._hold is not None:
+            self._hold.check()
 
     def _begin(self, prepared: Prepared) -> None:
-        job = _Job(self._store.campaigns.get(prepared.id), prepared.operator)
+        control = Control() if self._hold is None else self._hold.control()
+        job = _Job(self._store.campaigns.get(prepared.id), prepared.operator, control)
         job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
         self._job = job
         job.thread.start()
@@ -83,7 +109,8 @@ class BenchRunner:
     def resume(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
         """Let a paused campaign go on, or take up one that was interrupted, failed or aborted.
 
-        Raises Conflict while another runs, when it is done, or when the bench waits to be looked at.
+        Raises BenchBusy while another runs or without the lease on the bench, Conflict when it is done, or when the
+        bench waits to be looked at.
         """
         with self._guard:
             job = self._job
@@ -92,24 +119,38 @@ class BenchRunner:
                     raise Conflict(f"campaign {campaign} runs and is not paused")
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:
-                self._refuse_while_busy()
+                self._refuse_unless_free()
                 make_clock = self._make_clock
                 self._begin(prepare_resume(self._store, campaign, self._bench, lambda _: make_clock(), request))
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     def take_up_left(self) -> None:
-        """Take up the campaign that an earlier process left on this bench; what hinders it becomes its reason."""
+        """Take up the campaign that was left half done on this bench; what hinders it becomes its reason.
+
+        Without the lease nothing is touched: whoever has it by now may be taking it up.
+        """
+        self._left = not self._may_drive
+        if self._left:
+            return
         for row in self._store.campaigns.unfinished():
             if row.bench_name != self._bench.name:
                 continue
             why_not = too_often(self._store.interruptions.standing(row.id))
             try:
                 if why_not is None:
-                    self.resume(row.id, ResumeRequest(by="the service at its start"))
+                    self.resume(row.id, ResumeRequest(by="the service"))
                     return
+            except BenchBusy:  # somebody was quicker, or the lease went just now
+                self._left = True
+                return
             except (LabctlError, InstrumentError) as error:
                 why_not = f"not taken up: {error}"
             self._store.campaigns.close_unfinished(row.id, why_not, self._make_clock().utc())
+
+    def take_up_cut_short(self) -> None:
+        """Once the bench may be driven again, take up the campaign that was cut short when it was lost."""
+        if self._left and self._job is None and self._may_drive:
+            self.take_up_left()
 
     def pause(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
         """Ask the running campaign to hold after the present data set. Raises Conflict when it does not run here."""
@@ -143,7 +184,8 @@ class BenchRunner:
             self._ring()
 
         try:
-            run(self._store, prepared, job.control, seen)
+            answer = run(self._store, prepared, job.control, seen)
+            self._left = self._left or answer.state == CampaignState.INTERRUPTED
         finally:
             self._job = None
             self._ring()
@@ -194,9 +236,11 @@ class BenchRunner:
         }
 
     def close(self) -> None:
-        """End what runs, in the safe state."""
+        """End what runs, in the safe state, and let the bench go."""
         job = self._job
         if job is not None and job.thread is not None:
             job.control.abort("the service stops")
             with uninterrupted():  # an impatient Ctrl-C must not leave the bench as it is
                 job.thread.join(SAFE_WITHIN_S)
+        if self._hold is not None and not (job and job.thread and job.thread.is_alive()):
+            self._hold.close()

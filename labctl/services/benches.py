@@ -44,8 +44,13 @@ def bench_statuses(store: Store) -> list[BenchStatus]:
     return [bench_status(row) for row in store.benches.all()]
 
 
-def serve_simulator(source: str, out: Path | None, speed: float, ready: Callable[[dict[str, str]], None]) -> None:
-    """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until interrupted."""
+def serve_simulator(
+    source: str, out: Path | None, speed: float, ready: Callable[[dict[str, str]], None], log: Path | None = None
+) -> None:
+    """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until interrupted.
+
+    `log` gets one JSON document per line: when which instrument heard what, and whether the table turned.
+    """
     if not 0 < speed < float("inf"):
         raise BadInput(f"--speed {speed}: a positive number, 1 for the wall's own pace")
-    serve_simulation(load_bench(source), ScaledClock(speed), out, ready)
+    serve_simulation(load_bench(source), ScaledClock(speed), out, ready, log)

@@ -96,9 +96,10 @@ def looked_after(answer: CampaignAnswer, *, by_somebody: bool) -> CampaignAnswer
     """Say so when no process runs a campaign that has not ended."""
     if answer.state in ENDED or by_somebody:
         return answer
+    why = answer.reason if answer.state == "interrupted" else "no process runs it any more: look after the bench"
     reason = (
-        "no process runs it any more: look after the bench; `labctl campaign resume` or a service on its bench takes "
-        "it up where it was, `labctl campaign abort` ends it"
+        f"{why}; `labctl campaign resume` or a service on its bench takes it up where it was, `labctl campaign abort` "
+        "ends it"
     )
     return answer.model_copy(update={"reason": reason, "abandoned": True})
 

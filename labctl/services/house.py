@@ -11,15 +11,18 @@ from typing import Any
 from instruments.clock import Clock
 from labctl.actor import ITSELF, acting
 from labctl.errors import Conflict
-from labctl.services.acts import ConfirmRequest, ReasonRequest, ResumeRequest
-from labctl.services.answers import CampaignAnswer, EventAnswer
+from labctl.services import scheduling
+from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
+from labctl.services.answers import CampaignAnswer, EventAnswer, ScheduledAnswer
 from labctl.services.bench_runner import BenchRunner
 from labctl.services.campaigns import ENDED, event_answer, from_rows, looked_after
 from labctl.services.opening import LocalActs
+from labctl.services.scheduler import Scheduler
 from labctl.store import Store
 
 #: An open event stream says that it is alive after this long without an event.
 HEARTBEAT_S = 10.0
+NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`"
 
 
 class ServiceActs(LocalActs):
@@ -47,7 +50,7 @@ class ServiceActs(LocalActs):
     def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
         """Let a paused campaign go on, or take up one that was interrupted."""
         if self._runner is None:
-            raise Conflict("this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`")
+            raise Conflict(NO_BENCH)
         answer = self._runner.resume(campaign, request)
         self._note_campaign("resume", campaign, request.reason)
         return answer
@@ -61,6 +64,18 @@ class ServiceActs(LocalActs):
         self._note_campaign("confirm", campaign, said)
         return answer
 
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+        """Enter a campaign into the schedule of this service's bench."""
+        if self._runner is None:
+            raise Conflict(NO_BENCH)
+        if bench is not None and bench != self._runner.bench.name:
+            raise Conflict(f"this service runs bench {self._runner.bench.name}, not {bench}; leave the bench out")
+        return scheduling.add_start(self._store, request, self._runner.bench, self._clock.utc())
+
+    def cancel_start(self, start: int) -> ScheduledAnswer:
+        """Take an entry out of the schedule."""
+        return scheduling.cancel_start(self._store, start, self._clock.utc())
+
 
 class House:
     """What a running service serves."""
@@ -69,20 +84,28 @@ class House:
         self.store = store
         self.clock = clock
         self._runner = runner
+        self.scheduler = None if runner is None else Scheduler(store, clock, runner, runner.bench.name)
         self._opened_at = clock.utc()
         self._closed = False
 
     def start(self) -> None:
-        """Make the house ready: a campaign that an earlier process left on this bench is taken up, safe state first."""
-        if self._runner is not None:
-            with acting(ITSELF):  # nobody asked for it
+        """Make the house ready: a campaign that an earlier process left on this bench is taken up, safe state first.
+
+        Then the schedule runs: what is due waits for that campaign.
+        """
+        with acting(ITSELF):  # nobody asked for it
+            if self._runner is not None:
                 self._runner.take_up_left()
+            if self.scheduler is not None:
+                self.scheduler.start()
 
     def close(self) -> None:
-        """End what runs, leave the bench safe, close the store. Safe to call twice."""
+        """Begin nothing more, end what runs, leave the bench safe, close the store. Safe to call twice."""
         if self._closed:
             return
         self._closed = True
+        if self.scheduler is not None:
+            self.scheduler.close()
         if self._runner is not None:
             self._runner.close()
         self.store.close()
@@ -94,7 +117,7 @@ class House:
     def bench_runner(self) -> BenchRunner:
         """Return the runner of this service's bench; raises Conflict when it has none."""
         if self._runner is None:
-            raise Conflict("this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`")
+            raise Conflict(NO_BENCH)
         return self._runner
 
     def benches(self) -> list[dict[str, Any]]:
@@ -163,6 +186,7 @@ class House:
             "database": Path(self.store.location).name,  # a folder, or a password in a URL, is nobody's business here
             "since": self._opened_at.isoformat(),
             "bench": self._runner.describe() if self._runner is not None else None,
+            "schedule_trouble": self.scheduler.trouble if self.scheduler is not None else "",
         }
 
     def metrics(self) -> dict[str, float]:

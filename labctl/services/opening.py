@@ -9,10 +9,11 @@ from pathlib import Path
 from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
-from labctl.services import calibrations, criticism, keys, recordings
+from labctl.services import calibrations, criticism, keys, recordings, scheduling
 from labctl.services.acts import (
     Acts,
     BackupNote,
+    CampaignRequest,
     CertifyRequest,
     ClearRequest,
     ConfirmRequest,
@@ -21,9 +22,10 @@ from labctl.services.acts import (
     ReasonRequest,
     ResumeRequest,
 )
-from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
 from labctl.services.benches import bench_status
 from labctl.services.campaigns import campaign_status
+from labctl.services.planning import bench_for, load_bench, load_recipe
 from labctl.store import Store, holder_of, open_store
 
 
@@ -99,6 +101,17 @@ class LocalActs:
     def clear_bench(self, bench: str, request: ClearRequest) -> BenchStatus:
         """Take in that a person has looked at a bench."""
         return bench_status(self._store.benches.clear(bench, request.by, request.reason, self._clock.utc()))
+
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+        """Enter a campaign into the schedule of a bench; a service that holds this bench and database begins it."""
+        file = load_bench(bench or bench_for(load_recipe(request.recipe)))
+        answer = scheduling.add_start(self._store, request, file, self._clock.utc())
+        said = "; ".join(filter(None, (scheduling.NOBODY.format(bench=file.name), answer.note)))
+        return answer.model_copy(update={"note": said})
+
+    def cancel_start(self, start: int) -> ScheduledAnswer:
+        """Take an entry out of the schedule."""
+        return scheduling.cancel_start(self._store, start, self._clock.utc())
 
 
 def service_url(database: str | None) -> str | None:

@@ -34,6 +34,17 @@ def load_recipe(source: str) -> Recipe:
     return read_recipe(source)
 
 
+def own_text(source: str) -> str:
+    """Return the text of a recipe file, for somebody who does not read it himself or later; a name stays as it is.
+
+    Raises RecipeError.
+    """
+    load_recipe(source)
+    if "\n" in source or source in shipped_recipes():
+        return source
+    return Path(source).read_text(encoding="utf-8")
+
+
 def load_bench(source: str) -> BenchFile:
     """Return a bench by shipped name or path; raises BadBench naming the file and the key."""
     try:

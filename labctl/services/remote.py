@@ -13,6 +13,7 @@ from labctl.config import KEY_VARIABLE, key, os_user
 from labctl.errors import Conflict, LabctlError, NotCertified, StoreError
 from labctl.services.acts import (
     BackupNote,
+    CampaignRequest,
     CertifyRequest,
     ClearRequest,
     ConfirmRequest,
@@ -22,9 +23,9 @@ from labctl.services.acts import (
     Request,
     ResumeRequest,
 )
-from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported
+from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
 from labctl.services.keys import KeyAnswer, KeyRequest, NewKeyAnswer
-from labctl.services.planning import load_recipe
+from labctl.services.planning import own_text
 from labctl.services.recordings import FILE_NAMES
 from labctl.services.running import StartRequest
 
@@ -47,8 +48,11 @@ class RemoteActs:
         self._client = httpx.Client(base_url=url, timeout=TIMEOUT_S, headers=identity)
 
     def _post(self, path: str, **content: Any) -> Any:
+        return self._ask("POST", path, **content)
+
+    def _ask(self, method: str, path: str, **content: Any) -> Any:
         try:
-            response = self._client.post(path, **content)
+            response = self._client.request(method, path, **content)
         except httpx.HTTPError as error:
             raise StoreError(
                 f"the service at {self._client.base_url} holds the database but does not answer ({error}); "
@@ -101,19 +105,19 @@ class RemoteActs:
 
     def start_campaign(self, request: StartRequest) -> CampaignAnswer:
         """Ask for a campaign on the service's bench."""
-        for option, given in (("--bench", request.bench), ("--speed", request.speed), ("--seed", request.seed)):
+        self._refuse_options(("--bench", request.bench), ("--speed", request.speed), ("--seed", request.seed))
+        recipe = own_text(request.recipe)
+        return CampaignAnswer.model_validate(
+            self._post("/api/campaigns", json={"recipe": recipe, "clip": request.clip})
+        )
+
+    def _refuse_options(self, *options: tuple[str, object]) -> None:
+        for option, given in options:
             if given is not None:
                 raise Conflict(
                     f"{option} {given}: the service at {self._client.base_url} holds this database and runs campaigns "
                     "on its own bench at its own pace; leave the option out, stop it, or name another --database"
                 )
-        recipe = request.recipe
-        if Path(recipe).is_file():
-            load_recipe(recipe)
-            recipe = Path(recipe).read_text(encoding="utf-8")
-        return CampaignAnswer.model_validate(
-            self._post("/api/campaigns", json={"recipe": recipe, "clip": request.clip})
-        )
 
     def _campaign(self, campaign: int, act: str, request: Request) -> CampaignAnswer:
         return CampaignAnswer.model_validate(self._post(f"/api/campaigns/{campaign}/{act}", json=request.model_dump()))
@@ -160,3 +164,12 @@ class RemoteActs:
     def note_backup(self, note: BackupNote) -> None:
         """Ask for a row in the audit trail."""
         self._post("/api/backups", json=note.model_dump())
+
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+        """Ask for a campaign on the service's bench, later."""
+        self._refuse_options(("--bench", bench))
+        return ScheduledAnswer.model_validate(self._post("/api/campaigns", json=request.model_dump(exclude_unset=True)))
+
+    def cancel_start(self, start: int) -> ScheduledAnswer:
+        """Ask for an entry to be taken out of the schedule."""
+        return ScheduledAnswer.model_validate(self._ask("DELETE", f"/api/schedule/{start}"))

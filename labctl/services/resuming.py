@@ -12,11 +12,11 @@ from labctl.errors import Conflict
 from labctl.services.acts import ResumeRequest
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import answer_of
+from labctl.services.leases import holding, open_for
 from labctl.services.planning import load_bench
 from labctl.services.power import boot_id, power_failed
 from labctl.services.running import Observe, Prepared, clock_for, operator_of, refuse_unconfirmed, run
 from labctl.store import CampaignRow, Standing, Store, TakeUp, open_store
-from procedures.control import Control
 from procedures.operator import Operator
 from procedures.plan import Plan
 from procedures.progress import Progress
@@ -112,9 +112,11 @@ def resume_here(
     attend: Callable[[Operator], None] | None = None,
 ) -> CampaignAnswer:
     """Take up a campaign in this process and run it to its end; without a number the newest that is not over."""
-    with open_store(database or default_database(), write=True) as store:
+    location = database or default_database()
+    with open_store(location, write=False) as store:
         row = store.campaigns.get(campaign) if campaign is not None else _newest_unfinished(store)
-        bench_file = load_bench(bench) if bench else BenchFile.model_validate(dict(row.bench))
+    bench_file = load_bench(bench) if bench else BenchFile.model_validate(dict(row.bench))
+    with open_for(bench_file, location) as store, holding(store, bench_file) as control:
 
         def make_clock(standing: Standing) -> Clock:
             clock = clock_for(bench_file, speed)
@@ -128,7 +130,7 @@ def resume_here(
             if observe is not None:
                 observe(answer_of(row, progress))
 
-        return run(store, prepared, Control(), seen)
+        return run(store, prepared, control, seen)
 
 
 def _newest_unfinished(store: Store) -> CampaignRow:

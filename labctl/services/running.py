@@ -9,6 +9,7 @@ from pydantic import Field
 
 from instruments.bench import BenchFile, SimulationSettings
 from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
+from instruments.errors import InstrumentError
 from instruments.gyro import Gyro
 from instruments.hand import NoHand
 from instruments.open import Bench, open_bench
@@ -18,15 +19,17 @@ from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.acts import Request
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import answer_of
+from labctl.services.leases import holding, open_for
 from labctl.services.planning import bench_for, load_bench, load_recipe
 from labctl.services.power import boot_id
-from labctl.store import NewCampaign, NewUnit, Store, open_store
+from labctl.store import NewCampaign, NewUnit, Store
 from procedures.control import Control
 from procedures.engine import Engine
 from procedures.limits import BenchLimits
 from procedures.operator import HandOperator, Operator, PersonOperator
 from procedures.plan import Plan, make_plan
 from procedures.progress import Progress
+from procedures.safe import stop_table
 from procedures.takeup import Restart
 
 Observe = Callable[[CampaignAnswer], None]
@@ -95,7 +98,7 @@ def clock_for(bench: BenchFile, speed: float | None) -> Clock:
 def prepare(
     store: Store, recipe_source: str, bench_file: BenchFile, clock: Clock, *, clip: bool, opened: Bench | None = None
 ) -> Prepared:
-    """Open the bench, plan, and write the whole campaign down; nothing has moved when this returns.
+    """Open the bench, plan, and write the whole campaign down; the table is at rest when this returns.
 
     `opened` is the bench where it is open already.
 
@@ -107,6 +110,8 @@ def prepare(
     try:
         bench.table.identify()
         bench.chamber.identify()
+        if bench.table.is_moving():  # whoever drove it before was killed: a move goes on without him
+            _rest(bench, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
         units = tuple(_unit(gyro, bench_file, clock) for gyro in bench.gyros.values())
         new = NewCampaign(
@@ -124,6 +129,11 @@ def prepare(
     except BaseException:
         bench.close()
         raise
+
+
+def _rest(bench: Bench, clock: Clock) -> None:
+    if complaint := stop_table(bench.table, clock):
+        raise InstrumentError(bench.table.name, complaint)
 
 
 def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
@@ -179,7 +189,7 @@ def run_here(
 ) -> CampaignAnswer:
     """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks."""
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
-    with open_store(database or default_database(), write=True) as store:
+    with open_for(bench_file, database or default_database()) as store, holding(store, bench_file) as control:
         clock = clock_for(bench_file, request.speed)
         prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip)
         row = store.campaigns.get(prepared.id)
@@ -190,4 +200,4 @@ def run_here(
             if observe is not None:
                 observe(answer_of(row, progress))
 
-        return run(store, prepared, observe=seen)
+        return run(store, prepared, control, seen)

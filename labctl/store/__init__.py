@@ -15,6 +15,7 @@ from labctl.store.database import Database, Holder, holder_of, is_url
 from labctl.store.interruptions import Interruptions, Standing, TakeUp
 from labctl.store.journal import StoreJournal
 from labctl.store.keys import Keys
+from labctl.store.leases import LeaseRow, Leases
 from labctl.store.recordings import Recordings
 from labctl.store.records import (
     AuditRow,
@@ -28,6 +29,7 @@ from labctl.store.records import (
     StepRow,
     Unit,
 )
+from labctl.store.starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.units import Units
 
 __all__ = [
@@ -50,13 +52,19 @@ __all__ = [
     "Interruptions",
     "KeyRow",
     "Keys",
+    "LeaseRow",
+    "Leases",
     "NewCalibration",
     "NewCampaign",
+    "NewStart",
     "NewUnit",
     "Progress",
     "RecordingRow",
     "Recordings",
     "Standing",
+    "StartEventRow",
+    "StartRow",
+    "Starts",
     "StepRow",
     "Store",
     "StoreJournal",
@@ -83,6 +91,8 @@ class Store:
         self.calibrations = Calibrations(database)
         self.audit = Audit(database)
         self.keys = Keys(database)
+        self.starts = Starts(database)
+        self.leases = Leases(database)
 
     @property
     def location(self) -> str:
@@ -93,6 +103,11 @@ class Store:
     def is_held(self) -> bool:
         """Whether a process, perhaps this one, holds the database for writing."""
         return self._database.writes or is_url(self.location) or holder_of(self.location) is not None
+
+    @property
+    def is_sole_writer(self) -> bool:
+        """Whether no other process can write to the database as long as this one holds it."""
+        return self._database.writes and not is_url(self.location)
 
     def announce(self, url: str) -> None:
         """Say at which address the holder of this database can be asked to write."""

@@ -168,7 +168,7 @@ class Campaigns:
 
     def unfinished(self) -> list[CampaignRow]:
         """Return campaigns that a process left without an end."""
-        return self._rows(tables.campaigns.c.state.in_(("planned", "running", "paused", "waiting")))
+        return self._rows(tables.campaigns.c.state.in_(("planned", "running", "paused", "waiting", "interrupted")))
 
     def close_unfinished(self, campaign: int, reason: str, at: datetime) -> None:
         """Mark a campaign that nobody runs any more as failed, saying why."""

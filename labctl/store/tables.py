@@ -271,3 +271,51 @@ api_keys = sa.Table(
     sa.Column("revoked_at", Instant),
     sa.UniqueConstraint("digest"),
 )
+
+#: Campaigns that are to begin later. `due_at` is the next start that waits; a single start keeps its own when it ended.
+scheduled_starts = sa.Table(
+    "scheduled_starts",
+    metadata,
+    _id(),
+    sa.Column("bench_name", sa.String(200), nullable=False),
+    sa.Column("recipe_name", sa.String(200), nullable=False),
+    sa.Column("recipe", sa.Text, nullable=False),
+    sa.Column("clip", sa.Boolean, nullable=False),
+    sa.Column("priority", sa.Integer, nullable=False),
+    sa.Column("cron", sa.String(200)),
+    sa.Column("time_zone", sa.String(100), nullable=False),
+    sa.Column("late_limit_s", sa.Float),
+    sa.Column("due_at", Instant, nullable=False),
+    sa.Column("state", sa.String(20), nullable=False),
+    sa.Column("created_at", Instant, nullable=False),
+    sa.Index(None, "bench_name", "state", "due_at"),
+)
+
+#: What became of each start that fell due. `after_campaign` is the newest campaign at the time it was claimed.
+start_events = sa.Table(
+    "start_events",
+    metadata,
+    _id(),
+    sa.Column("start_id", RowId, sa.ForeignKey("scheduled_starts.id"), nullable=False),
+    sa.Column("at", Instant, nullable=False),
+    sa.Column("due_at", Instant, nullable=False),
+    sa.Column("outcome", sa.String(20), nullable=False),
+    sa.Column("message", sa.Text, nullable=False),
+    sa.Column("campaign_id", RowId, sa.ForeignKey("campaigns.id")),
+    sa.Column("after_campaign", RowId, nullable=False),
+    sa.Index(None, "start_id", "id"),
+)
+
+leases = sa.Table(
+    "leases",
+    metadata,
+    sa.Column("bench_name", sa.String(200), primary_key=True),
+    sa.Column("owner", sa.String(32), nullable=False),
+    sa.Column("host", sa.String(200), nullable=False),
+    sa.Column("machine", sa.String(200), nullable=False),
+    sa.Column("pid", sa.BigInteger, nullable=False),
+    sa.Column("since", Instant, nullable=False),
+    sa.Column("beat", sa.BigInteger, nullable=False),
+    sa.Column("beat_at", Instant, nullable=False),
+    sa.Column("expires_at", Instant, nullable=False),
+)

@@ -201,6 +201,11 @@ def upload(client: TestClient) -> Any:
     return client.post("/api/recordings", files=files)
 
 
+def cancel(client: TestClient) -> Any:
+    later = client.post("/api/campaigns", json={"recipe": "short", "at": "2199-01-01T00:00Z"})
+    return client.delete(f"/api/schedule/{later.json()['id']}")
+
+
 UNIT = "/api/units/OSU-FOG-2024/calibrations"
 PERSON = {"by": "A", "reason": "B"}
 NOTE = {"file": "x", "bytes": 1, "sha256": "0" * 64}
@@ -229,6 +234,7 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
     ),
     "/api/campaigns/{campaign}/resume": ("campaign resume", lambda c: c.post("/api/campaigns/1/resume", json={})),
     "/api/campaigns": ("campaign start", lambda c: c.post("/api/campaigns", json={"recipe": "short"})),
+    "/api/schedule/{start}": ("schedule cancel", cancel),
     "/api/keys": ("key create", lambda c: c.post("/api/keys", json={"name": "robot", "role": "viewer"})),
     "/api/keys/{name}/revoke": ("key revoke", lambda c: c.post("/api/keys/robot/revoke", json={"reason": "lost"})),
     "/api/backups": ("backup", lambda c: c.post("/api/backups", json=NOTE)),

@@ -121,6 +121,10 @@ def test_no_word_in_a_request_becomes_a_path(
     for trap in traps:
         answers = [
             client.post("/api/campaigns", json={"recipe": trap}),
+            client.post("/api/campaigns", json={"recipe": trap, "at": "now"}),
+            client.post("/api/campaigns", json={"recipe": "short", "at": trap}),
+            client.post("/api/campaigns", json={"recipe": "short", "cron": trap}),
+            client.post("/api/campaigns", json={"recipe": "short", "at": "now", "time_zone": trap}),
             client.post(f"{units}/calibrations/1/improve", json={"add": ["bias"], "formula": [trap]}),
             client.post(f"{units}/calibrations/1/improve", json={"add": [trap]}),
             client.post(f"{units}/calibrations", json={"model": trap}),

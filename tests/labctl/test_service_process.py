@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ import pytest
 from labctl.config import os_user
 from labctl.services.keys import KeyRequest, Role, create_key
 from labctl.store import check, open_store
+
+pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -46,20 +49,24 @@ class Service:
         return done
 
 
+@contextmanager
+def running(database: Path, *options: str) -> Iterator[Service]:
+    made = Service(database, *options)
+    try:
+        yield made
+    finally:
+        made.http.close()
+        made.process.kill()
+        made.process.wait()
+        for stream in (made.process.stdout, made.process.stderr):
+            assert stream is not None
+            stream.close()
+
+
 @pytest.fixture
 def service(tmp_path: Path) -> Iterator[Service]:
-    made = Service(tmp_path / "lab.sqlite")
-    yield made
-    end(made)
-
-
-def end(made: Service) -> None:
-    made.http.close()
-    made.process.kill()
-    made.process.wait()
-    for stream in (made.process.stdout, made.process.stderr):
-        assert stream is not None
-        stream.close()
+    with running(tmp_path / "lab.sqlite") as made:
+        yield made
 
 
 def test_commands_ask_the_service_that_holds_the_database(service: Service) -> None:
@@ -93,6 +100,30 @@ def test_a_campaign_is_aborted_from_the_command_line(service: Service) -> None:
     assert "aborted" in again.stderr
 
 
+def test_a_service_begins_what_was_entered_before_it_ran_and_while_it_runs(tmp_path: Path) -> None:
+    database = tmp_path / "lab.sqlite"
+    command = [sys.executable, "-m", "labctl", "campaign", "start", "short", "--at", "now", "--json"]
+    bench = ["--bench", "single-axis-sim", "--database", str(database)]
+    before = json.loads(subprocess.run([*command, *bench], capture_output=True, text=True, check=True).stdout)
+    assert (before["state"], "no service runs" in before["note"]) == ("waiting", True)
+    with running(database) as service:
+        assert begun(service, before["id"])["campaign"] == 1
+        queued = json.loads(service.run("campaign", "start", "short", "--at", "now", "--json").stdout)
+        assert "no service" not in queued["note"]
+        assert service.http.get(f"/api/schedule/{queued['id']}").json()["history"] == []
+        service.run("campaign", "abort", "1", status=0)
+        assert begun(service, queued["id"])["campaign"] == 2
+
+
+def begun(service: Service, start: int) -> Any:
+    """Wait until an entry's first start was begun."""
+    while True:
+        history = service.http.get(f"/api/schedule/{start}").json()["history"]
+        if history and history[0]["outcome"] != "claimed":
+            assert history[0]["outcome"] == "started", history
+            return history[0]
+
+
 def test_sigterm_ends_the_campaign_in_the_safe_state(service: Service) -> None:
     campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
     service.process.send_signal(signal.SIGTERM)
@@ -123,8 +154,7 @@ def test_a_service_with_keys_asks_the_command_line_too(tmp_path: Path) -> None:
     database = tmp_path / "lab.sqlite"
     with open_store(str(database), write=True) as store:
         keys = {role: create_key(store, KeyRequest(name=role.value, role=role), AT).key for role in Role}
-    service = Service(database, "--host", "0.0.0.0")
-    try:
+    with running(database, "--host", "0.0.0.0") as service:
         assert service.url.startswith("http://0.0.0.0:")
         assert "$LABCTL_KEY" in service.run("import", str(EXAMPLES / "osu-fog"), status=2).stderr
         service.run("import", str(EXAMPLES / "osu-fog"), key=keys[Role.OPERATOR])
@@ -135,5 +165,3 @@ def test_a_service_with_keys_asks_the_command_line_too(tmp_path: Path) -> None:
         told = [(row["who"], row["action"], row["detail"]["via"]) for row in rows]
         assert told == [("operator", "import", "key"), ("approver", "key revoke", "key")]
         assert service.http.get("/health").json().keys() == {"status", "version"}
-    finally:
-        end(service)

@@ -98,6 +98,12 @@ class Campaign(RuleBasedStateMachine):
         self.leg(at=[(at, lambda: self.rig.control.abort("enough"))])
 
     @unfinished
+    @rule(at=instants)
+    def has_to_let_the_bench_go(self, at: int) -> None:
+        self.leg(at=[(at, lambda: self.rig.control.interrupt("the lease is another's"))])
+        assert self.state in {CampaignState.INTERRUPTED, CampaignState.DONE}  # or it was over before
+
+    @unfinished
     @rule(at=instants, last=st.integers(1, 40))
     def is_paused_and_goes_on(self, at: int, last: int) -> None:
         self.leg(at=[(at, self.rig_pause), (at + last, self.rig_goes_on)])

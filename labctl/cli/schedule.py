@@ -1,0 +1,102 @@
+"""`labctl campaign schedule`: list, show, cancel; and entering a start, for `labctl campaign start --at | --cron`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labctl.cli.errors import one_clear_line
+from labctl.cli.options import Database, Json
+from labctl.cli.output import complaints, console, print_json, table
+
+if TYPE_CHECKING:
+    from labctl.services.acts import CampaignRequest
+    from labctl.services.answers import ScheduledAnswer
+
+app = typer.Typer(no_args_is_help=True, help="The schedule: campaigns that begin later, in a running service.")
+
+StartId = Annotated[int, typer.Argument(metavar="ID", help="Entry of the schedule.")]
+
+
+def enter(
+    request: CampaignRequest,
+    bench: str | None,
+    database: str | None,
+    *,
+    as_json: bool,
+    pace: float | None,
+    seed: int | None,
+) -> None:
+    """Enter a start into the schedule, and print the entry."""
+    from labctl.errors import BadInput
+    from labctl.services.opening import open_acts
+
+    for option, value in (("--speed", pace), ("--seed", seed)):
+        if value is not None:
+            raise BadInput(f"{option} {value}: the service that runs it then sets its own; leave the option out")
+    with open_acts(database) as acts:
+        answer = acts.schedule_campaign(request, bench)
+    print_json(answer) if as_json else print_start(answer)
+
+
+def print_start(answer: ScheduledAnswer) -> None:
+    """Print one entry of the schedule."""
+    console.print(f"start {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]")
+    if answer.due_at is not None:
+        again = f", again by cron line {answer.cron!r}" if answer.cron else ""
+        console.print(f"  begins {answer.due_at:%Y-%m-%d %H:%M %z} ({answer.time_zone}){again}", markup=False)
+    for event in answer.history:
+        console.print(f"  due {event.due_at:%Y-%m-%d %H:%M %z}: {event.outcome}: {event.message}", markup=False)
+    if answer.note:
+        console.print(f"  {answer.note}", style="yellow", markup=False)
+
+
+@app.command("list")
+def list_(
+    ended: Annotated[bool, typer.Option("--all", help="Also entries that are over.")] = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """List what begins when, next first."""
+    from labctl.services.opening import open_reading, service_url
+    from labctl.services.scheduling import list_starts
+
+    with one_clear_line(), open_reading(database) as store:
+        answers = list_starts(store, ended=ended)
+        served = service_url(database) is not None
+    if as_json:
+        print_json(answers)
+        return
+    rows = table("", "id", "recipe", "bench", "state", "next", "cron", "last start", "priority", numbers=1)
+    for answer in answers:
+        due = f"{answer.due_at:%Y-%m-%d %H:%M %z}" if answer.due_at else "–"
+        last = f"{answer.history[-1].outcome}: {answer.history[-1].message}" if answer.history else "–"
+        rows.add_row(
+            str(answer.id), answer.recipe, answer.bench, answer.state, due, answer.cron or "–", last,
+            str(answer.priority),
+        )  # fmt: skip
+    console.print(rows)
+    if answers and not served:
+        complaints.print("no service holds this database, so nothing begins; `labctl serve` does", style="yellow")
+
+
+@app.command("show")
+def show(start: StartId, as_json: Json = False, database: Database = None) -> None:
+    """Say when an entry begins next and what became of each start that fell due."""
+    from labctl.services.opening import open_reading
+    from labctl.services.scheduling import start_status
+
+    with one_clear_line(), open_reading(database) as store:
+        answer = start_status(store, start)
+    print_json(answer) if as_json else print_start(answer)
+
+
+@app.command("cancel")
+def cancel(start: StartId, as_json: Json = False, database: Database = None) -> None:
+    """Take an entry out of the schedule. A campaign that it has begun runs on."""
+    from labctl.services.opening import open_acts
+
+    with one_clear_line(), open_acts(database) as acts:
+        answer = acts.cancel_start(start)
+    print_json(answer) if as_json else print_start(answer)

@@ -1,0 +1,90 @@
+"""When a campaign is to begin: a time as a person writes it, or a cron line, in a time zone.
+
+Cron lines mean what Debian's cron makes of them (cronsim follows it, and its rules for summer time):
+
+* a fixed time that the clocks jump over runs right after the jump: 02:30 becomes 03:00 on that day;
+* a fixed time that comes twice runs the first time only;
+* a line whose minute or hour begins with a star runs by elapsed time: in both hours that are called the same, and not
+  in one that is left out.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from zoneinfo import ZoneInfo
+
+import tzlocal
+from cronsim import CronSim, CronSimError
+
+from labctl.errors import BadInput
+
+FIELDS = 5
+#: Cron treats smaller changes of the local time specially, greater ones as a correction of the clock.
+LARGEST_CHANGE = timedelta(hours=3)
+NOW = "now"
+
+
+def time_zone(name: str | None) -> ZoneInfo:
+    """Return a time zone by its name in the tz database, or the local one. Raises BadInput."""
+    try:
+        return ZoneInfo(name) if name is not None else ZoneInfo(tzlocal.get_localzone_name())
+    except (KeyError, ValueError, OSError) as error:  # unknown, not a name, a folder
+        raise BadInput(f"time zone {name!r} is not known; name one like Europe/Berlin or UTC") from error
+
+
+def moment(text: str, zone: ZoneInfo, now: datetime) -> datetime:
+    """Return a time as UTC; one without zone of its own is meant in `zone`.
+
+    A time that comes twice is the first of the two. Raises BadInput for one that does not exist or is past.
+    """
+    if text == NOW:
+        return now
+    try:
+        said = datetime.fromisoformat(text)
+        meant = said.replace(tzinfo=zone) if said.tzinfo is None else said.astimezone(zone)
+        there = meant.astimezone(UTC)
+    except (ValueError, OverflowError) as error:
+        raise BadInput(
+            f"time {text!r} is not one; write 2026-03-28T22:00, with +01:00 or Z behind it, or now"
+        ) from error
+    if there.astimezone(zone).replace(tzinfo=None, fold=0) != meant.replace(tzinfo=None, fold=0):
+        raise BadInput(f"time {text!r} does not exist in {zone.key}: the clocks jump over it that day; name another")
+    if there <= now:
+        here = now.astimezone(zone)
+        raise BadInput(
+            f"time {text!r} ({meant:%Y-%m-%d %H:%M %z}) is past, it is {here:%Y-%m-%d %H:%M %z} in {zone.key}; "
+            "name a later one, or now"
+        )
+    return there
+
+
+def next_due(line: str, zone: ZoneInfo, after: datetime) -> datetime | None:
+    """Return when a cron line is due next, strictly after an instant; None when never within 50 years."""
+    for found in CronSim(line, after.astimezone(zone)):
+        if found.astimezone(UTC) > after:
+            return found.astimezone(UTC)
+    return None
+
+
+def last_due(line: str, zone: ZoneInfo, first: datetime, now: datetime) -> datetime:
+    """Return the newest time up to `now` at which a cron line was due; `first` is one of them."""
+    # backwards from behind any change of the clocks: inside a repeated hour the search would miss the first of the two
+    for found in CronSim(line, (now + LARGEST_CHANGE).astimezone(zone), reverse=True):
+        due = found.astimezone(UTC)
+        if due <= now:
+            return max(due, first)
+    return first
+
+
+def check_cron(line: str, zone: ZoneInfo, now: datetime) -> datetime:
+    """Return when a cron line is due for the first time. Raises BadInput naming what is wrong with it."""
+    shape = "minute hour day-of-month month day-of-week, such as '30 2 * * MON'"
+    if len(line.split()) != FIELDS:
+        raise BadInput(f"cron line {line!r} has {len(line.split())} fields, not {FIELDS}: {shape}")
+    try:
+        due = next_due(line, zone, now)
+    except CronSimError as error:
+        raise BadInput(f"cron line {line!r}: {str(error).lower()}; a line is {shape}") from error
+    if due is None:
+        raise BadInput(f"cron line {line!r} never comes true within 50 years; look at its days and months")
+    return due
