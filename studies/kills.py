@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.bench import BenchFile
-from labctl.fitting import fit
 from labctl.services import running
 from labctl.services.planning import load_bench
 from labctl.services.resuming import ResumeRequest, prepare_resume
@@ -46,8 +45,11 @@ off_s = 60
 rates_dps = [0, 40]
 """
 DATA_SETS = 14
-#: Two fits agree where no coefficient differs by more than this many times the uncertainty of the difference.
-WITHIN_NOISE_U = 5.0
+#: A data set scatters by 0.0014 deg/s/rtHz over 10 s and 0.0011 deg/s of drift. Two fits agree where what they say at
+#: one point differs by less than five times that; the unit's law is bent, so single coefficients mean less.
+NOISE_DPS = 0.0012
+WITHIN_NOISE_DPS = 5 * 2**0.5 * NOISE_DPS
+REFERENCE_C = 26.5
 
 Fitted = NDArray[np.float64]
 
@@ -72,19 +74,29 @@ class Verdict:
     wrong_counts: int  #: data sets of the plan that are there twice, or not at all
     within_limits: bool
     safe: bool
-    worst_u: float  #: largest difference of the fit from the undisturbed campaign's, in its standard uncertainty
+    worst_dps: float  #: largest difference of the fit from the undisturbed campaign's
     new_session: bool
 
     @property
     def well(self) -> bool:
         """Whether all that was promised holds."""
         clean = self.state == "done" and not (self.steps_open or self.missing_readings or self.wrong_counts)
-        return clean and self.within_limits and self.safe and self.worst_u < WITHIN_NOISE_U
+        return clean and self.within_limits and self.safe and self.worst_dps < WITHIN_NOISE_DPS
 
 
 def bench() -> BenchFile:
-    """Return the bench that outlives the processes."""
-    return load_bench("single-axis-sim")
+    """Return the bench that outlives the processes.
+
+    Two things are left out that change with the instant of a data set and are no noise of the fit: the unit does not
+    heat itself (after minutes without power it would be colder in these short soaks), and the motor's steps are even
+    (where in a step a gate begins is worth up to 4 mdeg/s over 10 s).
+    """
+    single = load_bench("single-axis-sim")
+    assert single.simulation is not None
+    units = {"fog": {"self_heating_c": 0.0}}
+    return single.model_copy(
+        update={"simulation": single.simulation.model_copy(update={"units": units, "table": {"step_error_deg": 0.0}})}
+    )
 
 
 def first_process(world: World, location: str, life: Life) -> tuple[MortalDatabase, int | None]:
@@ -114,15 +126,18 @@ def undisturbed(folder: Path) -> tuple[int, Fitted]:
 
 
 def fitted(store: Store, campaign: int) -> Fitted:
-    """Return the fitted coefficients and their standard uncertainties, (2, n)."""
-    points = store.recordings.points(store.campaigns.get(campaign).recordings["FOG-0001"])
-    axis = fit(points, "bias_scale").fitted.axes["z"]
-    return np.array([axis.values[:, 0], axis.u[:, 0]])
+    """Return bias and error of scale at 40 deg/s, both at the reference temperature, (2,) deg/s."""
+    points = store.recordings.points(store.campaigns.get(campaign).recordings["FOG-0001"]).columns
+    up = np.where(np.asarray(points["position"]) == "z", 1.0, -1.0)
+    rate = up * np.asarray(points["table_rate_dps"])
+    warm = np.asarray(points["temperature_c"]) - REFERENCE_C
+    terms = np.stack([np.ones_like(rate), rate / 40.0, warm, warm * rate / 40.0, warm**2, up], axis=1)
+    return np.linalg.lstsq(terms, np.asarray(points["gyro_z"]) - rate, rcond=None)[0][:2]
 
 
-def difference_u(one: Fitted, other: Fitted) -> float:
-    """Return the largest difference of two fits in units of its standard uncertainty."""
-    return float(np.max(np.abs(one[0] - other[0]) / np.hypot(one[1], other[1])))
+def difference_dps(one: Fitted, other: Fitted) -> float:
+    """Return the largest difference of two fits."""
+    return float(np.abs(one - other).max())
 
 
 def judge(kill: Kill, expected: Fitted, folder: Path) -> Verdict:
@@ -167,7 +182,7 @@ def _verdict(
         wrong,
         world.within_limits,
         _safe(world),
-        difference_u(fitted(store, campaign), expected) if row.state == "done" else np.inf,
+        difference_dps(fitted(store, campaign), expected) if row.state == "done" else np.inf,
         store.interruptions.standing(campaign).added_runs > 0,
     )
     store.close()
@@ -215,7 +230,7 @@ def run_kills(count: int) -> dict[str, float]:
         "readings_missing": float(sum(verdict.missing_readings for verdict in verdicts)),
         "data_sets_twice_or_missing": float(sum(verdict.wrong_counts for verdict in verdicts)),
         "new_sessions": float(sum(verdict.new_session for verdict in verdicts)),
-        "worst_difference_u": max(verdict.worst_u for verdict in verdicts),
+        "worst_difference_dps": max(verdict.worst_dps for verdict in verdicts),
     }
 
 
