@@ -205,6 +205,7 @@ class Engine:
         figures = error.figures if isinstance(error, StepFailed) else {}
         stopped = isinstance(error, Aborted | KeyboardInterrupt | SystemExit)
         stopped = stopped or self._suspends(error) or self._mends(index, error)
+        stopped = stopped or (isinstance(error, Unanswered) and self._leaves_out(index))
         reason = str(error) or type(error).__name__
         outcome = "interrupted" if stopped else "failed"
         result = StepResult(outcome=outcome, reason=reason, figures=figures)

@@ -148,7 +148,7 @@ def ended(database: Path) -> tuple[str, str]:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(tmp_path: Path, number: signal.Signals) -> None:
     database = tmp_path / "lab.sqlite"
-    arguments = ("campaign", "start", "short", "--bench", "single-axis-sim", "--speed", "60", "--json")
+    arguments = ("campaign", "start", "short", "--bench", "single-axis-sim", "--speed", "15", "--json")
     with subprocess.Popen(
         command(database, *arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -163,7 +163,7 @@ def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(tmp_path: Path, nu
 @pytest.mark.timeout(400)
 def test_a_service_that_is_interrupted_twice_ends_its_campaign_first(tmp_path: Path) -> None:
     database = tmp_path / "lab.sqlite"
-    arguments = ("serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json")
+    arguments = ("serve", "--bench", "single-axis-sim", "--speed", "15", "--port", "0", "--json")
     with subprocess.Popen(
         command(database, *arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
