@@ -14,7 +14,7 @@ from instruments.errors import InstrumentError
 from labctl.errors import BenchBusy, Conflict, LabctlError
 from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer
-from labctl.services.campaigns import answer_of, campaign_status
+from labctl.services.campaigns import ENDED, answer_of, campaign_status
 from labctl.services.leases import BenchHold
 from labctl.services.resuming import prepare_resume, too_often
 from labctl.services.running import Prepared, prepare, run
@@ -173,7 +173,8 @@ class BenchRunner:
 
     def _running(self, campaign: int) -> _Job:
         job = self._job
-        if job is None or job.row.id != campaign:
+        over = job is not None and job.progress is not None and job.progress.state.value in ENDED
+        if job is None or job.row.id != campaign or over:
             state = self._store.campaigns.get(campaign).state
             raise Conflict(f"campaign {campaign} does not run on bench {self._bench.name} now; it is {state}")
         return job

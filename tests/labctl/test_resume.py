@@ -150,7 +150,7 @@ def test_what_is_not_confirmed_safe_stays_until_a_person_clears_it(tmp_path: Pat
     assert "nothing is unconfirmed" in labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").stderr
     assert json.loads(labctl(location, "campaign", "resume", "1", "--by", "Ada", "--json").stdout)["state"] == "done"
     with open_store(location, write=False) as store:
-        assert store.first_broken_audit_row() is None
+        assert store.audit.first_broken() is None
 
 
 def labctl(location: str, *arguments: str) -> Any:
