@@ -23,6 +23,8 @@ from procedures.recipe import Recipe
 
 #: At most this many rivals are held against the leader, and this many experiments shown.
 PAIRS, SHOWN = 6, 4
+#: More separation (chi2) than this makes an answer no surer.
+SURE = 40.0
 
 
 def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict[str, Any]]:
@@ -50,7 +52,7 @@ def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict
         told = [rival for rival, delta in deltas.items() if delta > LEAD]
         if not told:
             continue
-        delta = max(deltas.values())
+        delta = min(deltas[rival] for rival in told)
         hours = plan.expected_s / 3600
         ranked.append(
             {
@@ -60,7 +62,7 @@ def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict
                 | {"format": "labctl-recipe/1", "name": f"{recipe.name}-next"},
                 "power": float(norm.cdf((delta / 2 - LEAD) / np.sqrt(delta))),
                 "hours": hours,
-                "per_hour": delta / hours,
+                "per_hour": min(delta, SURE) / hours,
             }
         )
     return sorted(ranked, key=lambda e: (-len(e["separates"]), -e["per_hour"]))[:SHOWN]
