@@ -55,7 +55,14 @@ class ErrorModel:
     def columns(self, channels: Channels, axis: str) -> list[tuple[str, Column]]:
         """Return (effect id, regressor) of one output axis, before temperature multiplies the regressors."""
         return [
-            (term.effect, replace(column, values=column.mean(channels), carrier=None))
+            (effect_id, replace(column, values=column.mean(channels), carrier=None))
+            for effect_id, column in self.carried(channels, axis)
+        ]
+
+    def carried(self, channels: Channels, axis: str) -> list[tuple[str, Column]]:
+        """Return the same with the waves in the table angle that some of them are the size of."""
+        return [
+            (term.effect, column)
             for term in self.terms
             for column in kind_of(term).columns(channels, axis, term, self.reference)
         ]

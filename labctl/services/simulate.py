@@ -193,7 +193,7 @@ class _Walk:
             "mounting": np.full(n, step.mounting, dtype=np.int64),
             "power_s": times - (self._power_on_s or 0.0),
             "table_rate_dps": np.full(n, achieved),
-            "table_angle_deg": table.commanded_deg(times),
+            "table_angle_deg": table.commanded_deg(times - self._period / 2),  # amid what a reading averages
             "temperature_c": sample.temperature_c.mean(axis=1),
             "chamber_c": self._world.heat.airs_c(times),
             "chamber_setpoint_c": np.full(n, self._setpoint),

@@ -72,18 +72,31 @@ def base_rows(data: Compressed, model: ErrorModel, axis: str) -> tuple[NDArray[n
 
     The base is the model in its forward form, and the Earth's rate that goes round where the latitude is known.
     """
-    found = [c for _, c in model.forward().columns(data.nodes, axis) if np.any(c.values)]
-    values = np.column_stack([c.values for c in found]) if found else np.zeros((len(data.nodes), 0))
     basis = model.temperature.basis(data.nodes.temperature_c(axis))
-    rows = [data.rows_of(expand(values, basis))]
-    names = [f"{c.name}@{k}" for c in found for k in range(basis.shape[1])]
+    rows: list[NDArray[np.float64]] = []
+    names: list[str] = []
+    for effect_id, column in model.forward().carried(data.nodes, axis):
+        if not np.any(column.values):
+            continue
+        over = np.ones((len(basis), 1)) if effect_id in model.steady else basis
+        rows.append(_over_temperature(data, column, over))
+        names += [f"{column.name}@{k}" for k in range(over.shape[1])]
     precision = [np.zeros(len(names))]
     turning = _turning(data, axis)
     if turning:
         rows.append(np.stack([data.rows(column) for column in turning], axis=2))
         names += [column.name for column in turning]
         precision.append(np.full(len(turning), 2.0 / turning_size_dps(data.info) ** 2))
-    return np.concatenate(rows, axis=2), names, np.concatenate(precision)
+    whole = np.concatenate(rows, axis=2) if rows else np.zeros((*data.present.shape, 0))
+    return whole, names, np.concatenate(precision)
+
+
+def _over_temperature(data: Compressed, column: Column, basis: Array) -> NDArray[np.float64]:
+    """Return the coordinates of a column times each function of temperature, (R, m, k)."""
+    if column.carrier is None or column.carrier not in data.waves:
+        return data.rows_of(expand(column.values[:, None], basis))
+    slow = [data.at_sets(column.values * basis[:, k]) for k in range(basis.shape[1])]
+    return np.stack([values * data.waves[column.carrier] for values in slow], axis=2)
 
 
 def _turning(data: Compressed, axis: str) -> list[Column]:

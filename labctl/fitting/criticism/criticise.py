@@ -18,6 +18,7 @@ from labctl.fitting.criticism.refine import refined, sharpened
 from labctl.fitting.criticism.residuals import Residuals, maps, residuals_of, where_it_fails, worst_data_sets
 from labctl.fitting.criticism.verdict import (
     ENOUGH,
+    FAR,
     LEAD,
     NEXT_SHARE,
     NEXT_SHARE_UNTOLD,
@@ -47,6 +48,8 @@ LEAST_SPARE = 6
 STEPS = 4
 #: Less of an effect than this beside the base, and the schedule cannot see it.
 LEAST_VISIBLE = 0.15
+#: From this evidence on, an effect is worth refining its shape.
+NOTICED = 1.0
 #: How many suspects are fitted in full.
 SHOWN = 6
 #: The drift is larger than the data sheet says from this factor on.
@@ -188,12 +191,18 @@ def _known(groups: list[tuple[str, ...]]) -> set[str]:
 
 
 def _judged(weighed: Weighed, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Weighed, Step]:
-    """Judge, and where the answer is no single name judge again with the leaders' shapes refined."""
+    """Judge, and where the answer is no single name, or hardly, judge again with the leaders' shapes refined."""
     step = judge(weighed, first=first)
-    if step.form not in {"unexplained", "ambiguous"}:
+    if step.form == "adequate" or (step.form == "missing" and not _has_rival(weighed)):
         return weighed, step
-    weighed = sharpened(weighed, catalogue, ENOUGH)
+    weighed = sharpened(weighed, catalogue, NOTICED)
     return weighed, judge(weighed, first=first)
+
+
+def _has_rival(weighed: Weighed) -> bool:
+    """Whether another effect is so near the leader that its shape may decide."""
+    effects = [c for c in weighed.candidates if not c.smooth][:2]
+    return len(effects) == 2 and effects[1].log_bf > max(NOTICED, effects[0].log_bf - FAR)
 
 
 def _pair(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> Verdict | None:

@@ -36,7 +36,7 @@ SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
 #: The next effect is only named when it takes off at least this share of what the first did: less is shape error.
 NEXT_SHARE = 0.04
 #: The same after effects that could not be told apart: one of the others may fit better than the one that was added.
-NEXT_SHARE_UNTOLD = 0.2
+NEXT_SHARE_UNTOLD = 0.08
 #: An effect that takes off less than this share of the excess chi2 is not named alone at the first step.
 LEAST_SHARE = 0.3
 #: Columns that are the same up to rounding have the same evidence within this.
