@@ -6,7 +6,7 @@ import contextlib
 import signal
 import subprocess
 import sys
-import time
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from labctl.store.database import Database
 from procedures.operator import PersonOperator
 
 PATIENCE = 2000  #: looks at a campaign before a test gives up
+WAIT_S = 60.0  #: for the next sign of life
 
 
 @pytest.fixture
@@ -43,12 +44,18 @@ def client(runner: BenchRunner) -> Iterator[TestClient]:
 
 
 def until(client: TestClient, wanted: Any) -> Any:
-    """Look at campaign 1 until it is as wanted."""
-    for _ in range(PATIENCE):
-        answer = client.get("/api/campaigns/1").json()
-        if wanted(answer):
-            return answer
-        time.sleep(0.01)
+    """Look at campaign 1, whenever its runner says that something happened, until it is as wanted."""
+    happened = threading.Event()
+    stop = client.app.state.house.bench_runner().listen(happened.set)  # type: ignore[attr-defined]
+    try:
+        for _ in range(PATIENCE):
+            happened.clear()
+            answer = client.get("/api/campaigns/1").json()
+            if wanted(answer):
+                return answer
+            assert happened.wait(WAIT_S), f"nothing happened any more: {answer}"
+    finally:
+        stop()
     raise AssertionError(f"never so: {answer}")
 
 
@@ -134,7 +141,7 @@ def begun(database: Path) -> None:
                 with open_store(str(database), write=False) as store:
                     if any(step.kind == "acquire" and step.started_s for step in store.campaigns.steps(1)):
                         return
-        time.sleep(0.05)
+        SystemClock().sleep(0.05)  # another process has its own pace
     raise AssertionError("no data set was ever taken")
 
 
