@@ -11,7 +11,7 @@ from scipy.stats import norm
 from instruments.bench import BenchFile
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import Criticism
-from labctl.fitting.criticism.evidence import LEAST_LEFT, Schur, solve_option
+from labctl.fitting.criticism.evidence import reproduced_of, solve_option
 from labctl.fitting.criticism.verdict import LEAD
 from labctl.fitting.effects import Term
 from labctl.services.planning import bench_for, limits_of, load_bench
@@ -135,7 +135,7 @@ def separation(schedule: Schedule, leader: Term, coefficients: Mapping[str, np.n
         left = schedule.left[axis]
         size = float(values @ left.gram[signal, signal] @ values)
         shared = max(
-            (_shared(left, signal, values, where) for o, where in options if o.candidate == rival), default=0.0
+            (reproduced_of(left, signal, values, where) for o, where in options if o.candidate == rival), default=0.0
         )
         total += max(size - shared, 0.0)
     return total
@@ -149,14 +149,6 @@ def _apart(term: Term | None, leader: Term) -> float:
         abs(float(np.log((term.parameters[name] + 1e-9) / (leader.parameters[name] + 1e-9))))
         for name in leader.parameters
     )
-
-
-def _shared(left: Schur, signal: slice, values: np.ndarray, by: slice) -> float:
-    inner = left.gram[by, signal] @ values
-    scale = np.sqrt(np.maximum(left.whole[by], 1e-300))
-    sizes, vectors = np.linalg.eigh(left.gram[by, by] / np.outer(scale, scale))
-    kept = sizes > LEAST_LEFT
-    return float(((vectors[:, kept].T @ (inner / scale)) ** 2 / sizes[kept]).sum())
 
 
 def _recipe_of(store: Store, recording: int, found: Criticism) -> tuple[Recipe, BenchFile] | None:

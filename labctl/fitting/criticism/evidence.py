@@ -181,11 +181,14 @@ def visible_share(left: Schur, where: slice) -> float:
 
 def reproduced(left: Schur, signal: slice, by: slice) -> tuple[float, float]:
     """Return (how much of the leader's signal another option reproduces, the signal's size), both in chi2."""
-    a, _ = solve_option(left, signal)
-    size = float(a @ left.gram[signal, signal] @ a)
-    inner = left.gram[by, signal] @ a
+    values, _ = solve_option(left, signal)
+    return reproduced_of(left, signal, values, by), float(values @ left.gram[signal, signal] @ values)
+
+
+def reproduced_of(left: Schur, signal: slice, values: Array, by: slice) -> float:
+    """Return how much of an option's signal with coefficients (k,) another option reproduces, in chi2."""
+    inner = left.gram[by, signal] @ values
     scale = np.sqrt(np.maximum(left.whole[by], 1e-300))
-    values, vectors = np.linalg.eigh(left.gram[by, by] / np.outer(scale, scale))
-    kept = values > LEAST_LEFT
-    projected = vectors[:, kept].T @ (inner / scale)
-    return float((projected**2 / values[kept]).sum()), size
+    sizes, vectors = np.linalg.eigh(left.gram[by, by] / np.outer(scale, scale))
+    kept = sizes > LEAST_LEFT
+    return float(((vectors[:, kept].T @ (inner / scale)) ** 2 / sizes[kept]).sum())
