@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from labctl.fitting.channels import Array
 
@@ -128,8 +128,8 @@ def allan(rate_dps: Array, period_s: float) -> Allan | None:
     return Allan(
         tau,
         np.sqrt(variance),
-        np.sqrt(variance * freedom / chi2.isf(tail, freedom)),
-        np.sqrt(variance * freedom / chi2.ppf(tail, freedom)),
+        np.sqrt(variance * freedom / chdtri(freedom, tail)),
+        np.sqrt(variance * freedom / chdtri(freedom, 1 - tail)),
         np.sqrt(model),
         {k.letter: _figure(j, terms, tau, freedom) for j, k in enumerate(KINDS) if k.letter in REPORTED},
         n * period_s,

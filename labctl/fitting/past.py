@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.linalg import solve_banded
 
 from labctl.recording import Recording
 
@@ -82,10 +82,12 @@ def _slope(temperature_c: Array, over_s: float) -> Array:
 
 
 def _behind(temperature_c: Array, tau_s: float) -> Array:
+    """Return how far a first-order follower is behind: f[i] - keep f[i-1] = (1 - keep) T[i], at rest at the start."""
     keep = np.exp(-SPACING_S / tau_s)
-    start = temperature_c[0]
-    followed, _ = lfilter([1 - keep], [1, -keep], temperature_c, zi=[keep * start])
-    return np.asarray(followed - temperature_c)
+    band = np.array([np.ones(len(temperature_c)), np.full(len(temperature_c), -keep)])
+    pull = (1 - keep) * temperature_c
+    pull[0] = temperature_c[0]
+    return np.asarray(solve_banded((1, 0), band, pull) - temperature_c)
 
 
 def _play(temperature_c: Array, width_k: float) -> Array:

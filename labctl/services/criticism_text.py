@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from labctl.fitting.criticism import Criticism
 from labctl.fitting.criticism.criticise import LARGE_DRIFT, Suspect, failing, pictures, worst
@@ -69,7 +69,7 @@ def _lack_of_fit(found: Criticism) -> dict[str, float | None]:
         return {"statistic": None, "p_value": None}
     total = sum(axis.best.chi2 for axis in found.weighed.axes.values())
     freedom = sum(axis.rows - axis.base_columns for axis in found.weighed.axes.values())
-    return {"statistic": float(total / max(freedom, 1)), "p_value": float(chi2.sf(total, max(freedom, 1)))}
+    return {"statistic": float(total / max(freedom, 1)), "p_value": float(chdtrc(max(freedom, 1), total))}
 
 
 def _suspect(suspect: Suspect, found: Criticism) -> dict[str, Any]:

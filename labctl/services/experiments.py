@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from instruments.bench import BenchFile
 from labctl.errors import LabctlError
@@ -60,7 +60,7 @@ def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict
                 "do": text,
                 "recipe": changed.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
                 | {"format": "labctl-recipe/1", "name": f"{recipe.name}-next"},
-                "power": float(norm.cdf((delta / 2 - LEAD) / np.sqrt(delta))),
+                "power": float(ndtr((delta / 2 - LEAD) / np.sqrt(delta))),
                 "hours": hours,
                 "per_hour": min(delta, SURE) / hours,
             }

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from labctl.errors import LabctlError
 from labctl.fitting.context import Context, context_of
@@ -244,7 +244,7 @@ def _suspects(weighed: Weighed, context: Context, model: ErrorModel, verdict: Ve
     for candidate in effects:
         dimensions = sum(int(weighed.axes[a].dimensions[o]) for a, o in candidate.option.items())
         tried = sum(len(d.options) for d in weighed.designs.values()) / max(len(weighed.designs), 1)
-        single = float(chi2.sf(candidate.gain, max(dimensions, 1)))
+        single = float(chdtrc(max(dimensions, 1), candidate.gain))
         after = None
         if candidate.log_bf >= 0 and candidate.term is not None:
             term = verdict.terms.get(candidate.id, candidate.term)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from labctl.fitting.channels import Array
 from labctl.fitting.criticism.candidates import smooth_channels
@@ -141,7 +141,7 @@ def runs_test(values: Array) -> tuple[float, float]:
     expected = 1 + 2 * n1 * n2 / n
     variance = 2 * n1 * n2 * (2 * n1 * n2 - n) / (n**2 * (n - 1))
     z = (runs - expected) / np.sqrt(variance)
-    return float(z), float(2 * norm.sf(abs(z)))
+    return float(z), float(2 * ndtr(-abs(z)))
 
 
 def _lag1(values: Array, run: NDArray[np.int64]) -> float:

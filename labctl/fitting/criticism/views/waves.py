@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from labctl.fitting.channels import Array
 from labctl.fitting.criticism.compress import STEP_LINES
@@ -56,7 +56,7 @@ def angle_lines(within: Within, residual: Residual, axis: str) -> list[dict[str,
     level = float(np.median(mean(power / energy)))
     over = mean(power / energy) / max(level, 1e-300)
     amplitude = np.sqrt(4 * np.maximum(mean((power - level * energy) / whole**2), 0.0))
-    limit = chi2.isf(ALARM / len(cycles), 2 * sets) / (2 * sets)
+    limit = chdtri(2 * sets, ALARM / len(cycles)) / (2 * sets)
     lines = sorted(np.flatnonzero(over > limit).tolist(), key=lambda k: -over[k])[:8]
     return [
         {
@@ -111,7 +111,7 @@ def frequency_lines(within: Within, residual: Residual, axis: str) -> list[dict[
             "datasets": len(rows),
             "hz": plain_list(np.add.reduceat(hz, starts) / widths),
             "over_white": plain_list(over),
-            "limit": plain_list(chi2.isf(ALARM / len(starts), freedom) / freedom),
+            "limit": plain_list(chdtri(freedom, ALARM / len(starts)) / freedom),
         }
     ]
 
