@@ -26,6 +26,7 @@ from labctl.services.acts import ImproveRequest
 from labctl.services.answers import CriticismAnswer, FitAnswer, LadderAnswer, LadderRow
 from labctl.services.criticism_text import answer_of
 from labctl.services.experiments import experiments_for
+from labctl.services.kept import kept
 from labctl.services.recordings import newest_recording
 from labctl.store import CalibrationRecord, NewCalibration, Store
 
@@ -38,8 +39,17 @@ def criticise_unit(
     """Hold a version (default: the newest) against a recording (default: the newest). Raises NotFound, BadInput."""
     row = _version(store, serial, version)
     number = newest_recording(store, serial, recording)
-    found = _criticise(store, number, model_of(row), _catalogue(competing))
-    return answer_of(serial, row.version, number, found, experiments_for(store, number, found))
+    catalogue = _catalogue(competing)
+
+    def work() -> CriticismAnswer:
+        found = _criticise(store, number, model_of(row), catalogue)
+        return answer_of(serial, row.version, number, found, experiments_for(store, number, found))
+
+    question = {
+        "serial": serial, "version": row.version, "model": row.answer["model"], "recording": number,
+        "readings": store.recordings.fingerprint(number), "formulas": [[each.id, each.text] for each in competing],
+    }  # fmt: skip
+    return kept(CriticismAnswer, question, work)
 
 
 def _criticise(store: Store, recording: int, model: ErrorModel, catalogue: Mapping[str, Effect]) -> Criticism:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterator, Mapping
 from datetime import datetime
 from typing import Any
@@ -85,6 +87,20 @@ class Recordings:
         )
         with self._database.reading() as connection:
             return [RecordingRow(*row[:7], int(row[7] or 0), int(row[8] or 0)) for row in connection.execute(query)]
+
+    def fingerprint(self, recording: int) -> str:
+        """Return a digest of all that a recording holds now: equal only where every answer about it is."""
+        head = self.get(recording)
+        d, b, e = tables.data_sets.c, tables.sample_blocks.c, tables.environment.c
+        ours = (
+            sa.select(d.number, d.state, d.n).where(d.recording_id == recording).order_by(d.number),
+            sa.select(b.number, b.seq, b.n, b.crc32).where(b.recording_id == recording).order_by(b.number, b.seq),
+            sa.select(sa.func.count(), sa.func.max(e.t_s)).where(e.recording_id == recording),
+        )
+        with self._database.reading() as connection:
+            rows = [[tuple(row) for row in connection.execute(query)] for query in ours]
+        said = json.dumps([head.serial, head.campaign, head.kind, dict(head.info), rows], sort_keys=True)
+        return hashlib.sha256(said.encode()).hexdigest()
 
     def points(self, recording: int) -> Recording:
         """Return one row per complete data set, from the statistics alone (kind "points"), or the table imported."""
