@@ -24,7 +24,7 @@ PROTOCOLS = {
 }
 MODELS = {"O": "ojeda2000", "O+": "ojeda2000", "Y": "yang2018", "Y+": "yang2018"}
 #: No effect of the catalogue.
-OUTSIDE = {"outside_etalon": "temperature_c"}
+OUTSIDE = {"outside_etalon": "temperature_c", "outside_humidity": "humidity_pct"}
 
 
 @dataclass(frozen=True)

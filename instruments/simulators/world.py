@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from instruments.bench import BenchFile, GyroSettings, SimulationSettings
 from instruments.simulators.hidden import HiddenEffect, State, hidden_effects
 from instruments.simulators.motion import TableMotion
+from instruments.simulators.room import humidity_pct, supply_wander_v
 from instruments.simulators.thermal import Body, Heat
 from instruments.simulators.units import UnitTruth, make_unit
 
@@ -74,6 +75,11 @@ class World:
     def gyro(self, name: str) -> SimulatedGyro:
         """Return a unit of the bench."""
         return self._gyros[name]
+
+    @staticmethod
+    def humidity_pct(t_s: Array) -> Array:
+        """Return the relative humidity of the room at times (n,), per cent."""
+        return humidity_pct(t_s)
 
     def mount(self, t_s: float, position: str) -> None:  # noqa: ARG002  a hand is quicker than a second
         """Turn every unit so that body axis `position` points up along the table axis."""
@@ -160,10 +166,7 @@ class SimulatedGyro:
         white = self._rng.standard_normal((n, len(truth.axes) + 1))
         rate = rate + self._drifts(t_s) + truth.white_dps_rthz * np.sqrt(self.sample_rate_hz) * white[:, :-1]
         thermometer = shown[:, None] + truth.thermometer_noise_c * white[:, -1:]
-        supply = np.full(n, truth.supply_v)
-        for effect in self._hidden:
-            supply = supply + effect.supply_v(t_s)
-        return GyroSample(rate, np.repeat(thermometer, len(truth.axes), axis=1), supply)
+        return GyroSample(rate, np.repeat(thermometer, len(truth.axes), axis=1), truth.supply_v + supply_wander_v(t_s))
 
     def _state(self, t_s: Array, table_dps: Array, angle: Array, body: Array, sensor: Array, on_s: Array) -> State:
         world = self.world
@@ -185,6 +188,8 @@ class SimulatedGyro:
             mounting=world.mounting,
             full_scale_dps=self.settings.max_rate_dps,
             north_deg=world.north_deg,
+            supply_wander_v=supply_wander_v(t_s),
+            humidity_pct=humidity_pct(t_s),
             own_at=self._own_at,
         )
 

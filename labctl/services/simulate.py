@@ -198,6 +198,7 @@ class _Walk:
             "chamber_c": self._world.heat.airs_c(times),
             "chamber_setpoint_c": np.full(n, self._setpoint),
             "supply_v": sample.supply_v,
+            "humidity_pct": self._world.humidity_pct(times),
         }
         part |= {f"gyro_{axis}": sample.rate_dps[:, i] for i, axis in enumerate(self._settings.axes)}
         self._parts.append(part)

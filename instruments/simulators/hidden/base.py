@@ -34,6 +34,8 @@ class State:
     mounting: int
     full_scale_dps: float
     north_deg: float
+    supply_wander_v: Array
+    humidity_pct: Array  #: relative humidity of the room
     own_at: Callable[[Array], Array]  #: times (k,) not long ago -> own rates then, (k, axes)
 
 
@@ -55,7 +57,3 @@ class HiddenEffect:
     def thermometer_c(self, state: State) -> Array:
         """Return what is added to the thermometer, (n,)."""
         return np.zeros(len(state.t_s))
-
-    def supply_v(self, t_s: Array) -> Array:
-        """Return what is added to the supply voltage, (n,)."""
-        return np.zeros(len(t_s))

@@ -127,19 +127,21 @@ class MissedSteps(HiddenEffect):
 
 
 class SupplySensitivity(HiddenEffect):
-    """A bias that follows a supply voltage which wanders over hours."""
+    """A bias that follows the supply voltage."""
 
     id, unit, default = "supply_sensitivity", "deg/s/V", 0.05
 
-    def _wander(self, t_s: Array) -> Array:
-        hours = t_s / 3600.0
-        return 0.06 * np.sin(2 * np.pi * hours / 5.3) + 0.04 * np.sin(2 * np.pi * hours / 1.7 + 1.0)
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return (self.size * state.supply_wander_v)[:, None]
 
-    def supply_v(self, t_s: Array) -> Array:
-        return self._wander(t_s)
+
+class OutsideHumidity(HiddenEffect):
+    """No effect of the catalogue: the bias jumps where the room's humidity passes a value."""
+
+    id, unit, default = "outside_humidity", "deg/s", 0.01
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
-        return (self.size * self._wander(state.t_s))[:, None]
+        return (0.5 * self.size * np.tanh((state.humidity_pct - 46.0) / 0.8))[:, None]
 
 
 EFFECTS: tuple[type[HiddenEffect], ...] = (
@@ -155,4 +157,5 @@ EFFECTS: tuple[type[HiddenEffect], ...] = (
     TableRateRipple,
     MissedSteps,
     SupplySensitivity,
+    OutsideHumidity,
 )
