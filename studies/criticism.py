@@ -19,6 +19,7 @@ from labctl.errors import LabctlError
 from labctl.fitting.context import context_of
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.residuals import residuals_of
+from labctl.fitting.criticism.verdict import overlap
 from labctl.fitting.fit import fit_context
 from labctl.fitting.model import ErrorModel
 from labctl.fitting.presets import changed, preset_for
@@ -121,7 +122,19 @@ class _Stopwatch:
 def _said(found: Criticism) -> dict[str, Any]:
     top = [(c.id, c.smooth, round(c.log_bf, 2)) for c in found.weighed.candidates[:4]] if found.weighed else []
     return {"verdict": found.verdict.form, "named": list(found.verdict.named), "nodes": nodes(found),
-            "depends_on": list(found.verdict.depends_on)[:3], "top": top}  # fmt: skip
+            "alike": alike(found), "depends_on": list(found.verdict.depends_on)[:3], "top": top}  # fmt: skip
+
+
+def alike(found: Criticism) -> float:
+    """Return the least share of the leader's signal that another of those named with it would give just so, 0 to 1.
+
+    At 1 this schedule makes them the same, whatever its readings.
+    """
+    if found.weighed is None or len(found.verdict.groups) != 1:
+        return 0.0
+    known = {c.id: c for c in found.weighed.candidates if not c.smooth}
+    named = [known[name] for name in found.verdict.named if name in known]
+    return min((overlap(found.weighed, named[0], rival) for rival in named[1:]), default=1.0) if named else 0.0
 
 
 def nodes(found: Criticism) -> int:

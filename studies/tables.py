@@ -12,6 +12,8 @@ from labctl.fitting.effects import CATALOGUE
 from studies.campaigns import OUTSIDE, PROTOCOLS
 
 Answer = dict[str, Any]
+#: The same on a schedule: one gives all but this of the other's signal.
+SAME = 0.999
 Z95 = 1.959963984540054
 
 
@@ -63,6 +65,11 @@ def single(answer: Answer) -> bool:
 def right_alone(answer: Answer) -> bool:
     """Whether what is hidden was named, and nothing else but its exact likes."""
     return right_or_group(answer) and single(answer)
+
+
+def right_cause(answer: Answer) -> bool:
+    """Whether what is hidden was named, and nothing that this schedule does not make the same."""
+    return right_or_group(answer) and (single(answer) or answer["alike"] > SAME)
 
 
 def wrong_claim(answer: Answer) -> bool:
@@ -172,6 +179,7 @@ def own(cells: Cells) -> str:
     counts: tuple[tuple[str, Callable[[Answer], bool]], ...] = (
         ("right name or group", right_or_group),
         ("right name alone", right_alone),
+        ("right name alone, or with what the schedule makes the same", right_cause),
         ("wrong single name", wrong_single),
         ("named, truth not among it", wrong_claim),
         ("a name too many", one_too_many),

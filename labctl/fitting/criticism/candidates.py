@@ -16,6 +16,12 @@ from labctl.fitting.model import ErrorModel, expand
 
 #: Knots of a smooth function of a channel: a coarse and a fine one compete.
 KNOTS = (5, 9)
+#: Channels of the surroundings may also jump at a value, or come and go so many times over their range: shapes of one
+#: and two coefficients, where a smooth function of nine would not pay.
+STEPS_AT = (0.2, 0.35, 0.5, 0.65, 0.8)
+WAVES_OVER_RANGE = (1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
+#: A jump is spread over this share of the range.
+SPREAD = 0.1
 #: What is no channel of the world: numbers of things, what the gyro says, and what belongs to the place in a data set.
 NO_CHANNELS = frozenset(
     {
@@ -26,6 +32,7 @@ NO_CHANNELS = frozenset(
 #: These hold everything that others name, so they are what a model starts from and never what is missing.
 ONLY_BASE = frozenset({"rate_temperature_surface"})
 TIMES = frozenset({"t_s", "power_s"})
+NO_SURROUNDINGS = TIMES | {"table_rate_dps"}
 
 
 @dataclass(frozen=True)
@@ -155,7 +162,30 @@ def _smooth_options(data: Compressed, axis: str) -> list[Option]:
         distinct = np.unique(np.round(values, 9))
         for number in KNOTS:
             found += _smooth(data, name, values, np.unique(np.quantile(distinct, np.linspace(0, 1, number))))
+        if name not in NO_SURROUNDINGS and len(distinct) > max(KNOTS):
+            found += _steps(data, name, values, np.quantile(distinct, STEPS_AT))
+            found += _waves(data, name, values)
     return found
+
+
+def _steps(data: Compressed, name: str, values: Array, places: Array) -> list[Option]:
+    half = SPREAD * np.ptp(values) / 2
+    return [
+        Option(
+            name, None, data.rows_of(np.clip((values - place) / half, -1.0, 1.0)[:, None]),
+            (f"{name}>{place:.6g}",), ("deg/s",),
+        )
+        for place in places
+    ]  # fmt: skip
+
+
+def _waves(data: Compressed, name: str, values: Array) -> list[Option]:
+    phase = 2 * np.pi * (values - values.min()) / np.ptp(values)
+    names, units = (f"cos {name}", f"sin {name}"), ("deg/s", "deg/s")
+    return [
+        Option(name, None, data.rows_of(np.column_stack([np.cos(n * phase), np.sin(n * phase)])), names, units)
+        for n in WAVES_OVER_RANGE
+    ]
 
 
 def _smooth(data: Compressed, name: str, values: Array, knots: Array) -> list[Option]:
