@@ -8,6 +8,7 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 
+from labctl import web
 from labctl.api import calibrations, campaigns, health, keys, problems, recordings, schedule, units, watchdog
 from labctl.api.door import Access, Door
 from labctl.services.house import House
@@ -56,5 +57,6 @@ def create_app(house: House, access: Access | None = None) -> FastAPI:
     rooms = (health, units, calibrations, campaigns, schedule, recordings, keys)
     for room in rooms:
         app.include_router(room.router)
+    web.install(app)
     app.add_middleware(Door, house=house, access=access or Access())
     return app

@@ -16,6 +16,7 @@ from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, TooL
 from labctl.services.house import House
 from labctl.services.keys import Caller, Role, identify, refuse_beyond
 from labctl.services.remote import USER_HEADER
+from labctl.web import is_page
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -72,7 +73,7 @@ class Door:
             caller = self._caller(scope)
             refuse_beyond(caller, Role.VIEWER if scope["method"] in READING else Role.OPERATOR)
         except NotAllowed:
-            if scope["path"] in OPEN and scope["method"] in READING:
+            if (scope["path"] in OPEN or is_page(scope["path"])) and scope["method"] in READING:
                 return None
             raise
         return caller

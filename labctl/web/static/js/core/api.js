@@ -1,0 +1,113 @@
+// One way to ask the service: keys, problem documents, event streams.
+
+const KEY = "labctl.key";
+
+/** What the service said no with (RFC 9457): `status`, `type`, `title`, `detail`. */
+export class Problem extends Error {
+  constructor(document) {
+    super(document.detail || document.title || "the service gave no reason");
+    Object.assign(this, document);
+  }
+}
+
+/** The service did not answer at all. */
+export class Unreachable extends Error {
+  constructor() {
+    super("The service does not answer. Nothing on this page is newer than what you see.");
+  }
+}
+
+export const key = () => sessionStorage.getItem(KEY);
+export const setKey = (value) => (value ? sessionStorage.setItem(KEY, value) : sessionStorage.removeItem(KEY));
+
+function headers(more = {}) {
+  return key() ? { ...more, Authorization: `Bearer ${key()}` } : more;
+}
+
+async function answer(path, options) {
+  let response;
+  try {
+    response = await fetch(path, options);
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Unreachable();
+  }
+  if (response.ok) return response;
+  const document = await response.json().catch(() => ({ title: response.statusText, status: response.status }));
+  if (response.status === 401) window.dispatchEvent(new CustomEvent("labctl:key", { detail: document.detail }));
+  throw new Problem({ status: response.status, ...document });
+}
+
+/** Path and query: `at("/api/x", {recording: 3, formula: ["a", "b"]})`; null is left out. */
+export function at(path, query = {}) {
+  const search = new URLSearchParams();
+  for (const [name, value] of Object.entries(query)) {
+    for (const one of Array.isArray(value) ? value : [value]) if (one !== null && one !== undefined && one !== "") search.append(name, one);
+  }
+  const text = search.toString();
+  return text ? `${path}?${text}` : path;
+}
+
+export async function get(path, { query, signal } = {}) {
+  return (await answer(at(path, query), { headers: headers(), signal })).json();
+}
+
+export async function post(path, body = {}, { signal } = {}) {
+  const options = { method: "POST", headers: headers({ "Content-Type": "application/json" }), body: JSON.stringify(body), signal };
+  return (await answer(path, options)).json();
+}
+
+export async function remove(path) {
+  return (await answer(path, { method: "DELETE", headers: headers() })).json();
+}
+
+/** Send files as one form. */
+export async function upload(path, files) {
+  const form = new FormData();
+  for (const file of files) form.append("files", file, file.name);
+  return (await answer(path, { method: "POST", headers: headers(), body: form })).json();
+}
+
+/** Fetch a file with the key and hand it to the reader. */
+export async function download(path, name) {
+  const blob = await (await answer(path, { headers: headers() })).blob();
+  save(blob, name);
+}
+
+export function save(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/** Yield {event, id, data} of a stream of server-sent events until it ends. EventSource cannot send a key. */
+export async function* events(path, { after, signal } = {}) {
+  const response = await answer(path, { headers: headers(after ? { "Last-Event-ID": String(after) } : {}), signal });
+  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  try {
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) return;
+      text += value;
+      const messages = text.split(/\r?\n\r?\n/);
+      text = messages.pop();
+      for (const message of messages) yield parsed(message);
+    }
+  } finally {
+    reader.cancel().catch(() => {});
+  }
+}
+
+function parsed(message) {
+  const found = { event: "message", id: null, data: null };
+  for (const line of message.split(/\r?\n/)) {
+    const [, field, value] = /^(\w*):? ?(.*)$/s.exec(line) ?? [];
+    if (field === "data") found.data = JSON.parse(value);
+    else if (field === "event") found.event = value;
+    else if (field === "id") found.id = Number(value);
+  }
+  return found;
+}

@@ -1,0 +1,102 @@
+// Every picture: drawn by Plotly in the page's colours, saved as PNG, SVG or the numbers behind it as CSV.
+
+import { save } from "./api.js";
+import { h } from "./dom.js";
+
+let script = null;
+const drawn = new Set();
+
+/** Load Plotly once, when the first picture asks for it. */
+export function plotly() {
+  script ??= new Promise((resolve, reject) => {
+    const element = h("script", { src: "/static/plotly.js", onload: () => resolve(window.Plotly), onerror: () => reject(new Error("the drawing library could not be loaded")) });
+    document.head.append(element);
+  });
+  return script;
+}
+
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export const axisColour = (axis) => colour(`axis-${axis}`) || colour("accent");
+/** Residual over floor, the same in every map: blue below, red above. */
+export const DIVERGING = [[0, "#1f5fa8"], [0.35, "#8db3d9"], [0.5, "#c9ccd0"], [0.65, "#dd9a8b"], [1, "#b3242f"]];
+/** Temperatures from cold to hot. */
+export function warmth(share) {
+  const stops = [[45, 95, 190], [80, 170, 190], [190, 170, 90], [215, 110, 50], [180, 40, 50]];
+  const at = Math.min(Math.max(share, 0), 1) * (stops.length - 1);
+  const k = Math.min(Math.floor(at), stops.length - 2);
+  return `rgb(${stops[k].map((low, c) => Math.round(low + (at - k) * (stops[k + 1][c] - low))).join(",")})`;
+}
+
+function dressed(layout) {
+  const axis = { gridcolor: colour("line"), zerolinecolor: colour("line-strong"), linecolor: colour("line-strong"), automargin: true, exponentformat: "power", ticks: "outside", tickcolor: colour("line") };
+  const own = Object.fromEntries(Object.entries(layout).filter(([name]) => /^[xy]axis\d*$/.test(name)).map(([name, value]) => [name, { ...axis, ...value }]));
+  return {
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: getComputedStyle(document.body).fontFamily, size: 12.5, color: colour("soft") },
+    margin: { l: 58, r: 16, t: 12, b: 44 }, hovermode: "closest", dragmode: "zoom",
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
+    hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line-strong"), font: { color: colour("ink") } },
+    xaxis: axis, yaxis: axis, ...layout, ...own,
+  };
+}
+
+/**
+ * Make a picture. `draw()` gives {data, layout}; it is called again when the colours change.
+ * `csv()` gives [[heading, ...], [value, ...], ...]; without it the traces' own x, y, z are saved.
+ * Returns an element with `.update()` (draw again) and `.plot` (Plotly's element, once it is drawn).
+ */
+export function figure(name, caption, draw, { tall = "20rem", csv, onready } = {}) {
+  const plot = h("div", { class: "plot", role: "img", "aria-label": `${name}. ${caption ?? ""}` });
+  const tool = (text, act, label) => h("button", { type: "button", class: "button quiet tiny", "aria-label": `Save ${name} as ${label}`, onclick: act }, text);
+  const element = h("figure", { class: "figure", style: `--tall: ${tall}` },
+    h("div", { class: "toolbar" }, tool("PNG", () => picture("png"), "PNG"), tool("SVG", () => picture("svg"), "SVG"), tool("CSV", () => save(new Blob([text(rows())], { type: "text/csv" }), `${file(name)}.csv`), "CSV")),
+    plot, caption ? h("figcaption", {}, caption) : null);
+
+  async function picture(format) {
+    const Plotly = await plotly();
+    const link = await Plotly.toImage(plot, { format, width: Math.max(plot.clientWidth, 800), height: Math.max(plot.clientHeight, 450), scale: format === "png" ? 2 : 1 });
+    save(await (await fetch(link)).blob(), `${file(name)}.${format}`);
+  }
+
+  const rows = () => csv?.() ?? traces(plot.data ?? []);
+  let waiting = false;
+  element.plot = plot;
+  element.update = async () => {
+    if (waiting) return;
+    waiting = true;
+    const Plotly = await plotly();
+    await new Promise(requestAnimationFrame);
+    waiting = false;
+    const { data, layout = {} } = draw();
+    const first = !plot.data;
+    await Plotly.react(plot, data, dressed(layout), { displaylogo: false, responsive: true, displayModeBar: "hover", modeBarButtonsToRemove: ["toImage"], ...(layout.labctlConfig ?? {}) });
+    if (first) {
+      drawn.add(element);
+      onready?.(plot);
+    }
+  };
+  // drawn when it is near the window: a page with ten pictures opens as fast as one with two
+  new IntersectionObserver((entries, observer) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    observer.disconnect();
+    element.update();
+  }, { rootMargin: "300px" }).observe(element);
+  return element;
+}
+
+window.addEventListener("labctl:theme", () => {
+  for (const element of drawn) element.isConnected ? element.update() : drawn.delete(element);
+});
+
+const file = (name) => name.toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, "");
+const text = (rows) => rows.map((row) => row.map((cell) => (/[",\n]/.test(String(cell)) ? `"${String(cell).replaceAll('"', '""')}"` : cell ?? "")).join(",")).join("\n") + "\n";
+
+function traces(data) {
+  const rows = [["trace", "x", "y", "z"]];
+  for (const trace of data) {
+    const label = trace.name ?? "";
+    if (trace.z) trace.z.forEach((line, r) => Array.from(line).forEach((z, c) => rows.push([label, trace.x?.[c] ?? c, trace.y?.[r] ?? r, z])));
+    else Array.from(trace.x ?? trace.y ?? []).forEach((x, k) => rows.push([label, trace.x ? x : k, trace.y?.[k], ""]));
+  }
+  return rows;
+}

@@ -1,0 +1,33 @@
+// Numbers and times as a person reads them, each with its unit.
+
+/** A number to so many significant digits, never in the form 1e-3 where a table is read: 0.00120, 1 234, 4.5e-7. */
+export function number(value, digits = 3) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-5 || size >= 1e7)) return value.toExponential(digits - 1).replace("e", " × 10^").replace("^+", "^");
+  const text = Number(value.toPrecision(digits));
+  const decimals = size === 0 ? 0 : Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(text) || 1)));
+  return text.toFixed(Math.min(decimals, 8));
+}
+
+export const withUnit = (value, unit, digits) => (Number.isFinite(value) ? `${number(value, digits)} ${unit}` : "–");
+export const count = (value) => (Number.isFinite(value) ? value.toLocaleString("en-GB") : "–");
+export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)} %` : "–");
+
+/** Seconds as 45 h 10 min, 3 min 20 s, 12 s. */
+export function duration(seconds) {
+  if (!Number.isFinite(seconds)) return "–";
+  const whole = Math.max(0, Math.round(seconds));
+  const [hours, minutes] = [Math.floor(whole / 3600), Math.floor((whole % 3600) / 60)];
+  if (hours) return `${hours} h ${minutes} min`;
+  return minutes ? `${minutes} min ${whole % 60} s` : `${whole} s`;
+}
+
+const DAY = { weekday: "short", day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };
+/** An instant in the reader's time zone. */
+export const instant = (text) => (text ? new Date(text).toLocaleString("en-GB", DAY) : "–");
+export const day = (text) => (text ? new Date(text).toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" }) : "–");
+export const clock = (text) => (text ? new Date(text).toLocaleTimeString("en-GB") : "–");
+
+/** An id as words: scale_factor_asymmetry -> scale factor asymmetry. */
+export const words = (id) => String(id).replaceAll("_", " ");

@@ -1,0 +1,136 @@
+// Parts that several pages are put together from.
+
+import { Problem, Unreachable } from "./api.js";
+import { fill, fresh, h } from "./dom.js";
+
+/** A card with a heading; `beside` stands at the heading's right. */
+export function card(title, ...children) {
+  return h("section", { class: "card stack", "aria-label": title }, h("h2", {}, title), ...children);
+}
+
+export function headed(title, beside, ...children) {
+  return h("section", { class: "card stack", "aria-label": title }, h("div", { class: "card-head" }, h("h2", {}, title), beside), ...children);
+}
+
+/** The head of a page: its h1, a line below, and what can be done at the right. */
+export function head(title, line, ...acts) {
+  return h("header", { class: "page-head" },
+    h("div", {}, h("h1", {}, title), line ? h("p", { class: "soft" }, line) : null),
+    acts.length ? h("div", { class: "row" }, ...acts) : null);
+}
+
+/** Facts side by side: [name, value, unit, beside]. */
+export function facts(rows) {
+  return h("dl", { class: "facts" }, rows.filter(Boolean).map(([name, value, unit, beside]) =>
+    h("div", { class: "fact" }, h("dt", {}, name),
+      h("dd", {}, value, unit ? h("span", { class: "unit" }, unit) : null, beside ? h("span", { class: "beside" }, beside) : null))));
+}
+
+export const chip = (text, kind = "") => h("span", { class: `chip ${kind}` }, text);
+export const notice = (kind, ...children) => h("div", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : "status" }, ...children);
+export const empty = (...children) => h("div", { class: "empty stack" }, ...children);
+export const busy = (text) => h("p", { class: "busy soft", role: "status" }, text);
+
+/** A table: columns are {title, number?, cell(row)}. */
+export function table(columns, rows, { label, selected, onrow } = {}) {
+  return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": label },
+    h("table", { class: "data" },
+      h("thead", {}, h("tr", {}, columns.map((c) => h("th", { class: c.number ? "number" : null, scope: "col" }, c.title)))),
+      h("tbody", {}, rows.map((row) =>
+        h("tr", { "aria-selected": selected?.(row) ? "true" : null, onclick: onrow ? () => onrow(row) : null },
+          columns.map((c) => h("td", { class: c.number ? "number" : null }, c.cell(row))))))));
+}
+
+/** Labelled select: options are [value, text]. */
+export function choice(label, options, value, onchange) {
+  const id = fresh("choice");
+  return h("div", { class: "field" }, h("label", { for: id }, label),
+    h("select", { id, onchange: (event) => onchange(event.target.value) },
+      options.map(([each, text]) => h("option", { value: each, selected: String(each) === String(value) }, text))));
+}
+
+export function field(label, input, hint) {
+  const id = fresh("field");
+  input.id = id;
+  if (hint) input.setAttribute("aria-describedby", `${id}-hint`);
+  return h("div", { class: "field" }, h("label", { for: id }, label), input, hint ? h("span", { class: "hint", id: `${id}-hint` }, hint) : null);
+}
+
+/** A row of buttons of which one is chosen: [value, text]. */
+export function tabs(label, options, value, onchange) {
+  const buttons = options.map(([each, text]) =>
+    h("button", { type: "button", "aria-pressed": String(each === value), onclick: () => {
+      buttons.forEach((button, k) => button.setAttribute("aria-pressed", String(options[k][0] === each)));
+      onchange(each);
+    } }, text));
+  return h("div", { class: "tabs", role: "group", "aria-label": label }, buttons);
+}
+
+/** A button that does something that takes a while: it says so, and cannot be pressed twice. */
+export function button(text, act, { kind = "", done } = {}) {
+  const element = h("button", { type: "button", class: `button ${kind}`, onclick: async () => {
+    element.disabled = true;
+    element.classList.add("busy");
+    try {
+      await act();
+      if (done) toast("good", done);
+    } catch (error) {
+      if (error.name !== "AbortError") toast("bad", error.message);
+    } finally {
+      element.disabled = false;
+      element.classList.remove("busy");
+    }
+  } }, text);
+  return element;
+}
+
+/** What went wrong, in words, with a way to try again. */
+export function trouble(error, again) {
+  const what = error instanceof Problem ? error.title : error instanceof Unreachable ? "No answer" : "Something went wrong on this page";
+  if (!(error instanceof Problem || error instanceof Unreachable)) console.error(error);
+  return h("div", { class: "page" }, h("h1", {}, what), notice("bad", h("p", {}, error.message)),
+    again ? h("div", { class: "row" }, h("button", { class: "button", type: "button", onclick: again }, "Try again")) : null);
+}
+
+/** Tell something in the corner; errors stay until they are closed. */
+export function toast(kind, text) {
+  const corner = document.querySelector(".toasts");
+  const told = notice(kind, h("span", {}, text), h("button", { class: "button quiet tiny", type: "button", "aria-label": "Close", onclick: () => told.remove() }, "✕"));
+  corner.append(told);
+  if (kind !== "bad") setTimeout(() => told.remove(), 6000);
+}
+
+/** Ask a person for a few words: resolves to {name: value}, or null. `fields`: [{name, label, value, hint, type, required}]. */
+export function dialog(title, fields, { text, confirm = "Go on", kind = "first" } = {}) {
+  return new Promise((resolve) => {
+    const inputs = fields.map((f) => h("input", { name: f.name, type: f.type ?? "text", value: f.value ?? "", required: f.required !== false, autocomplete: "off" }));
+    const name = fresh("dialog");
+    const box = h("dialog", { "aria-labelledby": name }, h("form", { method: "dialog", onsubmit: (event) => {
+      event.preventDefault();
+      box.close("yes");
+    } },
+    h("h2", { id: name }, title), text ? h("p", { class: "soft" }, text) : null,
+    fields.map((f, k) => field(f.label, inputs[k], f.hint)),
+    h("div", { class: "row", style: "justify-content: flex-end" },
+      h("button", { class: "button quiet", type: "button", onclick: () => box.close() }, "Cancel"),
+      h("button", { class: `button ${kind}`, type: "submit" }, confirm))));
+    box.addEventListener("close", () => {
+      box.remove();
+      resolve(box.returnValue === "yes" ? Object.fromEntries(inputs.map((input) => [input.name, input.value])) : null);
+    });
+    document.body.append(box);
+    box.showModal();
+    inputs[0]?.focus();
+  });
+}
+
+/** Fill a place with what a promise gives; until then and on failure it says so. */
+export async function later(place, text, make) {
+  fill(place, busy(text));
+  try {
+    fill(place, await make());
+  } catch (error) {
+    if (error.name !== "AbortError") fill(place, notice("bad", error.message));
+  }
+  return place;
+}

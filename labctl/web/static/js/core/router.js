@@ -1,0 +1,80 @@
+// Every state has an address; the page is what the address says.
+
+const routes = [];
+let leave = new AbortController();
+let shown = null;
+
+/** Say which module shows addresses like `/units/:serial`. A module has `page(context)`, which returns an element. */
+export const route = (pattern, load) => routes.push({ parts: pattern.split("/").filter(Boolean), load });
+
+function match(path) {
+  const parts = path.split("/").filter(Boolean).map(decodeURIComponent);
+  for (const { parts: pattern, load } of routes) {
+    if (pattern.length !== parts.length) continue;
+    const params = {};
+    const fits = pattern.every((part, k) => (part.startsWith(":") ? ((params[part.slice(1)] = parts[k]), true) : part === parts[k]));
+    if (fits) return { load, params };
+  }
+  return null;
+}
+
+/** Go to an address as if its link had been pressed. */
+export function go(path) {
+  history.pushState(null, "", path);
+  return show();
+}
+
+/** Write a choice into the address without leaving the page; null takes it out. */
+export function remember(choice) {
+  const query = new URLSearchParams(location.search);
+  for (const [name, value] of Object.entries(choice)) {
+    if (value === null || value === undefined || value === "") query.delete(name);
+    else query.set(name, value);
+  }
+  const text = query.toString();
+  history.replaceState(null, "", text ? `?${text}` : location.pathname);
+}
+
+export const query = () => Object.fromEntries(new URLSearchParams(location.search));
+
+/** Show what the address says. */
+export async function show() {
+  leave.abort();
+  leave = new AbortController();
+  const { signal } = leave;
+  const main = document.querySelector("main");
+  const found = match(location.pathname);
+  window.dispatchEvent(new CustomEvent("labctl:moved"));
+  main.setAttribute("aria-busy", "true");
+  try {
+    const module = await (found ? found.load() : import("../pages/missing.js"));
+    const element = await module.page({ params: found?.params ?? {}, query: query(), signal });
+    if (signal.aborted) return;
+    shown = element;
+    main.replaceChildren(element);
+    const heading = element.querySelector("h1");
+    document.title = heading ? `${heading.textContent} · labctl` : "labctl";
+    if (document.activeElement === document.body || main.contains(document.activeElement)) main.focus({ preventScroll: true });
+  } catch (error) {
+    if (signal.aborted || error.name === "AbortError") return;
+    const { trouble } = await import("./parts.js");
+    main.replaceChildren(trouble(error, show));
+  } finally {
+    if (!signal.aborted) main.removeAttribute("aria-busy");
+  }
+}
+
+/** Take over links within these pages. */
+export function start() {
+  document.addEventListener("click", (event) => {
+    const link = event.target.closest?.("a[href]");
+    if (!link || event.defaultPrevented || event.button || event.metaKey || event.ctrlKey || event.shiftKey || link.download || link.target) return;
+    const url = new URL(link.href);
+    if (url.origin !== location.origin || url.pathname.startsWith("/api") || url.pathname.startsWith("/static") || !match(url.pathname)) return;
+    event.preventDefault();
+    go(url.pathname + url.search + url.hash);
+    window.scrollTo(0, 0);
+  });
+  window.addEventListener("popstate", show);
+  return show();
+}

@@ -1,0 +1,68 @@
+// What stands around every page: the rail, the key, the theme, and whether the service still answers.
+
+import { key, setKey } from "./api.js";
+import { fill, h, s } from "./dom.js";
+import { dialog } from "./parts.js";
+import { show } from "./router.js";
+
+const PLACES = [
+  ["/bench", "Bench", "M4 20h16M6 20V9l6-5 6 5v11M10 20v-5h4v5"],
+  ["/campaigns", "Campaigns", "M4 5h16M4 12h10M4 19h7M17 14v6m-3-3h6"],
+  ["/units", "Units", "M12 3l8 4.5v9L12 21l-8-4.5v-9zM4 7.5l8 4.5 8-4.5M12 12v9"],
+  ["/explore", "Explore", "M4 19l5-7 4 3 7-10M4 5v14h16"],
+  ["/recordings", "Recordings", "M3 12h3l2-6 4 12 3-9 2 3h4"],
+  ["/effects", "Effects", "M5 4h11a3 3 0 013 3v13H8a3 3 0 01-3-3zM5 17a3 3 0 013-3h11"],
+];
+
+const icon = (path) => s("svg", { viewBox: "0 0 24 24", fill: "none", stroke: "currentColor", "stroke-width": "1.8", "stroke-linecap": "round", "stroke-linejoin": "round", "aria-hidden": "true" }, s("path", { d: path }));
+
+export function shell() {
+  const links = PLACES.map(([path, name, drawing]) => h("a", { href: path }, icon(drawing), name));
+  const theme = h("button", { type: "button", class: "button quiet tiny wide", onclick: swap });
+  const keys = h("button", { type: "button", class: "button quiet tiny wide", onclick: () => askKey() });
+  const name = () => {
+    fill(theme, document.documentElement.dataset.theme === "dark" ? "Light colours" : "Dark colours");
+    fill(keys, key() ? "Forget the key" : "Use a key");
+  };
+  name();
+
+  function swap() {
+    const dark = document.documentElement.dataset.theme !== "dark";
+    document.documentElement.dataset.theme = dark ? "dark" : "light";
+    localStorage.setItem("labctl.theme", dark ? "dark" : "light");
+    name();
+    window.dispatchEvent(new CustomEvent("labctl:theme"));
+  }
+
+  let asking = false;
+  async function askKey(why) {
+    if (key() && !why) {
+      setKey(null);
+      name();
+      return show();
+    }
+    if (asking) return null;
+    asking = true;
+    const given = await dialog("This service asks for a key", [{ name: "key", label: "Key", type: "password", hint: "Made by `labctl key create`; kept in this tab until it is closed." }], { text: why, confirm: "Use it" });
+    asking = false;
+    if (!given) return null;
+    setKey(given.key.trim());
+    name();
+    return show();
+  }
+
+  window.addEventListener("labctl:key", (event) => askKey(event.detail ?? "Reading asks for a viewer's key, acting for an operator's."));
+  window.addEventListener("labctl:moved", () => links.forEach((link) => {
+    const here = location.pathname === link.pathname || location.pathname.startsWith(`${link.pathname}/`);
+    here ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current");
+  }));
+
+  document.body.append(
+    h("a", { class: "skip", href: "#main" }, "To the page"),
+    h("div", { class: "rail" },
+      h("a", { class: "brand", href: "/" }, h("img", { src: "/static/mark.svg", alt: "" }), "labctl"),
+      h("nav", { "aria-label": "Pages" }, links),
+      h("div", { class: "rail-foot" }, theme, keys)),
+    h("main", { id: "main", tabindex: "-1" }),
+    h("div", { class: "toasts", "aria-live": "polite" }));
+}

@@ -1,0 +1,57 @@
+// The first page: what there is, or, in an empty house, the three ways to begin.
+
+import { get, post } from "../core/api.js";
+import { h } from "../core/dom.js";
+import { button, card, head } from "../core/parts.js";
+import { go } from "../core/router.js";
+
+export async function page({ signal }) {
+  const [units, campaigns, benches] = await Promise.all(["/api/units", "/api/campaigns", "/api/benches"].map((path) => get(path, { signal })));
+  if (units.length || campaigns.length) return overview(units, campaigns, benches);
+  return h("div", { class: "page" },
+    head("Begin", "Nothing has been measured yet. Three ways to the first calibration, one press each."),
+    h("div", { class: "columns" },
+      card("See it find a hidden effect",
+        h("p", {}, "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out what is missing."),
+        button("Simulate a recording", simulated, { kind: "first" })),
+      card("Look at a real gyro",
+        h("p", {}, "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. Why is the fit fifteen times worse than the noise?"),
+        button("Open the real gyro", example)),
+      card("Bring your own data",
+        h("p", {}, "A folder in the interchange format: recording.toml and its data file, as CSV or Parquet."),
+        h("a", { class: "button", href: "/recordings" }, "Import a recording")),
+      benches.length ? card(`Run a campaign on ${benches[0].name}`,
+        h("p", {}, "Choose a recipe, see what it could find, and start."),
+        h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign")) : null));
+}
+
+/** Made, fitted, and opened where it fails. */
+async function simulated() {
+  const made = await post("/api/recordings/simulated", { recipe: "ojeda2000-121", hide: ["scale_factor_asymmetry=0.0002"], seed: 1 });
+  await explored(made.serial, made.recording, "ojeda2000");
+}
+
+async function example() {
+  const made = await post("/api/recordings/example", { name: "osu-fog" });
+  await explored(made.serial, made.recording, "bias_scale");
+}
+
+async function explored(serial, recording, model) {
+  const fitted = await post(`/api/units/${encodeURIComponent(serial)}/calibrations`, { recording, model });
+  await go(`/explore?unit=${encodeURIComponent(serial)}&version=${fitted.version}&recording=${recording}`);
+}
+
+function overview(units, campaigns, benches) {
+  const running = campaigns.find((campaign) => ["running", "paused", "suspended", "starting"].includes(campaign.state));
+  return h("div", { class: "page" },
+    head("labctl", "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall."),
+    h("div", { class: "columns" },
+      card("Bench", benches.length
+        ? h("p", {}, running ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.` : `${benches[0].name} is free.`)
+        : h("p", {}, "This service drives no bench."),
+      h("div", { class: "row" }, h("a", { class: "button first", href: "/bench" }, "To the bench"), h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"))),
+      card("Units", h("ul", { class: "plain" }, units.slice(0, 6).map((unit) => h("li", { class: "row spread" },
+        h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
+        h("a", { href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "explore"))))),
+      card("Data", h("div", { class: "row" }, h("a", { class: "button", href: "/recordings" }, "Import a recording"), button("Simulate a hidden effect", simulated), button("Open the real gyro", example)))));
+}
