@@ -119,11 +119,11 @@ def criticise(
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, base, None, None)
     weighed = weigh(data, forward, catalogue)
-    verdict, explained = _ask(data, forward, weighed, catalogue)
+    verdict, explained, last = _ask(data, forward, weighed, catalogue)
     if not full:
         return Criticism(verdict, data, None, None, weighed)
     assert base is not None
-    left = residuals_of(weighed)
+    left = residuals_of(weighed, last)
     direct = fit_context(context, _direct(model)).error.rms_dps if model.argument == "output" else None
     return Criticism(
         verdict, data, base, direct, weighed, left,
@@ -158,15 +158,17 @@ def _too_little(data: Compressed, model: ErrorModel) -> str | None:
     return None
 
 
-def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> tuple[Verdict, float]:
-    """Ask, add what is named, and ask again, until nothing more is."""
+def _ask(
+    data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]
+) -> tuple[Verdict, float, Weighed]:
+    """Ask, add what is named, and ask again, until nothing more is; returns also what was weighed last."""
     depends = channels_behind(first)
     weighed, step = _judged(first, catalogue)
     explained = _explained(weighed)
     if step.form == "unexplained":
         pair = _pair(data, model, weighed, catalogue)
         found = replace(pair, depends_on=depends) if pair else Verdict(step.form, depends_on=step.depends_on or depends)
-        return found, explained
+        return found, explained, weighed
     form: Form = step.form
     groups: list[tuple[str, ...]] = []
     terms: dict[str, Term] = {}
@@ -183,7 +185,7 @@ def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping
             break  # what is left of a named effect is its shape, not another cause
     if len(groups) > 1:
         form = "missing" if all(len(group) == 1 for group in groups) else "ambiguous"
-    return Verdict(form, tuple(groups), depends if groups else (), terms=terms), explained
+    return Verdict(form, tuple(groups), depends if groups else (), terms=terms), explained, weighed
 
 
 def _known(groups: list[tuple[str, ...]]) -> set[str]:
