@@ -43,9 +43,10 @@ function dressed(layout) {
 /**
  * Make a picture. `draw()` gives {data, layout}; it is called again when the colours change.
  * `csv()` gives [[heading, ...], [value, ...], ...]; without it the traces' own x, y, z are saved.
- * Returns an element with `.update()` (draw again) and `.plot` (Plotly's element, once it is drawn).
+ * Returns an element with `.update()` (draw), `.redraw()` (draw again, if it was drawn), `.plot` (Plotly's element) and
+ * `.ondrawn(plot)`, to be set by whoever listens to it.
  */
-export function figure(name, caption, draw, { tall = "20rem", csv, onready } = {}) {
+export function figure(name, caption, draw, { tall = "20rem", csv } = {}) {
   const plot = h("div", { class: "plot", role: "img", "aria-label": `${name}. ${caption ?? ""}` });
   const tool = (text, act, label) => h("button", { type: "button", class: "button quiet tiny", "aria-label": `Save ${name} as ${label}`, onclick: act }, text);
   const element = h("figure", { class: "figure", style: `--tall: ${tall}` },
@@ -72,9 +73,10 @@ export function figure(name, caption, draw, { tall = "20rem", csv, onready } = {
     await Plotly.react(plot, data, dressed(layout), { displaylogo: false, responsive: true, displayModeBar: "hover", modeBarButtonsToRemove: ["toImage"], ...(layout.labctlConfig ?? {}) });
     if (first) {
       drawn.add(element);
-      onready?.(plot);
+      element.ondrawn?.(plot);
     }
   };
+  element.redraw = () => plot.data && element.update();
   // drawn when it is near the window: a page with ten pictures opens as fast as one with two
   new IntersectionObserver((entries, observer) => {
     if (!entries.some((entry) => entry.isIntersecting)) return;

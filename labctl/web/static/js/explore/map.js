@@ -1,0 +1,87 @@
+// Residual over floor in rate x temperature: where the model fails, at a glance. Cells can be picked.
+
+import { colour, DIVERGING, figure } from "../core/figure.js";
+import { number } from "../core/format.js";
+import { levels, rowsOf } from "./rows.js";
+
+const LIMITS = [3, 10];
+const DIMMED_BELOW = 2;
+
+/** The largest residual over floor of several criticisms, within what a scale should end at. */
+export function scaleOf(...all) {
+  const largest = Math.max(...all.map((rows) => rows.score.reduce((most, score) => Math.max(most, Math.abs(score)), 0)));
+  return Math.min(Math.max(largest, LIMITS[0]), LIMITS[1]);
+}
+
+/** Cells of one position: their centres, mean scores and data sets. */
+function cells(rows, position) {
+  const here = rows.position.map((p, k) => (p === position ? k : -1)).filter((k) => k >= 0);
+  const [rates, across] = levels(here.map((k) => rows.channels.table_rate_dps[k]), 1e-3);
+  const [warm, down] = levels(here.map((k) => rows.channels.temperature_c[k]), 1, 30);
+  const found = new Map();
+  here.forEach((k, i) => {
+    const id = `${down[i]} ${across[i]}`;
+    const cell = found.get(id) ?? found.set(id, { row: down[i], column: across[i], sum: 0, sets: [] }).get(id);
+    cell.sum += rows.score[k];
+    cell.sets.push(rows.dataset[k]);
+  });
+  return { rates: rates.map((v) => number(v, 4)), warm: warm.map((v) => number(v, 3)), cells: [...found.values()] };
+}
+
+/** The traces and axes of one position; `id` is "" or the panel's number from 2 on, as Plotly counts axes. */
+function panel(rows, position, id, limit, pick) {
+  const { rates, warm, cells: all } = cells(rows, position);
+  const grid = () => warm.map(() => rates.map(() => null));
+  const [z, dim] = [grid(), grid()];
+  for (const cell of all) {
+    const mean = cell.sum / cell.sets.length;
+    z[cell.row][cell.column] = mean;
+    if (Math.abs(mean) * Math.sqrt(cell.sets.length) < DIMMED_BELOW) dim[cell.row][cell.column] = 1;
+  }
+  const axes = { xaxis: `x${id}`, yaxis: `y${id}` };
+  const shade = colour("card");
+  const heat = { type: "heatmap", ...axes, x: rates, y: warm, xgap: 1, ygap: 1, hoverinfo: "skip" };
+  const mark = (which, marker, name) => ({
+    type: "scatter", mode: "markers", name, ...axes, showlegend: false, marker,
+    x: which.map((cell) => rates[cell.column]), y: which.map((cell) => warm[cell.row]), customdata: which.map((cell) => cell.sets),
+    text: which.map((cell) => `${rates[cell.column]} deg/s, ${warm[cell.row]} deg C, ${position} up<br>${number(cell.sum / cell.sets.length, 2)} floors<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`),
+    hovertemplate: "%{text}<extra></extra>", selected: { marker: { opacity: marker.opacity ?? 1 } }, unselected: { marker: { opacity: marker.opacity ?? 1 } },
+  });
+  const picked = all.filter((cell) => cell.sets.some((set) => pick.has(set)));
+  return {
+    data: [
+      { ...heat, z, zmin: -limit, zmax: limit, colorscale: DIVERGING, showscale: id === "", colorbar: { title: { text: "floors" }, thickness: 12, outlinewidth: 0 }, name: `${position} up` },
+      { ...heat, z: dim, colorscale: [[0, shade], [1, shade]], opacity: 0.6, showscale: false, name: "within noise" },
+      mark(all, { size: 18, opacity: 0.01, symbol: "square" }, "cells"),
+      mark(picked, { size: 13, symbol: "square-open", color: colour("ink"), line: { width: 2.5 } }, "picked"),
+    ],
+    x: { type: "category", categoryorder: "array", categoryarray: rates, showgrid: false, title: { text: "table rate, deg/s" } },
+    y: { type: "category", categoryorder: "array", categoryarray: warm, showgrid: false, title: id === "" ? { text: "deg C" } : undefined },
+  };
+}
+
+/** The map of an axis, a panel for each position. `give()` returns {rows, limit, pick}. */
+export function map(name, caption, give, { pickable = true, tall = "22rem" } = {}) {
+  const draw = () => {
+    const { rows, limit, pick = new Set() } = give();
+    const positions = [...new Set(rows.position)];
+    const several = positions.length > 1;
+    const layout = { margin: { l: 52, r: 8, t: several ? 28 : 10, b: 46 }, dragmode: pickable ? "select" : false };
+    if (several) layout.grid = window.innerWidth < 760 ? { rows: positions.length, columns: 1, pattern: "independent", ygap: 0.35 } : { rows: 1, columns: positions.length, pattern: "independent", xgap: 0.14 };
+    const data = positions.flatMap((position, k) => {
+      const id = k ? String(k + 1) : "";
+      const { data: traces, x, y } = panel(rows, position, id, limit, pick);
+      layout[`xaxis${id}`] = x;
+      layout[`yaxis${id}`] = y;
+      return traces;
+    });
+    if (several) layout.annotations = positions.map((position, k) => ({ text: `${position} up`, showarrow: false, xref: `x${k ? k + 1 : ""} domain`, yref: `y${k ? k + 1 : ""} domain`, x: 0, y: 1.02, xanchor: "left", yanchor: "bottom", font: { size: 12 } }));
+    return { data, layout };
+  };
+  return figure(name, caption, draw, { tall });
+}
+
+/** The data sets under a Plotly click or selection on a map. */
+export const setsUnder = (event) => [...new Set((event?.points ?? []).flatMap((point) => point.customdata ?? []))];
+
+export const rowsFor = (state) => rowsOf(state.criticism, state.axis);
