@@ -12,7 +12,7 @@ from labctl.fitting.effects import read_formula
 from labctl.services import calibrations as services
 from labctl.services import criticism as criticism_services
 from labctl.services.acts import CertifyRequest, FitRequest, ImproveRequest
-from labctl.services.answers import CalibrationRow, Certified, CriticismAnswer, FitAnswer, LadderAnswer
+from labctl.services.answers import CalibrationRow, Certified, CriticismAnswer, FitAnswer, LadderAnswer, VersionAnswer
 from labctl.services.uncertainty import UncertaintyAnswer, uncertainty_at
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
@@ -55,6 +55,18 @@ def fit(serial: str, request: FitRequest, house: HouseOf) -> FitAnswer:
 def improve(serial: str, version: int, request: ImproveRequest, house: HouseOf) -> FitAnswer:
     """Add effects to a version, or take some out, and fit everything again; it becomes the unit's next version."""
     return house.acts().improve(serial, request.model_copy(update={"version": version}))
+
+
+@router.get("/calibrations/{version}", summary="One version")
+def one_version(serial: str, version: int, house: HouseOf) -> VersionAnswer:
+    """The version as its fit answered, when and from what it was made, and whether it is in force."""
+    return services.one_version(house.store, serial, version)
+
+
+@router.get("/certifications", summary="What was certified and revoked")
+def certifications(serial: str, house: HouseOf) -> list[Certified]:
+    """Every act of certifying and revoking a version of the unit, newest first: who, why, when, and due when."""
+    return services.list_certifications(house.store, serial)
 
 
 @router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")
