@@ -12,10 +12,13 @@ from labctl.fitting.effects import read_formula
 from labctl.services import calibrations as services
 from labctl.services import criticism as criticism_services
 from labctl.services.acts import CertifyRequest, FitRequest, ImproveRequest
-from labctl.services.answers import CalibrationRow, Certified, CriticismAnswer, FitAnswer, LadderAnswer
+from labctl.services.answers import CalibrationRow, Certified, CriticismAnswer, FitAnswer, LadderAnswer, VersionAnswer
+from labctl.services.improving import PreviewAnswer, preview_unit
+from labctl.services.residuals import ResidualsAnswer
 from labctl.services.uncertainty import UncertaintyAnswer, uncertainty_at
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
+RecordingNumber = Annotated[int | None, Query(description="Recording; default: the unit's newest.")]
 
 
 @router.head("/calibration", include_in_schema=False)
@@ -57,17 +60,41 @@ def improve(serial: str, version: int, request: ImproveRequest, house: HouseOf) 
     return house.acts().improve(serial, request.model_copy(update={"version": version}))
 
 
+@router.get("/calibrations/{version}", summary="One version")
+def one_version(serial: str, version: int, house: HouseOf) -> VersionAnswer:
+    """The version as its fit answered, when and from what it was made, and whether it is in force."""
+    return services.one_version(house.store, serial, version)
+
+
+@router.get("/certifications", summary="What was certified and revoked")
+def certifications(serial: str, house: HouseOf) -> list[Certified]:
+    """Every act of certifying and revoking a version of the unit, newest first: who, why, when, and due when."""
+    return services.list_certifications(house.store, serial)
+
+
 @router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")
 def criticism(
     serial: str,
     version: int,
     house: HouseOf,
-    recording: Annotated[int | None, Query(description="Recording; default: the unit's newest.")] = None,
+    recording: RecordingNumber = None,
     formula: Annotated[list[str] | None, Query(description="Effects of your own that compete: 'name: expr'.")] = None,
 ) -> CriticismAnswer:
     """What the model leaves, where, which effect may be missing, and what this recording cannot say."""
     competing = [read_formula(line) for line in formula or []]
     return criticism_services.criticise_unit(house.store, serial, version, recording, competing)
+
+
+@router.get("/calibrations/{version}/residuals", summary="What a model leaves, data set by data set")
+def residuals(serial: str, version: int, house: HouseOf, recording: RecordingNumber = None) -> ResidualsAnswer:
+    """The rows behind the map of the criticism, one per data set and axis: measured, modelled, and what is left."""
+    return criticism_services.residuals_unit(house.store, serial, version, recording)
+
+
+@router.post("/calibrations/{version}/preview", summary="What a changed model would be")
+def preview(serial: str, version: int, request: ImproveRequest, house: HouseOf) -> PreviewAnswer:
+    """The same change as `improve` makes, fitted, with its errors before and after; nothing is kept."""
+    return preview_unit(house.store, serial, request.model_copy(update={"version": version}))
 
 
 @router.get("/calibrations/{version}/uncertainty", summary="How far a corrected rate may be off")

@@ -130,6 +130,18 @@ class Certified(Answer):
     due: datetime | None = None
 
 
+class VersionAnswer(FitAnswer):
+    """A calibration version as it was made, and whether it is in force."""
+
+    parent: int | None = None
+    recording: int | None = None
+    created_at: datetime
+    hash: str
+    in_force: bool
+    due: datetime | None = Field(default=None, description="Until when it is in force as certified; null: no date.")
+    certification: Certified | None = Field(description="The newest act on this version; null: there was none.")
+
+
 class UnitAnswer(Answer):
     """Who a unit is and what is known of it."""
 

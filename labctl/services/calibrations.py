@@ -11,9 +11,9 @@ from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
 from labctl.services.acts import CertifyRequest, FitRequest
-from labctl.services.answers import CalibrationRow, Certified, FitAnswer
+from labctl.services.answers import CalibrationRow, Certified, FitAnswer, VersionAnswer
 from labctl.services.recordings import newest_recording
-from labctl.store import NewCalibration, Store
+from labctl.store import CertificationRow, NewCalibration, Store
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,31 @@ def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
         )
         for row in store.calibrations.of_unit(store.units.get(serial).serial)
     ]
+
+
+def one_version(store: Store, serial: str, version: int) -> VersionAnswer:
+    """Return a version as it was made, and whether it is in force. Raises NotFound."""
+    row = store.calibrations.get(store.units.get(serial).serial, version)
+    history = store.calibrations.history(serial)
+    in_force = bool(history) and history[0].act == "certify" and history[0].version == version
+    last = next((_certified(act) for act in history if act.version == version), None)
+    beside = {
+        "parent": row.parent, "recording": row.recording, "created_at": row.created_at, "hash": row.hash,
+        "in_force": in_force, "due": last.due if last is not None and in_force else None, "certification": last,
+    }  # fmt: skip
+    return VersionAnswer.model_validate({**row.answer, **beside})
+
+
+def list_certifications(store: Store, serial: str) -> list[Certified]:
+    """Return every act of certifying and revoking, newest first. Raises NotFound."""
+    return [_certified(row) for row in store.calibrations.history(store.units.get(serial).serial)]
+
+
+def _certified(row: CertificationRow) -> Certified:
+    act: Literal["certify", "revoke"] = "certify" if row.act == "certify" else "revoke"
+    return Certified(
+        serial=row.serial, version=row.version, act=act, by=row.by, reason=row.reason, at=row.at, due=row.due_at
+    )
 
 
 def _error(answer: Any, key: str) -> float | None:

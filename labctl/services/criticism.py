@@ -1,35 +1,29 @@
-"""Criticism: a calibration version held against a recording, an effect added to it, and the ladder of versions."""
+"""Criticism: a calibration version held against a recording, and the ladder of versions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 import tomli_w
 
-from labctl.calibration import build_calibration
 from labctl.errors import BadInput
-from labctl.fitting import FitResult
-from labctl.fitting.context import context_of
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.compress import thin
-from labctl.fitting.effects import CATALOGUE, Effect, Formula, Term, formulas, kind_of, parse_term, read_formula
-from labctl.fitting.fit import fit_context
+from labctl.fitting.effects import CATALOGUE, Effect, Formula, formulas
 from labctl.fitting.model import ErrorModel
-from labctl.fitting.presets import changed
 from labctl.recording import Recording
-from labctl.services.acts import ImproveRequest
-from labctl.services.answers import CriticismAnswer, FitAnswer, LadderAnswer, LadderRow
+from labctl.services.answers import Answer, CriticismAnswer, LadderAnswer, LadderRow
 from labctl.services.criticism_text import answer_of
 from labctl.services.experiments import experiments_for
-from labctl.services.kept import kept
+from labctl.services.kept import kept_among
 from labctl.services.recordings import newest_recording
-from labctl.store import CalibrationRecord, NewCalibration, Store
+from labctl.services.residuals import ResidualsAnswer, residual_columns
+from labctl.store import CalibrationRecord, Store
 
+A = TypeVar("A", bound=Answer)
 ERRORS = ("raw_rms_dps", "rms_dps", "heldout_rms_dps", "noise_floor_dps")
 
 
@@ -37,19 +31,35 @@ def criticise_unit(
     store: Store, serial: str, version: int | None, recording: int | None, competing: Sequence[Formula] = ()
 ) -> CriticismAnswer:
     """Hold a version (default: the newest) against a recording (default: the newest). Raises NotFound, BadInput."""
-    row = _version(store, serial, version)
+    return _held(CriticismAnswer, store, serial, version, recording, competing)
+
+
+def residuals_unit(store: Store, serial: str, version: int | None, recording: int | None) -> ResidualsAnswer:
+    """Return what the same criticism leaves, data set by data set. Raises NotFound, BadInput."""
+    return _held(ResidualsAnswer, store, serial, version, recording, ())
+
+
+def _held(
+    kind: type[A], store: Store, serial: str, version: int | None, recording: int | None, competing: Sequence[Formula]
+) -> A:
+    """Return one of the answers of a criticism; whichever is asked first, all are kept."""
+    row = version_of(store, serial, version)
     number = newest_recording(store, serial, recording)
     catalogue = _catalogue(competing)
 
-    def work() -> CriticismAnswer:
+    def work() -> list[Answer]:
         found = _criticise(store, number, model_of(row), catalogue)
-        return answer_of(serial, row.version, number, found, experiments_for(store, number, found))
+        columns = residual_columns(found.data, found.residuals, store.recordings.points(number), found.base)
+        return [
+            answer_of(serial, row.version, number, found, experiments_for(store, number, found)),
+            ResidualsAnswer(serial=serial, version=row.version, recording=number, columns=columns),
+        ]
 
     question = {
         "serial": serial, "version": row.version, "model": row.answer["model"], "recording": number,
         "readings": store.recordings.fingerprint(number), "formulas": [[each.id, each.text] for each in competing],
     }  # fmt: skip
-    return kept(CriticismAnswer, question, work)
+    return kept_among(kind, question, work)
 
 
 def _criticise(store: Store, recording: int, model: ErrorModel, catalogue: Mapping[str, Effect]) -> Criticism:
@@ -66,76 +76,6 @@ def readings_of(store: Store, recording: int) -> Recording:
     parts = [thin(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(recording)]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return Recording(info, columns, points.environment)
-
-
-def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> FitAnswer:
-    """Change a version's effects, fit again, keep it as the next. Raises NotFound, BadInput, NotEnoughData."""
-    row = _version(store, serial, request.version)
-    model = model_of(row)
-    number = newest_recording(store, serial, request.recording)
-    points = store.recordings.points(number)
-    context = context_of(points)
-    for effect_id in request.remove:
-        if effect_id not in model.effect_ids:
-            raise BadInput(f"effect {effect_id!r} is not in version {row.version} ({', '.join(model.effect_ids)})")
-    written = [read_formula(line) for line in request.formula]
-    wanted = [*(parse_term(text) for text in request.add), *(Term(f.id, formula=f.text) for f in written)]
-    if not wanted and not request.remove:
-        raise BadInput("say what to change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
-    base, _ = changed(model, (), tuple(request.remove)).build(context)
-    add = tuple(_shaped(store, number, points, base, term) for term in wanted)
-    before = fit_context(context, changed(model))
-    after = fit_context(context, changed(model, add, tuple(request.remove)))
-    return _keep(store, serial, row.version, number, points, before, after, at)
-
-
-def _shaped(store: Store, recording: int, points: Recording, base: ErrorModel, term: Term) -> Term:
-    """Return a term with the order and the nonlinear parameters that fit the recording best."""
-    kind = kind_of(term)
-    if term.order is not None or not (kind.parameters or kind.max_order):
-        return term
-    found = criticise(readings_of(store, recording), base, {kind.id: kind}, points=points, shape_only=True)
-    shape = found.verdict.terms.get(kind.id)
-    return replace(shape, steady=True) if shape is not None else term
-
-
-def _keep(
-    store: Store, serial: str, parent: int, recording: int, points: Recording, before: FitResult, after: FitResult,
-    at: datetime,
-) -> FitAnswer:  # fmt: skip
-    made = {"recording": recording, "improved_from": parent}
-
-    def build(version: int) -> NewCalibration:
-        calibration = build_calibration(
-            points.info, after, version=version, parent=parent, issued_at=at, provenance=made
-        )
-        answer = {
-            "serial": serial, "version": version, "parent": parent, **after.to_json(), **made,
-            "before": before.error.to_dict(), "plausible": plausible(after, points.info.technology or ""),
-            "left_out": list(calibration.document["left_out"]), "hash": calibration.hash,
-        }  # fmt: skip
-        return NewCalibration(
-            parent, recording, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
-        )
-
-    return FitAnswer.model_validate(dict(store.calibrations.add(serial, at, build).answer))
-
-
-def plausible(result: FitResult, technology: str) -> dict[str, dict[str, Any]]:
-    """Return effect -> the range its first coefficient usually lies in, and whether it does on every axis."""
-    found: dict[str, dict[str, Any]] = {}
-    for term in result.fitted.model.terms:
-        span = kind_of(term).ranges.get(technology)
-        if span is None:
-            continue
-        sizes = [
-            float(np.max(np.abs(fit.values[fit.effects.index(term.effect)])))
-            for fit in result.fitted.axes.values()
-            if term.effect in fit.effects
-        ]
-        limit = max(abs(span[0]), abs(span[1]))
-        found[term.effect] = {"from": span[0], "to": span[1], "inside": all(size <= limit for size in sizes)}
-    return found
 
 
 def ladder(store: Store, serial: str) -> LadderAnswer:
@@ -162,7 +102,8 @@ def model_of(row: CalibrationRecord) -> ErrorModel:
     return ErrorModel.from_dict(record)
 
 
-def _version(store: Store, serial: str, version: int | None) -> CalibrationRecord:
+def version_of(store: Store, serial: str, version: int | None) -> CalibrationRecord:
+    """Return a version, or the newest. Raises NotFound, BadInput where there is none yet."""
     rows = store.calibrations.of_unit(store.units.get(serial).serial)
     if not rows:
         raise BadInput(f"unit {serial!r} has no calibration yet; `labctl fit {serial}` makes the first")

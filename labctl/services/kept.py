@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import TypeVar
+from weakref import WeakValueDictionary
 
 from platformdirs import user_cache_path
 
@@ -25,22 +27,64 @@ A = TypeVar("A", bound=Answer)
 ROOMS = ("instruments", "labctl", "procedures")
 LIBRARIES = ("numpy", "scipy")
 #: The oldest go when there are more; an answer has some 200 kB.
-MOST = 200
+MOST = 400
 
 
 def kept(kind: type[A], question: Mapping[str, object], work: Callable[[], A]) -> A:
     """Return the answer to a question (JSON values), worked out by `work` only when it is not kept yet."""
-    asked = json.dumps({"by": _code(), "kind": kind.__name__, **question}, sort_keys=True)
-    file = user_cache_path("labctl") / "answers" / f"{hashlib.sha256(asked.encode()).hexdigest()}.json"
+    return kept_among(kind, question, lambda: [work()])
+
+
+def kept_among(kind: type[A], question: Mapping[str, object], work: Callable[[], Sequence[Answer]]) -> A:
+    """Return the answer of one kind where one work gives answers of several: all of them are kept.
+
+    Whoever asks the same question meanwhile, also for another kind, waits for that work instead of doing it again.
+    """
+    file = _file(kind, question)
+    if (answer := _read(kind, file)) is not None:
+        return answer
+    with _turn(json.dumps(question, sort_keys=True)):
+        if (answer := _read(kind, file)) is not None:
+            return answer
+        # What is kept is what is said, also the first time: one way through JSON, one answer.
+        said = {type(each): each.model_dump_json() for each in work()}
+        for each, text in said.items():
+            with suppress(OSError):
+                _write(_file(each, question), text)
+        return kind.model_validate_json(said[kind])
+
+
+def _file(kind: type[Answer], question: Mapping[str, object]) -> Path:
+    asked = json.dumps({"by": code_digest(), "kind": kind.__name__, **question}, sort_keys=True)
+    return user_cache_path("labctl") / "answers" / f"{hashlib.sha256(asked.encode()).hexdigest()}.json"
+
+
+def _read(kind: type[A], file: Path) -> A | None:
     with suppress(OSError, ValueError):
         answer = kind.model_validate_json(file.read_bytes())
         file.touch()
         return answer
-    # What is kept is what is said, also the first time: one way through JSON, one answer.
-    said = work().model_dump_json()
-    with suppress(OSError):
-        _write(file, said)
-    return kind.model_validate_json(said)
+    return None
+
+
+class _Turn:
+    """A lock that can be forgotten when nobody holds it."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+
+
+_turns: WeakValueDictionary[str, _Turn] = WeakValueDictionary()
+_turns_guard = threading.Lock()
+
+
+@contextmanager
+def _turn(asked: str) -> Iterator[None]:
+    """One at a time works at the same question, in this process."""
+    with _turns_guard:
+        turn = _turns.setdefault(asked, _Turn())
+    with turn.lock:
+        yield
 
 
 def _write(file: Path, text: str) -> None:
@@ -54,7 +98,7 @@ def _write(file: Path, text: str) -> None:
 
 
 @lru_cache(maxsize=1)
-def _code() -> str:
+def code_digest() -> str:
     """Return a digest of the code that answers, and of the libraries it calculates with."""
     digest = hashlib.sha256(" ".join(version(name) for name in LIBRARIES).encode())
     for source in _sources():

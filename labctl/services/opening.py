@@ -9,7 +9,7 @@ from pathlib import Path
 from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
-from labctl.services import calibrations, criticism, keys, recordings, scheduling
+from labctl.services import calibrations, improving, keys, recordings, scheduling
 from labctl.services.acts import (
     Acts,
     BackupNote,
@@ -46,7 +46,7 @@ class LocalActs:
 
     def improve(self, serial: str, request: ImproveRequest) -> FitAnswer:
         """Change a version's effects and keep the fit as the unit's next version."""
-        return criticism.improve_unit(self._store, serial, request, self._clock.utc())
+        return improving.improve_unit(self._store, serial, request, self._clock.utc())
 
     def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:
         """Make a version the unit's current one."""

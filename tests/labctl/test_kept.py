@@ -46,7 +46,7 @@ def test_the_same_question_is_answered_once(work: Work, ask: Callable[..., Ladde
 
 def test_other_code_answers_anew(work: Work, ask: Callable[..., LadderAnswer], monkeypatch: pytest.MonkeyPatch) -> None:
     ask(version=1)
-    monkeypatch.setattr(keeping, "_code", lambda: "changed")
+    monkeypatch.setattr(keeping, "code_digest", lambda: "changed")
     ask(version=1)
     assert work.times == 2
 

@@ -7,7 +7,8 @@ from labctl.cli.criticism import ladder_lines
 from labctl.cli.demo.stage import Stage
 from labctl.services.acts import ImproveRequest
 from labctl.services.answers import CriticismAnswer
-from labctl.services.criticism import criticise_unit, improve_unit, ladder
+from labctl.services.criticism import criticise_unit, ladder
+from labctl.services.improving import improve_unit
 
 SERIAL = "FOG-0002"
 HIDDEN = {"scale_factor_asymmetry": 2e-4}

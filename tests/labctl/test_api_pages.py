@@ -1,0 +1,145 @@
+"""HTTP: what the pages ask for, beside what the command line says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from instruments.clock import SystemClock, VirtualClock
+from labctl.api import create_app
+from labctl.recording import Recording
+from labctl.services import criticism
+from labctl.services.bench_runner import BenchRunner
+from labctl.services.house import House
+from labctl.services.planning import load_bench
+from labctl.store import Store
+from labctl.store.database import Database
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+FOG = "/api/units/OSU-FOG-2024"
+
+
+@pytest.fixture
+def client(tmp_path: Path) -> Iterator[TestClient]:
+    store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
+    runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
+    with TestClient(create_app(House(store, SystemClock(), runner))) as opened:
+        yield opened
+
+
+@pytest.fixture
+def fog(client: TestClient) -> TestClient:
+    files = [path for path in (EXAMPLES / "osu-fog").iterdir() if path.suffix in {".toml", ".csv"}]
+    sent = client.post("/api/recordings", files=[("files", (path.name, path.read_bytes())) for path in files])
+    assert sent.status_code == 201
+    assert client.post(f"{FOG}/calibrations", json={"model": "ojeda2000"}).status_code == 201
+    return client
+
+
+def test_a_version_says_whether_it_is_in_force(fog: TestClient) -> None:
+    fitted = fog.post(f"{FOG}/calibrations", json={"effects": ["bias", "scale_factor"]}).json()
+    version = fog.get(f"{FOG}/calibrations/2").json()
+    assert version | fitted == version
+    assert (version["recording"], version["parent"], version["in_force"], version["certification"]) == (
+        1, None, False, None,
+    )  # fmt: skip
+    assert version["created_at"].endswith("Z")
+    fog.post(f"{FOG}/calibrations/2/certify", json={"by": "A", "reason": "fits", "due_days": 365})
+    now = fog.get(f"{FOG}/calibrations/2").json()
+    assert now["in_force"] is True
+    assert now["due"] == now["certification"]["due"] > now["created_at"]
+    fog.post(f"{FOG}/calibrations/1/certify", json={"by": "B", "reason": "better"})
+    replaced = fog.get(f"{FOG}/calibrations/2").json()
+    assert (replaced["in_force"], replaced["due"], replaced["certification"]["by"]) == (False, None, "A")
+    assert fog.get(f"{FOG}/calibrations/3").status_code == 404
+
+
+def test_certifications_are_listed_newest_first(fog: TestClient) -> None:
+    assert fog.get(f"{FOG}/certifications").json() == []
+    fog.post(f"{FOG}/calibrations/1/certify", json={"by": "A", "reason": "fits", "due_days": 1})
+    fog.post(f"{FOG}/calibrations/1/revoke", json={"by": "B", "reason": "dropped"})
+    history = fog.get(f"{FOG}/certifications").json()
+    assert [(act["version"], act["act"], act["by"], act["reason"]) for act in history] == [
+        (1, "revoke", "B", "dropped"), (1, "certify", "A", "fits"),
+    ]  # fmt: skip
+    assert history[0]["due"] is None
+    assert history[1]["due"] > history[1]["at"]
+    assert fog.get("/api/units/NOBODY/certifications").status_code == 404
+
+
+def taken_in(client: TestClient, recording: Recording) -> int:
+    """Take a recording in past the door; returns its number."""
+    store: Store = client.app.state.house.store  # type: ignore[attr-defined]
+    return store.recordings.add_import(recording, recording.info.started_at)
+
+
+def by_cell(columns: dict[str, list[Any]], *names: str) -> dict[tuple[str, int], tuple[Any, ...]]:
+    keys = zip(columns["axis"], columns["dataset"], strict=True)
+    return dict(zip(keys, zip(*(columns[name] for name in names), strict=True), strict=True))
+
+
+def test_residuals_are_the_rows_behind_the_map(
+    client: TestClient, triaxial: Callable[[int], Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken_in(client, triaxial(3).campaign(3))
+    path = "/api/units/SIM-3/calibrations"
+    client.post(path, json={"model": "yang2018"})
+    answer = client.get(f"{path}/1/residuals").json()
+    rows = answer["columns"]
+    assert {len(values) for values in rows.values()} == {3 * 630}
+    with monkeypatch.context() as patched:  # one work gives both
+        patched.setattr(criticism, "readings_of", None)
+        maps = client.get(f"{path}/1/criticism").json()["maps"]
+    cells = by_cell(rows, "residual_dps", "over_floor", "table_rate_dps", "temperature_c", "position")
+    for part in maps:
+        for k, number in enumerate(part["dataset"]):
+            names = ("residual_dps", "over_floor", "table_rate_dps", "temperature_c")
+            assert cells[part["axis"], number] == (*(part[name][k] for name in names), part["position"])
+    measured, modelled = np.array(rows["measured_error_dps"]), np.array(rows["modelled_error_dps"])
+    assert measured - modelled == pytest.approx(np.array(rows["residual_dps"]))
+    assert np.array(rows["over_floor"]) * np.array(rows["floor_dps"]) == pytest.approx(np.array(rows["residual_dps"]))
+    across = np.array(rows["axis"]) != np.array(rows["position"])
+    assert not np.any(np.array(rows["own_rate_dps"])[across])
+    assert np.array(rows["own_rate_dps"])[~across] == pytest.approx(np.array(rows["table_rate_dps"])[~across])
+    assert set(rows["n"]) == {600}
+    assert client.get(f"{path}/2/residuals").status_code == 404
+
+
+def test_too_little_for_a_verdict_still_has_rows(client: TestClient, make_points: Callable[..., Recording]) -> None:
+    rate = np.array([-20.0, -10.0, 0.0, 10.0, 20.0])
+    taken_in(client, make_points(rate, np.full(5, 25.0), 1.01 * rate + 0.1))
+    client.post("/api/units/ONE/calibrations", json={"effects": ["bias", "scale_factor"]})
+    assert client.get("/api/units/ONE/calibrations/1/criticism").json()["verdict"] == "insufficient_data"
+    rows = client.get("/api/units/ONE/calibrations/1/residuals").json()["columns"]
+    assert rows["measured_error_dps"] == pytest.approx(list(0.01 * rate + 0.1))
+    assert rows["residual_dps"] == pytest.approx([0.0] * 5, abs=1e-9)
+    assert rows["n"] == [None] * 5
+
+
+def test_a_preview_is_what_improve_makes_and_changes_nothing(
+    client: TestClient, make_points: Callable[..., Recording], grid_11_by_11: tuple[np.ndarray, np.ndarray]
+) -> None:
+    rate, warm = grid_11_by_11
+    noise = np.random.default_rng(1).normal(0, 0.001, len(rate))
+    taken_in(client, make_points(rate, warm, 1.01 * rate + 0.002 * np.abs(rate) + 0.1 + noise))
+    unit = "/api/units/ONE/calibrations"
+    client.post(unit, json={"effects": ["bias", "scale_factor"]})
+    path, change = f"{unit}/1", {"add": ["scale_factor_asymmetry"]}
+    store: Store = client.app.state.house.store  # type: ignore[attr-defined]
+    before = store.audit.rows()
+    preview = client.post(f"{path}/preview", json=change)
+    assert preview.status_code == 200, preview.text
+    assert store.audit.rows() == before
+    assert client.get("/api/units/ONE").json()["calibrations"] == [1]
+    seen = preview.json()
+    made = client.post(f"{path}/improve", json=change).json()
+    for name in ("model", "axes", "error", "before", "validity", "plausible", "left_out", "recording", "improved_from"):
+        assert seen[name] == made[name], name
+    assert seen["residuals"] == client.get(f"{unit}/2/residuals").json()["columns"]
+    assert client.post(f"{path}/preview", json={}).status_code == 400
+    assert client.post(f"{path}/preview", json={"add": ["no_such"]}).json()["type"] == "urn:labctl:problem:bad-input"
