@@ -1,0 +1,63 @@
+// Watch the error fall: the ladder of versions, and the map of the version before beside this one's.
+
+import { get } from "../core/api.js";
+import { h } from "../core/dom.js";
+import { colour, figure } from "../core/figure.js";
+import { number, words } from "../core/format.js";
+import { headed, later, table } from "../core/parts.js";
+import { map, rowsFor, scaleOf } from "./map.js";
+import { rowsOf } from "./rows.js";
+
+export function ladderFigure(ladder) {
+  const steps = ladder.steps;
+  const x = steps.map((step) => `v${step.version}`);
+  const line = (key, name, line, symbol) => ({ type: "scatter", mode: "lines+markers", name, x, y: steps.map((step) => step[key]), line, marker: { size: 9, symbol }, text: steps.map((step) => `${step.model}: ${step.effects.map(words).join(", ")}`), hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>" });
+  const draw = () => ({
+    data: [
+      line("raw_rms_dps", "as the unit is", { color: colour("line-strong"), dash: "dot" }, "diamond-open"),
+      line("rms_dps", "after the fit", { color: colour("accent"), width: 2.5 }, "circle"),
+      line("heldout_rms_dps", "at unseen temperatures", { color: colour("warn"), width: 2.5 }, "square"),
+    ],
+    layout: {
+      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: 1, minor: { dtick: "D1", showgrid: false } }, xaxis: { type: "category" },
+      shapes: ladder.noise_floor_dps ? [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: ladder.noise_floor_dps, y1: ladder.noise_floor_dps, line: { color: colour("good"), dash: "dash" } }] : [],
+      annotations: ladder.noise_floor_dps ? [{ xref: "paper", x: 1, y: Math.log10(ladder.noise_floor_dps), text: "noise floor", showarrow: false, xanchor: "right", yanchor: "bottom", font: { color: colour("good"), size: 12 } }] : [],
+    },
+  });
+  return figure("Error ladder", "Each version's RMS error on its own data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.", draw, { tall: "19rem" });
+}
+
+export function watch(state, signal) {
+  const place = h("div", { class: "stack" });
+  const base = `/api/units/${encodeURIComponent(state.serial)}`;
+  later(place, "Climbing down the ladder", async () => {
+    const ladder = await get(`${base}/ladder`, { signal });
+    const here = ladder.steps.find((step) => step.version === state.version);
+    const parts = [ladderFigure(ladder), steps(ladder, state)];
+    if (here?.parent) parts.push(await faded(here.parent));
+    return h("div", { class: "stack" }, parts);
+  });
+
+  async function faded(parent) {
+    const before = await get(`${base}/calibrations/${parent}/criticism`, { query: { recording: state.recording }, signal });
+    const pair = () => [rowsOf(before, state.axis), rowsFor(state)];
+    const one = (k, name) => map(name, null, () => ({ rows: pair()[k], limit: scaleOf(...pair()) }), { pickable: false, tall: "16rem" });
+    const both = [one(0, `Version ${parent}`), one(1, `Version ${state.version}`)];
+    state.onchange((what) => what === "axis" && both.forEach((each) => each.redraw()));
+    return h("div", { class: "columns" }, both.map((each, k) => h("div", {}, h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`), each)));
+  }
+
+  const element = headed("Watch the error fall", null, place);
+  element.id = "watch";
+  return element;
+}
+
+function steps(ladder, state) {
+  return table([
+    { title: "Version", cell: (step) => (step.version === state.version ? h("strong", {}, `${step.version}`) : h("a", { href: `/explore?unit=${encodeURIComponent(state.serial)}&version=${step.version}` }, `${step.version}`)) },
+    { title: "Model", cell: (step) => h("span", {}, step.model, h("span", { class: "soft small" }, step.parent ? ` from version ${step.parent}` : "")) },
+    { title: "Effects", cell: (step) => step.effects.map(words).join(", ") },
+    { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
+    { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
+  ], ladder.steps, { label: "Versions", selected: (step) => step.version === state.version });
+}
