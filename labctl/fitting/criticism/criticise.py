@@ -33,7 +33,7 @@ from labctl.fitting.criticism.verdict import (
     share_removed,
 )
 from labctl.fitting.criticism.views import views_of
-from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh
+from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh, with_noise_of
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.fit import FitResult, fit_context
 from labctl.fitting.model import ErrorModel
@@ -123,12 +123,13 @@ def criticise(
     if not full:
         return Criticism(verdict, data, None, None, weighed)
     assert base is not None
-    left = residuals_of(weighed, last)
+    seen = weighed if last is weighed else with_noise_of(weighed, last)
+    left = residuals_of(seen)
     direct = fit_context(context, _direct(model)).error.rms_dps if model.argument == "output" else None
     return Criticism(
         verdict, data, base, direct, weighed, left,
-        tuple(_suspects(weighed, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)), explained,
-        views_of(weighed, left, recording, catalogue),
+        tuple(_suspects(weighed, seen, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)), explained,
+        views_of(seen, left, recording, catalogue),
     )  # fmt: skip
 
 
@@ -239,14 +240,16 @@ def _explained(first: Weighed) -> float:
     return float(np.clip(1.0 - excess / max(raw, 1e-12), 0.0, 1.0))
 
 
-def _suspects(weighed: Weighed, context: Context, model: ErrorModel, verdict: Verdict) -> list[Suspect]:
+def _suspects(weighed: Weighed, seen: Weighed, context: Context, model: ErrorModel, verdict: Verdict) -> list[Suspect]:
+    """Return what may be missing, best first: ranked as weighed, with sizes as `seen` with the noise that remains."""
     chance = probabilities(weighed.candidates)
     effects = [c for c in weighed.candidates if not c.smooth][:SHOWN]
     found = []
     for candidate in effects:
-        dimensions = sum(int(weighed.axes[a].dimensions[o]) for a, o in candidate.option.items())
+        dimensions = sum(int(seen.axes[a].dimensions[o]) for a, o in candidate.option.items())
+        gain = sum(float(seen.axes[a].gain[o]) for a, o in candidate.option.items())
         tried = sum(len(d.options) for d in weighed.designs.values()) / max(len(weighed.designs), 1)
-        single = float(chdtrc(max(dimensions, 1), candidate.gain))
+        single = float(chdtrc(max(dimensions, 1), gain))
         after = None
         if candidate.log_bf >= 0 and candidate.term is not None:
             term = verdict.terms.get(candidate.id, candidate.term)
@@ -260,8 +263,8 @@ def _suspects(weighed: Weighed, context: Context, model: ErrorModel, verdict: Ve
                 candidate,
                 chance[candidate.id],
                 float(-np.expm1(tried * np.log1p(-min(single, 1 - 1e-16)))),
-                coefficients_of(weighed, candidate),
-                share_removed(weighed, candidate),
+                coefficients_of(seen, candidate),
+                share_removed(seen, candidate),
                 after,
                 group,
             )

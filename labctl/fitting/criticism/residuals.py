@@ -47,24 +47,21 @@ class Residuals:
         return self.means / self.floor_dps
 
 
-def residuals_of(weighed: Weighed, noise_of: Weighed | None = None) -> dict[str, Residuals]:
-    """Return what the base leaves on each axis, at the likeliest noise.
-
-    `noise_of` is the same data beside a fuller model: beside one that misses an effect, that effect looks like drift.
-    """
-    return {axis: _axis(weighed, noise_of or weighed, axis) for axis in weighed.axes}
+def residuals_of(weighed: Weighed) -> dict[str, Residuals]:
+    """Return what the base leaves on each axis, at the likeliest noise."""
+    return {axis: _axis(weighed, axis) for axis in weighed.axes}
 
 
-def _axis(weighed: Weighed, noise_of: Weighed, axis: str) -> Residuals:
-    data, design, found = weighed.data, weighed.designs[axis], noise_of.axes[axis]
+def _axis(weighed: Weighed, axis: str) -> Residuals:
+    data, design, found = weighed.data, weighed.designs[axis], weighed.axes[axis]
     y = data.output[axis] - data.rows_of(data.nodes.rate_dps(axis)[:, None])[:, :, 0]
-    noise, white = found.best.noise, noise_of.white_var[axis]
+    noise, white = found.best.noise, weighed.white_var[axis]
     blocks, _ = factors(noise, white, design.t_s, design.run)
     together = np.concatenate([design.base, y[:, :, None]], axis=2)
     means = np.empty_like(together[0])
     for rows, factor in blocks:
         means[rows] = solve_triangular(factor, together[0][rows], lower=True, check_finite=False)
-    other = stack(together, noise_of.scales[axis], design.present)
+    other = stack(together, weighed.scales[axis], design.present)
     prior = np.diag(np.sqrt(design.precision))[design.precision > 0]
     prior = np.column_stack([prior, np.zeros(len(prior))]) if len(prior) else np.zeros((0, means.shape[1]))
     whole = np.vstack([means, other, prior])
@@ -78,7 +75,7 @@ def _axis(weighed: Weighed, noise_of: Weighed, axis: str) -> Residuals:
         drift,
         noise.tau_s or None,
         float(np.sum((whole[:, -1] - whole[:, :-1] @ (solution / size)) ** 2)),
-        weighed.axes[axis].rows - weighed.axes[axis].base_columns,
+        found.rows - found.base_columns,
     )
 
 
