@@ -18,7 +18,7 @@ from labctl.store import blocks, tables
 from labctl.store.audit import append
 from labctl.store.database import Database
 from labctl.store.means import means_rows, points_columns
-from labctl.store.records import RecordingRow
+from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.units import remember_unit
 
 WHOLE_TABLE = 0
@@ -56,6 +56,10 @@ class Recordings:
     def of_unit(self, serial: str) -> list[RecordingRow]:
         """Return a unit's recordings, newest first."""
         return self._heads(tables.recordings.c.serial == serial)
+
+    def all(self) -> list[RecordingRow]:
+        """Return every recording, newest first."""
+        return self._heads(sa.true())
 
     def _heads(self, condition: sa.ColumnElement[bool]) -> list[RecordingRow]:
         counts = (
@@ -135,6 +139,25 @@ class Recordings:
             ).all()
         for number in numbers:
             yield int(number), self.dataset(recording, int(number))
+
+    def data_sets(self, recording: int) -> list[DataSetRow]:
+        """Return every data set of a recording, also those that were not completed, in order."""
+        d = tables.data_sets.c
+        query = sa.select(
+            d.number, d.state, d.reason, d.position, d.run, d.mounting, d.table_rate_dps, d.table_angle_deg,
+            d.chamber_setpoint_c, d.gate_from_s.label("t_from_s"),
+            d.gate_until_s.label("t_until_s"), d.n, d.lost, d.damaged,
+        )  # fmt: skip
+        with self._database.reading() as connection:
+            rows = connection.execute(query.where(d.recording_id == recording).order_by(d.number))
+            return [DataSetRow(**dict(row)) for row in rows.mappings()]
+
+    def means(self, recording: int) -> list[MeanRow]:
+        """Return mean and standard deviation of every data set and channel, as far as they are kept as rows."""
+        m = tables.data_set_means.c
+        query = sa.select(m.number, m.channel, m.mean, m.std).where(m.recording_id == recording)
+        with self._database.reading() as connection:
+            return [MeanRow(*row) for row in connection.execute(query.order_by(m.channel, m.number))]
 
     def dataset(self, recording: int, number: int) -> dict[str, NDArray[Any]]:
         """Return the readings of one data set, column by column, in the interchange format's units."""
