@@ -145,6 +145,14 @@ def test_a_preview_is_what_improve_makes_and_changes_nothing(
     assert client.post(f"{path}/preview", json={"add": ["no_such"]}).json()["type"] == "urn:labctl:problem:bad-input"
 
 
+@pytest.fixture
+def ran(client: TestClient) -> TestClient:
+    """A service that has run a campaign: recording 1, 15 data sets of 10 s on one axis."""
+    number = client.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
+    assert "campaign done" in client.get(f"/api/campaigns/{number}/events").text
+    return client
+
+
 def test_recordings_and_their_data_sets(fog: TestClient) -> None:
     ran = fog.post("/api/campaigns", json={"recipe": "short"}).json()
     followed = fog.get(f"/api/campaigns/{ran['id']}/events")
