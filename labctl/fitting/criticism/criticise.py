@@ -33,7 +33,7 @@ from labctl.fitting.criticism.verdict import (
     share_removed,
 )
 from labctl.fitting.criticism.views import views_of
-from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh
+from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh, with_noise_of
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.fit import FitResult, fit_context
 from labctl.fitting.model import ErrorModel
@@ -119,16 +119,17 @@ def criticise(
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, base, None, None)
     weighed = weigh(data, forward, catalogue)
-    verdict, explained = _ask(data, forward, weighed, catalogue)
+    verdict, explained, last = _ask(data, forward, weighed, catalogue)
     if not full:
         return Criticism(verdict, data, None, None, weighed)
     assert base is not None
-    left = residuals_of(weighed)
+    seen = weighed if last is weighed else with_noise_of(weighed, last)
+    left = residuals_of(seen)
     direct = fit_context(context, _direct(model)).error.rms_dps if model.argument == "output" else None
     return Criticism(
         verdict, data, base, direct, weighed, left,
-        tuple(_suspects(weighed, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)), explained,
-        views_of(weighed, left, recording, catalogue),
+        tuple(_suspects(weighed, seen, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)), explained,
+        views_of(seen, left, recording, catalogue),
     )  # fmt: skip
 
 
@@ -158,15 +159,17 @@ def _too_little(data: Compressed, model: ErrorModel) -> str | None:
     return None
 
 
-def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> tuple[Verdict, float]:
-    """Ask, add what is named, and ask again, until nothing more is."""
+def _ask(
+    data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]
+) -> tuple[Verdict, float, Weighed]:
+    """Ask, add what is named, and ask again, until nothing more is; returns also what was weighed last."""
     depends = channels_behind(first)
     weighed, step = _judged(first, catalogue)
     explained = _explained(weighed)
     if step.form == "unexplained":
         pair = _pair(data, model, weighed, catalogue)
         found = replace(pair, depends_on=depends) if pair else Verdict(step.form, depends_on=step.depends_on or depends)
-        return found, explained
+        return found, explained, weighed
     form: Form = step.form
     groups: list[tuple[str, ...]] = []
     terms: dict[str, Term] = {}
@@ -183,7 +186,7 @@ def _ask(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping
             break  # what is left of a named effect is its shape, not another cause
     if len(groups) > 1:
         form = "missing" if all(len(group) == 1 for group in groups) else "ambiguous"
-    return Verdict(form, tuple(groups), depends if groups else (), terms=terms), explained
+    return Verdict(form, tuple(groups), depends if groups else (), terms=terms), explained, weighed
 
 
 def _known(groups: list[tuple[str, ...]]) -> set[str]:
@@ -237,14 +240,16 @@ def _explained(first: Weighed) -> float:
     return float(np.clip(1.0 - excess / max(raw, 1e-12), 0.0, 1.0))
 
 
-def _suspects(weighed: Weighed, context: Context, model: ErrorModel, verdict: Verdict) -> list[Suspect]:
+def _suspects(weighed: Weighed, seen: Weighed, context: Context, model: ErrorModel, verdict: Verdict) -> list[Suspect]:
+    """Return what may be missing, best first: ranked as weighed, with sizes as `seen` with the noise that remains."""
     chance = probabilities(weighed.candidates)
     effects = [c for c in weighed.candidates if not c.smooth][:SHOWN]
     found = []
     for candidate in effects:
-        dimensions = sum(int(weighed.axes[a].dimensions[o]) for a, o in candidate.option.items())
+        dimensions = sum(int(seen.axes[a].dimensions[o]) for a, o in candidate.option.items())
+        gain = sum(float(seen.axes[a].gain[o]) for a, o in candidate.option.items())
         tried = sum(len(d.options) for d in weighed.designs.values()) / max(len(weighed.designs), 1)
-        single = float(chdtrc(max(dimensions, 1), candidate.gain))
+        single = float(chdtrc(max(dimensions, 1), gain))
         after = None
         if candidate.log_bf >= 0 and candidate.term is not None:
             term = verdict.terms.get(candidate.id, candidate.term)
@@ -258,8 +263,8 @@ def _suspects(weighed: Weighed, context: Context, model: ErrorModel, verdict: Ve
                 candidate,
                 chance[candidate.id],
                 float(-np.expm1(tried * np.log1p(-min(single, 1 - 1e-16)))),
-                coefficients_of(weighed, candidate),
-                share_removed(weighed, candidate),
+                coefficients_of(seen, candidate),
+                share_removed(seen, candidate),
                 after,
                 group,
             )

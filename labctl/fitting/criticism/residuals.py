@@ -33,6 +33,8 @@ class Residuals:
     white_dps: float
     drift_dps: float
     drift_tau_s: float | None
+    chi2: float  #: of everything that is left, over its noise
+    freedom: int
 
     @property
     def means(self) -> Array:
@@ -46,7 +48,7 @@ class Residuals:
 
 
 def residuals_of(weighed: Weighed) -> dict[str, Residuals]:
-    """Return what the base leaves on each axis, at the noise that the base finds likeliest."""
+    """Return what the base leaves on each axis, at the likeliest noise."""
     return {axis: _axis(weighed, axis) for axis in weighed.axes}
 
 
@@ -72,6 +74,8 @@ def _axis(weighed: Weighed, axis: str) -> Residuals:
         float(np.sqrt(np.mean(white))),
         drift,
         noise.tau_s or None,
+        float(np.sum((whole[:, -1] - whole[:, :-1] @ (solution / size)) ** 2)),
+        found.rows - found.base_columns,
     )
 
 

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from labctl.fitting.channels import Array
 from labctl.fitting.criticism.candidates import Option, base_rows, options_of
 from labctl.fitting.criticism.compress import Compressed
-from labctl.fitting.criticism.evidence import AxisEvidence, Design, evidence, schur, solve_option
+from labctl.fitting.criticism.evidence import AxisEvidence, Design, evidence, gains_of, schur, solve_option
 from labctl.fitting.criticism.noise_grid import Noise, noise_grid
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.model import ErrorModel
@@ -94,6 +94,23 @@ def weigh(
     for axis, design in designs.items():
         axes[axis], whites[axis], scales[axis] = _weigh_axis(data, design, axis)
     return Weighed(data, model, designs, axes, whites, scales, _rank(designs, axes))
+
+
+def with_noise_of(weighed: Weighed, fuller: Weighed) -> Weighed:
+    """Return what was weighed, seen with the noise that is left beside a fuller model of the same data.
+
+    Beside a model that misses an effect, that effect looks like drift. What speaks for each candidate stays as it was.
+    """
+    axes = {}
+    for axis, design in weighed.designs.items():
+        found, other = weighed.axes[axis], fuller.axes[axis]
+        y = weighed.data.output[axis] - weighed.data.rows_of(weighed.data.nodes.rate_dps(axis)[:, None])[:, :, 0]
+        (left,) = schur(design, y, fuller.white_var[axis], fuller.scales[axis], [other.best.noise])
+        gain, dimensions = gains_of(left, found.slices)
+        axes[axis] = replace(
+            found, best=left, gain=gain, dimensions=dimensions, weights=other.weights, noises=other.noises
+        )
+    return replace(weighed, axes=axes, white_var=fuller.white_var, scales=fuller.scales)
 
 
 def _weigh_axis(data: Compressed, design: Design, axis: str) -> tuple[AxisEvidence, Array, NDArray[np.float64]]:
