@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, UploadFile
+from fastapi.responses import StreamingResponse
 
 from labctl.api.rooms import HouseOf
+from labctl.services import looking
 from labctl.services import recordings as services
 from labctl.services.answers import Imported
+from labctl.services.downloads import zip_recording
+from labctl.services.looking import DataSetsAnswer, RecordingAnswer
+from labctl.services.noise_at_rest import AllanAnswer, allan_unit
+from labctl.services.trace import TraceAnswer
+from labctl.services.trace import trace as trace_of
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
@@ -20,10 +27,57 @@ def import_recording(files: list[UploadFile], house: HouseOf) -> Imported:
     return services.import_files(house.acts(), [(file.filename or "", file.file) for file in files])
 
 
+@router.get("", summary="All recordings")
+def all_recordings(house: HouseOf) -> list[RecordingAnswer]:
+    """Every recording, newest first."""
+    return looking.list_recordings(house.store)
+
+
 @router.get("/{recording}", summary="One recording")
 def recording(recording: int, house: HouseOf) -> dict[str, Any]:
     """What the recording is: unit, axes, channels, data sets."""
     return services.describe_recording(house.store, recording)
+
+
+@router.get("/{recording}/datasets", summary="Its data sets")
+def datasets(recording: int, house: HouseOf) -> DataSetsAnswer:
+    """One row per data set, as columns, with mean and standard deviation of every channel; also incomplete ones."""
+    return looking.data_sets(house.store, recording)
+
+
+@router.get("/{recording}/trace", summary="A channel over time")
+def trace(
+    recording: int,
+    house: HouseOf,
+    channel: Annotated[str, Query(description="Such as gyro_x or temperature_c.", max_length=60)],
+    from_s: Annotated[float | None, Query(description="Window, in seconds of the recording; default: all.")] = None,
+    until_s: Annotated[float | None, Query(description="Its end.")] = None,
+    points: Annotated[int, Query(ge=1, le=20_000, description="At most this many bins.")] = 2000,
+) -> TraceAnswer:
+    """Least, largest and mean reading of a channel in bins of equal time, only those that hold readings."""
+    return trace_of(house.store, recording, channel, from_s, until_s, points)
+
+
+@router.get("/{recording}/allan", summary="Its noise at rest")
+def allan(
+    recording: int,
+    house: HouseOf,
+    dataset: Annotated[int | None, Query(description="A data set; default: the longest stretch at rest.")] = None,
+) -> AllanAnswer:
+    """The overlapping Allan deviation of each axis with 95 % intervals, and N, B and K as far as they show."""
+    return allan_unit(house.store, recording, dataset)
+
+
+@router.get("/{recording}/file", summary="The recording to take away", response_class=StreamingResponse)
+def file(
+    recording: int,
+    house: HouseOf,
+    format: Annotated[Literal["parquet", "csv"], Query(description="Of its tables.")] = "parquet",  # noqa: A002
+) -> StreamingResponse:
+    """The recording in the interchange format, every reading, as one zip; it imports again."""
+    made = zip_recording(house.store, recording, format)
+    headers = {"Content-Disposition": f'attachment; filename="{made.name}"', "Content-Length": str(made.size)}
+    return StreamingResponse(made.chunks(), media_type="application/zip", headers=headers)
 
 
 @router.get("/{recording}/samples", summary="Readings of one data set")

@@ -43,14 +43,14 @@ def kept_among(kind: type[A], question: Mapping[str, object], work: Callable[[],
     file = _file(kind, question)
     if (answer := _read(kind, file)) is not None:
         return answer
-    with _turn(json.dumps(question, sort_keys=True)):
+    with one_at_a_time(json.dumps(question, sort_keys=True)):
         if (answer := _read(kind, file)) is not None:
             return answer
         # What is kept is what is said, also the first time: one way through JSON, one answer.
         said = {type(each): each.model_dump_json() for each in work()}
         for each, text in said.items():
             with suppress(OSError):
-                _write(_file(each, question), text)
+                write_kept(_file(each, question), text.encode(), MOST)
         return kind.model_validate_json(said[kind])
 
 
@@ -79,21 +79,22 @@ _turns_guard = threading.Lock()
 
 
 @contextmanager
-def _turn(asked: str) -> Iterator[None]:
-    """One at a time works at the same question, in this process."""
+def one_at_a_time(asked: str) -> Iterator[None]:
+    """Let one thread of this process at a time work at the same question."""
     with _turns_guard:
         turn = _turns.setdefault(asked, _Turn())
     with turn.lock:
         yield
 
 
-def _write(file: Path, text: str) -> None:
+def write_kept(file: Path, content: bytes, most: int) -> None:
+    """Write a file whole or not at all; of its folder's files only the `most` used last stay. Raises OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    with NamedTemporaryFile("w", dir=file.parent, suffix=".part", delete=False, encoding="utf-8") as part:
-        part.write(text)
+    with NamedTemporaryFile("wb", dir=file.parent, suffix=".part", delete=False) as part:
+        part.write(content)
     Path(part.name).replace(file)
     oldest_first = sorted(file.parent.iterdir(), key=lambda path: path.stat().st_mtime)
-    for old in oldest_first[:-MOST]:
+    for old in oldest_first[:-most]:
         old.unlink(missing_ok=True)
 
 

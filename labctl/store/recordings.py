@@ -18,12 +18,22 @@ from labctl.store import blocks, tables
 from labctl.store.audit import append
 from labctl.store.database import Database
 from labctl.store.means import means_rows, points_columns
-from labctl.store.records import RecordingRow
+from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.units import remember_unit
 
 WHOLE_TABLE = 0
 #: A column of these belongs to the data set as a whole.
 OF_THE_SET = ("dataset", "position", "run", "mounting")
+
+
+def _blocks_query() -> sa.Select[int, int, int, bytes]:
+    b = tables.sample_blocks.c
+    ours = (b.recording_id == sa.bindparam("recording"), b.number == sa.bindparam("number"))
+    return sa.select(b.n, b.codec, b.crc32, b.data).where(*ours).order_by(b.seq)
+
+
+#: Made once: it is asked for every data set of a recording.
+_BLOCKS = _blocks_query()
 
 
 class Recordings:
@@ -57,6 +67,10 @@ class Recordings:
         """Return a unit's recordings, newest first."""
         return self._heads(tables.recordings.c.serial == serial)
 
+    def all(self) -> list[RecordingRow]:
+        """Return every recording, newest first."""
+        return self._heads(sa.true())
+
     def _heads(self, condition: sa.ColumnElement[bool]) -> list[RecordingRow]:
         counts = (
             sa.select(
@@ -88,17 +102,25 @@ class Recordings:
         with self._database.reading() as connection:
             return [RecordingRow(*row[:7], int(row[7] or 0), int(row[8] or 0)) for row in connection.execute(query)]
 
-    def fingerprint(self, recording: int) -> str:
-        """Return a digest of all that a recording holds now: equal only where every answer about it is."""
+    def fingerprint(self, recording: int, *, complete: bool = False) -> str:
+        """Return a digest of all that a recording holds now: equal only where every answer about it is.
+
+        With `complete` of its complete data sets alone, so that it stays while the next one is measured.
+        """
         head = self.get(recording)
         d, b, e = tables.data_sets.c, tables.sample_blocks.c, tables.environment.c
+        sets = sa.select(d.number, d.state, d.n).where(d.recording_id == recording).order_by(d.number)
+        packed = sa.select(b.number, b.seq, b.n, b.crc32).where(b.recording_id == recording)
+        if complete:
+            whole = sa.and_(d.recording_id == recording, d.state == "complete")
+            sets, packed = sets.where(whole), packed.where(b.number.in_(sa.select(d.number).where(whole)))
         ours = (
-            sa.select(d.number, d.state, d.n).where(d.recording_id == recording).order_by(d.number),
-            sa.select(b.number, b.seq, b.n, b.crc32).where(b.recording_id == recording).order_by(b.number, b.seq),
+            sets,
+            packed.order_by(b.number, b.seq),
             sa.select(sa.func.count(), sa.func.max(e.t_s)).where(e.recording_id == recording),
         )
         with self._database.reading() as connection:
-            rows = [[tuple(row) for row in connection.execute(query)] for query in ours]
+            rows = [[tuple(row) for row in connection.execute(query)] for query in ours[: 2 if complete else 3]]
         said = json.dumps([head.serial, head.campaign, head.kind, dict(head.info), rows], sort_keys=True)
         return hashlib.sha256(said.encode()).hexdigest()
 
@@ -127,14 +149,36 @@ class Recordings:
 
     def iter_datasets(self, recording: int) -> Iterator[tuple[int, dict[str, NDArray[Any]]]]:
         """Yield (number, columns of readings) of each complete data set, in the order of measurement."""
+        d = tables.data_sets.c
         with self._database.reading() as connection:
-            numbers = connection.scalars(
-                sa.select(tables.data_sets.c.number)
-                .where(tables.data_sets.c.recording_id == recording, tables.data_sets.c.state == "complete")
-                .order_by(tables.data_sets.c.number)
-            ).all()
-        for number in numbers:
-            yield int(number), self.dataset(recording, int(number))
+            heads = connection.execute(
+                sa.select(tables.data_sets).where(d.recording_id == recording, d.state == "complete").order_by(d.number)
+            )
+            rows = [dict(head) for head in heads.mappings()]
+            channels = _channels(connection, recording)
+        for head in rows:
+            with self._database.reading() as connection:
+                columns = _in_units(connection, head, channels)
+            yield int(head["number"]), columns
+
+    def data_sets(self, recording: int) -> list[DataSetRow]:
+        """Return every data set of a recording, also those that were not completed, in order."""
+        d = tables.data_sets.c
+        query = sa.select(
+            d.number, d.state, d.reason, d.position, d.run, d.mounting, d.table_rate_dps, d.table_angle_deg,
+            d.chamber_setpoint_c, d.gate_from_s.label("t_from_s"),
+            d.gate_until_s.label("t_until_s"), d.n, d.lost, d.damaged,
+        )  # fmt: skip
+        with self._database.reading() as connection:
+            rows = connection.execute(query.where(d.recording_id == recording).order_by(d.number))
+            return [DataSetRow(**dict(row)) for row in rows.mappings()]
+
+    def means(self, recording: int) -> list[MeanRow]:
+        """Return mean and standard deviation of every data set and channel, as far as they are kept as rows."""
+        m = tables.data_set_means.c
+        query = sa.select(m.number, m.channel, m.mean, m.std).where(m.recording_id == recording)
+        with self._database.reading() as connection:
+            return [MeanRow(*row) for row in connection.execute(query.order_by(m.channel, m.number))]
 
     def dataset(self, recording: int, number: int) -> dict[str, NDArray[Any]]:
         """Return the readings of one data set, column by column, in the interchange format's units."""
@@ -145,11 +189,20 @@ class Recordings:
             head = connection.execute(chosen).mappings().first()
             if head is None:
                 raise NotFound(f"recording {recording} has no data set {number}")
-            channels = connection.scalar(
-                sa.select(tables.recordings.c.channels).where(tables.recordings.c.id == recording)
-            )
-            raw = _joined(blocks_of(connection, recording, number))
-        return scaled(raw, channels, dict(head)) if channels else raw
+            return _in_units(connection, dict(head), _channels(connection, recording))
+
+
+def _channels(connection: sa.Connection, recording: int) -> list[dict[str, Any]]:
+    query = sa.select(tables.recordings.c.channels).where(tables.recordings.c.id == recording)
+    return connection.scalar(query) or []
+
+
+def _in_units(
+    connection: sa.Connection, head: Mapping[str, Any], channels: list[dict[str, Any]]
+) -> dict[str, NDArray[Any]]:
+    """Return the readings of one data set: as they came in from elsewhere, or in their units from what was sent."""
+    raw = _joined(blocks_of(connection, head["recording_id"], head["number"]))
+    return scaled(raw, channels, head) if channels else raw
 
 
 def new_recording(
@@ -290,11 +343,8 @@ def block_row(recording: int, number: int, seq: int, block: blocks.Block) -> dic
 
 def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[Any]]]:
     """Return the unpacked blocks of a data set, in order."""
-    b = tables.sample_blocks.c
-    query = (
-        sa.select(b.n, b.codec, b.crc32, b.data).where(b.recording_id == recording, b.number == number).order_by(b.seq)
-    )
-    return [blocks.unpack(blocks.Block(*row)) for row in connection.execute(query)]
+    found = connection.execute(_BLOCKS, {"recording": recording, "number": number})
+    return [blocks.unpack(blocks.Block(*row)) for row in found]
 
 
 def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:

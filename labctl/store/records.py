@@ -43,6 +43,36 @@ class RecordingRow:
 
 
 @dataclass(frozen=True)
+class DataSetRow:
+    """One data set, without its readings. Times are seconds of the recording; absent: not known."""
+
+    number: int
+    state: str
+    reason: str
+    position: str
+    run: int
+    mounting: int
+    table_rate_dps: float
+    table_angle_deg: float | None
+    chamber_setpoint_c: float | None
+    t_from_s: float | None
+    t_until_s: float | None
+    n: int
+    lost: int
+    damaged: int
+
+
+@dataclass(frozen=True)
+class MeanRow:
+    """A data set's figures of one channel, in the channel's unit."""
+
+    number: int
+    channel: str
+    mean: float | None
+    std: float | None
+
+
+@dataclass(frozen=True)
 class CampaignRow:
     """One campaign: what was planned and where it is."""
 

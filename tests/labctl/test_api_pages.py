@@ -143,3 +143,36 @@ def test_a_preview_is_what_improve_makes_and_changes_nothing(
     assert seen["residuals"] == client.get(f"{unit}/2/residuals").json()["columns"]
     assert client.post(f"{path}/preview", json={}).status_code == 400
     assert client.post(f"{path}/preview", json={"add": ["no_such"]}).json()["type"] == "urn:labctl:problem:bad-input"
+
+
+@pytest.fixture
+def ran(client: TestClient) -> TestClient:
+    """A service that has run a campaign: recording 1, 15 data sets of 10 s on one axis."""
+    number = client.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
+    assert "campaign done" in client.get(f"/api/campaigns/{number}/events").text
+    return client
+
+
+def test_recordings_and_their_data_sets(fog: TestClient) -> None:
+    ran = fog.post("/api/campaigns", json={"recipe": "short"}).json()
+    followed = fog.get(f"/api/campaigns/{ran['id']}/events")
+    assert "campaign done" in followed.text
+    rows = fog.get("/api/recordings").json()
+    assert [(row["id"], row["serial"], row["kind"], row["campaign"], row["datasets"]) for row in rows] == [
+        (2, "FOG-0001", "samples", 1, 15), (1, "OSU-FOG-2024", "points", None, 695),
+    ]  # fmt: skip
+    assert rows[0]["readings"] == 1500
+    sets = fog.get("/api/recordings/2/datasets").json()
+    columns = {name: values for name, values in sets.items() if isinstance(values, list)}
+    assert {len(values) for values in columns.values()} == {15}
+    assert sets["state"] == ["complete"] * 15
+    assert sets["number"] == list(range(1, 16))
+    assert all(begin < end for begin, end in zip(sets["t_from_s"], sets["t_until_s"], strict=True))
+    points = fog.get("/api/recordings/2").json()["points"]
+    assert sets["channels"]["gyro_z"]["mean"] == points["gyro_z"]
+    assert sets["channels"]["gyro_z"]["std"] == points["gyro_z_std"]
+    imported = fog.get("/api/recordings/1/datasets").json()
+    points = fog.get("/api/recordings/1").json()["points"]
+    assert imported["channels"]["gyro_z"]["mean"] == points["gyro_z"]
+    assert imported["table_rate_dps"] == points["table_rate_dps"]
+    assert fog.get("/api/recordings/3/datasets").status_code == 404
