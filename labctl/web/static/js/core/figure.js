@@ -27,6 +27,10 @@ export function warmth(share) {
   return `rgb(${stops[k].map((low, c) => Math.round(low + (at - k) * (stops[k + 1][c] - low))).join(",")})`;
 }
 
+const TOOLS = [["zoom2d", "pan2d", "select2d", "lasso2d", "resetScale2d"]];
+const TOOLS_3D = [["orbitRotation", "pan3d", "resetCameraDefault3d"]];
+const config = (data) => ({ displaylogo: false, responsive: true, displayModeBar: "hover", modeBarButtons: data.some((trace) => /surface|3d/.test(trace.type)) ? TOOLS_3D : TOOLS });
+
 function dressed(layout) {
   const axis = { gridcolor: colour("line"), zerolinecolor: colour("line-strong"), linecolor: colour("line-strong"), automargin: true, exponentformat: "power", ticks: "outside", tickcolor: colour("line") };
   const own = Object.fromEntries(Object.entries(layout).filter(([name]) => /^[xy]axis\d*$/.test(name)).map(([name, value]) => [name, { ...axis, ...value }]));
@@ -34,6 +38,7 @@ function dressed(layout) {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 12.5, color: colour("soft") },
     margin: { l: 58, r: 16, t: 12, b: 44 }, hovermode: "closest", dragmode: "zoom",
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("line-strong"), activecolor: colour("accent") },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line-strong"), font: { color: colour("ink") } },
     xaxis: axis, yaxis: axis, ...layout, ...own,
@@ -70,7 +75,7 @@ export function figure(name, caption, draw, { tall = "20rem", csv } = {}) {
     waiting = false;
     const { data, layout = {} } = draw();
     const first = !plot.data;
-    await Plotly.react(plot, data, dressed(layout), { displaylogo: false, responsive: true, displayModeBar: "hover", modeBarButtonsToRemove: ["toImage"], ...(layout.labctlConfig ?? {}) });
+    await Plotly.react(plot, data, dressed(layout), config(data));
     if (first) {
       drawn.add(element);
       element.ondrawn?.(plot);

@@ -4,12 +4,20 @@
 export function number(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-5 || size >= 1e7)) return value.toExponential(digits - 1).replace("e", " × 10^").replace("^+", "^");
+  if (size !== 0 && (size < 1e-5 || size >= 1e7)) return power(value, digits);
   const text = Number(value.toPrecision(digits));
   const decimals = size === 0 ? 0 : Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(text) || 1)));
   return text.toFixed(Math.min(decimals, 8));
 }
 
+const RAISED = { "-": "⁻", "+": "", ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])) };
+function power(value, digits) {
+  const [factor, exponent] = value.toExponential(digits - 1).split("e");
+  return `${factor} × 10${[...exponent].map((sign) => RAISED[sign]).join("")}`;
+}
+
+/** A setting as it was meant: -100, 12.5, 0.0042. */
+export const setting = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "–");
 export const withUnit = (value, unit, digits) => (Number.isFinite(value) ? `${number(value, digits)} ${unit}` : "–");
 export const count = (value) => (Number.isFinite(value) ? value.toLocaleString("en-GB") : "–");
 export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)} %` : "–");

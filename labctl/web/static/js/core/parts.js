@@ -32,9 +32,9 @@ export const empty = (...children) => h("div", { class: "empty stack" }, ...chil
 export const busy = (text) => h("p", { class: "busy soft", role: "status" }, text);
 
 /** A table: columns are {title, number?, cell(row)}. */
-export function table(columns, rows, { label, selected, onrow } = {}) {
+export function table(columns, rows, { label, selected, onrow, first } = {}) {
   return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": label },
-    h("table", { class: "data" },
+    h("table", { class: "data", style: first ? `--first: ${first}` : null },
       h("thead", {}, h("tr", {}, columns.map((c) => h("th", { class: c.number ? "number" : null, scope: "col" }, c.title)))),
       h("tbody", {}, rows.map((row) =>
         h("tr", { "aria-selected": selected?.(row) ? "true" : null, onclick: onrow ? () => onrow(row) : null },

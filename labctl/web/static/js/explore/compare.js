@@ -3,7 +3,7 @@
 import { get } from "../core/api.js";
 import { h } from "../core/dom.js";
 import { axisColour, colour, figure, warmth } from "../core/figure.js";
-import { number } from "../core/format.js";
+import { setting } from "../core/format.js";
 import { headed, later, tabs } from "../core/parts.js";
 import { query, remember } from "../core/router.js";
 import { levels } from "./rows.js";
@@ -13,7 +13,7 @@ const VIEWS = [["lines", "Error over rate"], ["warm", "Error over temperature"],
 const AT_REST = 0.01;
 
 export function compare(state, path, signal) {
-  const place = h("div");
+  const place = h("div", { style: "min-height: 28rem" });
   let view = query().view ?? "lines";
   let columns = null;
   const shown = () => later(place, "Reading the data sets", async () => {
@@ -48,7 +48,7 @@ function family(rows, state, along, by, name, unit, other) {
       const here = which.map((w, k) => (w === g ? k : -1)).filter((k) => k >= 0).sort((a, b) => rows[along][a] - rows[along][b]);
       const shade = warmth(centres.length > 1 ? g / (centres.length - 1) : 0.5);
       const x = here.map((k) => rows[along][k]);
-      const label = `${number(centre, 3)} ${other}`;
+      const label = `${setting(centre, 3)} ${other}`;
       return [
         { type: "scatter", mode: "lines", name: label, legendgroup: label, x, y: here.map((k) => rows.modelled_error_dps[k]), line: { color: shade, width: 1.5 }, hoverinfo: "skip" },
         { type: "scatter", mode: "markers", name: `measured at ${label}`, legendgroup: label, showlegend: false, x, y: here.map((k) => rows.measured_error_dps[k]), marker: { color: shade, size: 5 }, customdata: here.map((k) => rows.dataset[k]), hovertemplate: `${label}, data set %{customdata}<br>%{x:.5g} ${unit}: %{y:.4g} deg/s<extra></extra>` },

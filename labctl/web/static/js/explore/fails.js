@@ -6,7 +6,7 @@ import { number } from "../core/format.js";
 import { choice, headed, table } from "../core/parts.js";
 import { query, remember } from "../core/router.js";
 import { map, rowsFor, scaleOf, setsUnder } from "./map.js";
-import { channelName, channelTitle } from "./rows.js";
+import { channelName, channelTitle, scaled } from "./rows.js";
 
 const FIRST = ["table_rate_dps", "temperature_c", "t_s"];
 const LISTED = 12;
@@ -55,7 +55,7 @@ function picks(element, setsOf, state) {
 function scatter(state, channel) {
   const draw = () => {
     const rows = rowsFor(state);
-    const x = rows.channels[channel()];
+    const x = scaled(channel(), rows.channels[channel()]);
     const picked = state.pick.size ? rows.dataset.flatMap((set, k) => (state.pick.has(set) ? [k] : [])) : null;
     const data = [{
       type: "scatter", mode: "markers", name: "residual", x, y: rows.residual, customdata: rows.dataset, selectedpoints: picked,
@@ -63,7 +63,7 @@ function scatter(state, channel) {
       text: rows.dataset.map((set, k) => `data set ${set}: ${number(rows.score[k], 2)} floors`), hovertemplate: "%{text}<br>%{x:.5g}: %{y:.3g} deg/s<extra></extra>",
     }];
     if (state.overlay) {
-      data.push({ type: "scatter", mode: "markers", name: `what ${state.overlay.name} would explain`, x, y: state.overlay.values, customdata: rows.dataset, marker: { size: 5, symbol: "diamond", color: colour("ink") }, hovertemplate: "%{y:.3g} deg/s<extra></extra>" });
+      data.push({ type: "scatter", mode: "markers", name: "explained", x, y: state.overlay.values, customdata: rows.dataset, marker: { size: 5, symbol: "diamond", color: colour("ink") }, hovertemplate: "%{y:.3g} deg/s<extra></extra>" });
     }
     return { data, layout: { dragmode: "select", xaxis: { title: { text: channelTitle(channel()) } }, yaxis: { title: { text: "residual, deg/s" } }, showlegend: Boolean(state.overlay), margin: { l: 62, r: 8, t: state.overlay ? 34 : 8, b: 44 } } };
   };

@@ -44,6 +44,7 @@ export function learn(state, { onadd, explain }) {
     state.draw({ effect: suspect.effect, name: words(suspect.effect), values });
     return fill(drawnNow, `Diamonds in the pictures above: what ${words(suspect.effect)} would explain of the residual.`);
   }, { kind: "tiny" });
+  const speaking = criticism.suspects.filter((s) => s.log_bayes_factor > 0);
   const list = h("div");
   const fillList = () => fill(list, table([
     { title: "Suspect", cell: (s) => h("div", {}, h("a", { href: `/effects/${s.effect}` }, words(s.effect)), " ", named.has(s.effect) ? chip("named", "warn") : null, h("div", { class: "soft small" }, s.explanation)) },
@@ -52,15 +53,15 @@ export function learn(state, { onadd, explain }) {
     { title: "RMS then, deg/s", number: true, cell: (s) => number(s.rms_after_dps) },
     { title: "Unseen then, deg/s", number: true, cell: (s) => number(s.heldout_rms_after_dps) },
     { title: "Coefficient", cell: (s) => coefficient(s, state.axis) },
-    { title: "", cell: (s) => h("div", { class: "row nowrap" }, draw(s), button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "first" : ""}` })) },
-  ], criticism.suspects, { label: "Suspects" }));
+    { title: "", cell: (s) => h("div", { class: "row tight" }, draw(s), button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "first" : ""}` })) },
+  ], speaking, { label: "Suspects", first: "15rem" }));
   fillList();
   state.onchange((what) => {
     fillList();
     if (what === "overlay" && !state.overlay) fill(drawnNow, "Draw a suspect over the residual to see what it would explain.");
   });
   return headed("Learn what is missing", null,
-    criticism.suspects.length ? [drawnNow, list] : h("p", { class: "soft" }, "Nothing of the catalogue speaks for itself here."),
+    speaking.length ? [drawnNow, list] : h("p", { class: "soft" }, "No effect of the catalogue speaks for itself here: each would explain less than its coefficients cost."),
     aliases(criticism), experiments(criticism), unseen(criticism));
 }
 

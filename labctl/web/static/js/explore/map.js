@@ -1,7 +1,7 @@
 // Residual over floor in rate x temperature: where the model fails, at a glance. Cells can be picked.
 
 import { colour, DIVERGING, figure } from "../core/figure.js";
-import { number } from "../core/format.js";
+import { number, setting } from "../core/format.js";
 import { levels, rowsOf } from "./rows.js";
 
 const LIMITS = [3, 10];
@@ -25,33 +25,33 @@ function cells(rows, position) {
     cell.sum += rows.score[k];
     cell.sets.push(rows.dataset[k]);
   });
-  return { rates: rates.map((v) => number(v, 4)), warm: warm.map((v) => number(v, 3)), cells: [...found.values()] };
+  return { rates: rates.map((v) => setting(v)), warm: warm.map((v) => setting(v, 3)), cells: [...found.values()] };
 }
 
 /** The traces and axes of one position; `id` is "" or the panel's number from 2 on, as Plotly counts axes. */
 function panel(rows, position, id, limit, pick) {
   const { rates, warm, cells: all } = cells(rows, position);
   const grid = () => warm.map(() => rates.map(() => null));
-  const [z, dim] = [grid(), grid()];
+  const [z, dim, sets, texts] = [grid(), grid(), grid(), grid()];
   for (const cell of all) {
     const mean = cell.sum / cell.sets.length;
     z[cell.row][cell.column] = mean;
+    sets[cell.row][cell.column] = cell.sets;
+    texts[cell.row][cell.column] = `${rates[cell.column]} deg/s, ${warm[cell.row]} deg C, ${position} up<br>${number(mean, 2)} floors<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
     if (Math.abs(mean) * Math.sqrt(cell.sets.length) < DIMMED_BELOW) dim[cell.row][cell.column] = 1;
   }
   const axes = { xaxis: `x${id}`, yaxis: `y${id}` };
   const shade = colour("card");
-  const heat = { type: "heatmap", ...axes, x: rates, y: warm, xgap: 1, ygap: 1, hoverinfo: "skip" };
+  const heat = { type: "heatmap", ...axes, x: rates, y: warm, xgap: 1, ygap: 1 };
   const mark = (which, marker, name) => ({
     type: "scatter", mode: "markers", name, ...axes, showlegend: false, marker,
-    x: which.map((cell) => rates[cell.column]), y: which.map((cell) => warm[cell.row]), customdata: which.map((cell) => cell.sets),
-    text: which.map((cell) => `${rates[cell.column]} deg/s, ${warm[cell.row]} deg C, ${position} up<br>${number(cell.sum / cell.sets.length, 2)} floors<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`),
-    hovertemplate: "%{text}<extra></extra>", selected: { marker: { opacity: marker.opacity ?? 1 } }, unselected: { marker: { opacity: marker.opacity ?? 1 } },
+    x: which.map((cell) => rates[cell.column]), y: which.map((cell) => warm[cell.row]), customdata: which.map((cell) => cell.sets), hoverinfo: "skip", selected: { marker: { opacity: marker.opacity ?? 1 } }, unselected: { marker: { opacity: marker.opacity ?? 1 } },
   });
   const picked = all.filter((cell) => cell.sets.some((set) => pick.has(set)));
   return {
     data: [
-      { ...heat, z, zmin: -limit, zmax: limit, colorscale: DIVERGING, showscale: id === "", colorbar: { title: { text: "floors" }, thickness: 12, outlinewidth: 0 }, name: `${position} up` },
-      { ...heat, z: dim, colorscale: [[0, shade], [1, shade]], opacity: 0.6, showscale: false, name: "within noise" },
+      { ...heat, z, customdata: sets, text: texts, hovertemplate: "%{text}<extra></extra>", zmin: -limit, zmax: limit, colorscale: DIVERGING, showscale: id === "", colorbar: { title: { text: "floors" }, thickness: 12, outlinewidth: 0 }, name: `${position} up` },
+      { ...heat, z: dim, colorscale: [[0, shade], [1, shade]], opacity: 0.6, showscale: false, hoverinfo: "skip", name: "within noise" },
       mark(all, { size: 18, opacity: 0.01, symbol: "square" }, "cells"),
       mark(picked, { size: 13, symbol: "square-open", color: colour("ink"), line: { width: 2.5 } }, "picked"),
     ],

@@ -48,11 +48,13 @@ export function fromRanges(text) {
 }
 
 export const UNITS = {
-  table_rate_dps: "deg/s", previous_rate_dps: "deg/s", temperature_c: "deg C", chamber_c: "deg C", t_s: "s", power_s: "s", supply_v: "V", humidity_pct: "%",
+  table_rate_dps: "deg/s", previous_rate_dps: "deg/s", temperature_c: "deg C", chamber_c: "deg C", t_s: "h", power_s: "h", supply_v: "V", humidity_pct: "%",
 };
 const NAMES = {
   table_rate_dps: "table rate", previous_rate_dps: "previous rate", temperature_c: "gyro temperature", chamber_c: "chamber temperature",
   t_s: "time", power_s: "time since power-on", supply_v: "supply", humidity_pct: "humidity",
 };
+/** A channel's values in the unit that its title names: hours for what lasts for days. */
+export const scaled = (name, values) => (UNITS[name] === "h" ? values.map((value) => value / 3600) : values);
 export const channelName = (name) => NAMES[name] ?? name.replaceAll("_", " ");
 export const channelTitle = (name) => (UNITS[name] ? `${channelName(name)}, ${UNITS[name]}` : channelName(name));

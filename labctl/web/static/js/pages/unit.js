@@ -1,0 +1,104 @@
+// One unit: who it is, its calibrations and which is in force, how the error fell, and its coefficients.
+
+import { download, get, post } from "../core/api.js";
+import { h } from "../core/dom.js";
+import { day, instant, number } from "../core/format.js";
+import { button, card, chip, dialog, empty, facts, head, headed, later, notice, table } from "../core/parts.js";
+import { query, remember, show } from "../core/router.js";
+import { ladderFigure } from "../explore/watch.js";
+import { coefficients, comparison } from "../unit/coefficients.js";
+
+const FORMATS = [["json", "JSON", "json"], ["c", "C header", "h"]];
+
+export async function page({ params, signal }) {
+  const base = `/api/units/${encodeURIComponent(params.serial)}`;
+  const [unit, rows, history] = await Promise.all([get(base, { signal }), get(`${base}/calibrations`, { signal }), get(`${base}/certifications`, { signal })]);
+  const force = history.find((act) => act.version === unit.certified_version && act.act === "certify");
+  const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
+  return h("div", { class: "page" },
+    head(unit.serial, [unit.model, unit.technology].filter(Boolean).join(" · "), h("a", { class: "button first", href: explore }, "Explore")),
+    h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force, base)),
+    rows.length ? [versions(unit, rows, base, explore), ladder(base, signal), shapes(base, rows, signal)] : empty(h("p", {}, "No calibration yet."), h("p", {}, h("a", { class: "button first", href: explore }, "Fit a model"))),
+    h("div", { class: "columns" },
+      card("Recordings", h("ul", { class: "plain" }, unit.recordings.map((id) => h("li", {}, h("a", { href: `/recordings/${id}` }, `Recording ${id}`))))),
+      card("Certifications", history.length ? acts(history) : h("p", { class: "soft" }, "Nothing has been certified yet."))));
+}
+
+function inForce(unit, rows, force, base) {
+  if (!unit.certified_version) {
+    return notice("warn", h("p", {}, h("strong", {}, "No calibration is in force. "), "Robots that ask for this unit's calibration get none until a version is certified."));
+  }
+  const row = rows.find((each) => each.version === unit.certified_version);
+  const left = force?.due ? Math.ceil((new Date(force.due) - Date.now()) / 86_400_000) : null;
+  return h("div", { class: "stack" }, facts([
+    ["In force", `version ${unit.certified_version}`, null, row?.model],
+    ["Certified by", force?.by ?? "–", null, force ? instant(force.at) : null],
+    ["Due", force?.due ? day(force.due) : "no date", null, left === null ? null : left < 0 ? `${-left} days ago` : `in ${left} days`],
+    ["RMS error", number(row?.rms_dps), "deg/s"],
+    ["At unseen temperatures", number(row?.heldout_rms_dps), "deg/s"],
+  ]), left !== null && left < 0 ? notice("bad", "This calibration is overdue.") : null,
+  h("div", { class: "row" }, FORMATS.map(([format, title, suffix]) => button(`Download ${title}`, () => download(`${base}/calibration?format=${format}`, `${unit.serial}.${suffix}`)))));
+}
+
+function versions(unit, rows, base, explore) {
+  const act = (row) => row.certified
+    ? button("Revoke", () => certify(base, row.version, "revoke"), { kind: "tiny" })
+    : button("Certify", () => certify(base, row.version, "certify"), { kind: "tiny" });
+  return headed("Calibrations", null, table([
+    { title: "Version", cell: (row) => h("span", { class: "row" }, h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`), row.certified ? chip("in force", "good") : null) },
+    { title: "Model", cell: (row) => h("span", {}, row.model, row.parent ? h("span", { class: "soft small" }, ` from ${row.parent}`) : null) },
+    { title: "Made", cell: (row) => instant(row.created_at) },
+    { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
+    { title: "Unseen, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
+    { title: "Hash", cell: (row) => h("code", { title: row.hash }, row.hash.slice(0, 10)) },
+    { title: "", cell: (row) => h("div", { class: "row tight" }, act(row), FORMATS.map(([format, title, suffix]) => button(title, () => download(`${base}/calibration?version=${row.version}&format=${format}`, `${unit.serial}-v${row.version}.${suffix}`), { kind: "tiny quiet" }))) },
+  ], rows, { label: "Calibrations", selected: (row) => row.certified }));
+}
+
+async function certify(base, version, what) {
+  const fields = [{ name: "by", label: "Who" }, { name: "reason", label: "Why" }];
+  if (what === "certify") fields.push({ name: "due_days", label: "Due again in days", type: "number", value: "365", required: false });
+  const said = await dialog(what === "certify" ? `Put version ${version} in force` : `Take version ${version} out of force`, fields, {
+    text: what === "certify" ? "Whoever asks for this unit's calibration gets this version from now on. It is written to the audit trail." : "The unit then has no calibration in force. It is written to the audit trail.",
+    confirm: what === "certify" ? "Certify" : "Revoke", kind: what === "certify" ? "first" : "stop",
+  });
+  if (!said) return;
+  const body = { by: said.by, reason: said.reason };
+  if (said.due_days) body.due_days = Number(said.due_days);
+  await post(`${base}/calibrations/${version}/${what}`, body);
+  await show();
+}
+
+function ladder(base, signal) {
+  const place = h("div", { style: "min-height: 20rem" });
+  later(place, "Climbing down the ladder", async () => ladderFigure(await get(`${base}/ladder`, { signal })));
+  return headed("How the error fell", null, place);
+}
+
+/** Coefficients of one version, or of two beside each other. */
+function shapes(base, rows, signal) {
+  const newest = rows[0].version;
+  let [one, other] = [Number(query().version) || newest, Number(query().beside) || null];
+  const place = h("div");
+  const select = (label, value, none, onchange) => h("label", { class: "row small" }, label, h("select", { onchange: (event) => onchange(Number(event.target.value) || null) },
+    none ? h("option", { value: "" }, "none") : null, rows.map((row) => h("option", { value: row.version, selected: row.version === value }, `version ${row.version}`))));
+  const draw = () => {
+    remember({ version: one === newest ? null : one, beside: other });
+    later(place, "Reading the coefficients", async () => {
+      const [first, second] = await Promise.all([one, other].map((version) => (version ? get(`${base}/calibrations/${version}`, { signal }) : null)));
+      return h("div", { class: "stack" }, second ? comparison(first, second) : null, coefficients(first, second));
+    });
+  };
+  draw();
+  return headed("Coefficients", h("div", { class: "row" }, select("of", one, false, (value) => { one = value; draw(); }), select("beside", other, true, (value) => { other = value; draw(); })), place);
+}
+
+function acts(history) {
+  return table([
+    { title: "When", cell: (act) => instant(act.at) },
+    { title: "What", cell: (act) => `${act.act} version ${act.version}` },
+    { title: "Who", cell: (act) => act.by },
+    { title: "Why", cell: (act) => act.reason },
+  ], history, { label: "Certifications" });
+}
+

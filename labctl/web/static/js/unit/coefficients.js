@@ -1,0 +1,54 @@
+// A version's coefficients: over temperature where it has a table, else as a list; two versions beside each other.
+
+import { h } from "../core/dom.js";
+import { axisColour, colour, figure } from "../core/figure.js";
+import { number, words } from "../core/format.js";
+import { facts, table } from "../core/parts.js";
+
+const ERRORS = [["rms_dps", "RMS"], ["heldout_rms_dps", "at unseen temperatures"], ["noise_floor_dps", "noise floor"]];
+/** Coverage factor of the bars: expanded uncertainty. */
+const K = 2;
+
+/** Errors and effects of two versions. */
+export function comparison(first, second) {
+  const [own, other] = [first, second].map((version) => new Set(version.model.effects));
+  const more = [...own].filter((id) => !other.has(id));
+  const less = [...other].filter((id) => !own.has(id));
+  return h("div", { class: "stack" },
+    facts(ERRORS.map(([key, title]) => [title, number(first.error[key]), "deg/s", `version ${second.version}: ${number(second.error[key])}`])),
+    h("p", {}, `Version ${first.version} `, more.length ? `has ${more.map(words).join(", ")} more` : "has nothing more", less.length ? ` and lacks ${less.map(words).join(", ")}` : "", ` than version ${second.version}.`));
+}
+
+export function coefficients(first, second) {
+  const tabled = Object.values(first.axes).some((axis) => axis.temperature_c || axis.coefficients?.temperature_c);
+  return tabled ? overTemperature(first, second) : list(first, second);
+}
+
+const tableOf = (axis) => axis.coefficients?.temperature_c ? axis.coefficients : axis;
+
+/** A picture for each coefficient: its value over temperature with expanded uncertainty, an axis of the gyro a colour. */
+function overTemperature(first, second) {
+  const names = new Set(Object.values(first.axes).flatMap((axis) => Object.keys(tableOf(axis)).filter((name) => tableOf(axis)[name]?.value)));
+  return h("div", { class: "columns", style: "--least: 24rem" }, [...names].map((name) => {
+    const unit = Object.values(first.axes).map((axis) => tableOf(axis)[name]?.unit).find(Boolean);
+    const lines = (version, faint) => Object.entries(version?.axes ?? {}).filter(([, axis]) => tableOf(axis)[name]?.value).map(([axis, values]) => {
+      const { temperature_c: x, [name]: { value, u } } = tableOf(values);
+      return { type: "scatter", mode: "lines+markers", name: `axis ${axis}${second ? `, v${version.version}` : ""}`, x, y: value, error_y: faint || !u ? undefined : { type: "data", array: u.map((each) => K * each), thickness: 1, width: 2 }, line: { color: axisColour(axis), dash: faint ? "dot" : "solid", width: faint ? 1.2 : 2 }, marker: { size: faint ? 4 : 6 }, opacity: faint ? 0.7 : 1 };
+    });
+    const draw = () => ({ data: [...lines(first, false), ...lines(second, true)], layout: { xaxis: { title: { text: "temperature, deg C" } }, yaxis: { title: { text: unit && unit !== "1" ? `${words(name)}, ${unit}` : words(name), font: { color: colour("soft") } } } } });
+    return h("div", {}, h("h3", {}, words(name)), figure(`Coefficient ${words(name)}`, "Bars: expanded uncertainty, k = 2.", draw, { tall: "17rem" }));
+  }));
+}
+
+function list(first, second) {
+  const rows = Object.entries(first.axes).flatMap(([axis, { coefficients: own }]) => Object.entries(own ?? {}).map(([name, found]) => ({ axis, name, ...found, beside: second?.axes[axis]?.coefficients?.[name] })));
+  return table([
+    { title: "Axis", cell: (row) => row.axis },
+    { title: "Coefficient", cell: (row) => h("code", {}, row.name) },
+    { title: "Value", number: true, cell: (row) => number(row.value, 5) },
+    { title: "Expanded uncertainty, k = 2", number: true, cell: (row) => number(K * row.u, 2) },
+    second ? { title: `Version ${second.version}`, number: true, cell: (row) => (row.beside ? number(row.beside.value, 5) : "–") } : null,
+    second ? { title: "Differs by", number: true, cell: (row) => (row.beside ? `${number(Math.abs(row.value - row.beside.value) / Math.hypot(row.u, row.beside.u), 2)} u` : "–") } : null,
+    { title: "Unit", cell: (row) => (row.unit === "1" ? "–" : row.unit) },
+  ].filter(Boolean), rows, { label: "Coefficients" });
+}
