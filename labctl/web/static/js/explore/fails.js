@@ -46,7 +46,8 @@ export function fails(state) {
 /** Listen for picks of a picture from when it is first drawn. */
 function picks(element, setsOf, state) {
   element.ondrawn = (plot) => {
-    plot.on("plotly_selected", (event) => event && state.choose(setsOf(event)));
+    // drawing again ends a selection once more, with nothing in it
+    plot.on("plotly_selected", (event) => event?.points?.length && state.choose(setsOf(event)));
     plot.on("plotly_click", (event) => state.choose(setsOf(event)));
     plot.on("plotly_deselect", () => state.choose([]));
   };

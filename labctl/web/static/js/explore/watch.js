@@ -8,18 +8,22 @@ import { headed, later, table } from "../core/parts.js";
 import { map, rowsFor, scaleOf } from "./map.js";
 import { rowsOf } from "./rows.js";
 
+/** What the unit is off by itself is left out of the picture, at first, where it would squeeze the fall into a line. */
+const DWARFING = 10;
+
 export function ladderFigure(ladder) {
   const steps = ladder.steps;
   const x = steps.map((step) => `v${step.version}`);
+  const dwarfs = Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) > DWARFING * Math.max(...steps.map((step) => step.rms_dps ?? 0));
   const line = (key, name, line, symbol) => ({ type: "scatter", mode: "lines+markers", name, x, y: steps.map((step) => step[key]), line, marker: { size: 9, symbol }, text: steps.map((step) => `${step.model}: ${step.effects.map(words).join(", ")}`), hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>" });
   const draw = () => ({
     data: [
-      line("raw_rms_dps", "as the unit is", { color: colour("line-strong"), dash: "dot" }, "diamond-open"),
+      { ...line("raw_rms_dps", "as the unit is", { color: colour("line-strong"), dash: "dot" }, "diamond-open"), visible: dwarfs ? "legendonly" : true },
       line("rms_dps", "after the fit", { color: colour("accent"), width: 2.5 }, "circle"),
       line("heldout_rms_dps", "at unseen temperatures", { color: colour("warn"), width: 2.5 }, "square"),
     ],
     layout: {
-      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: 1, minor: { dtick: "D1", showgrid: false } }, xaxis: { type: "category" },
+      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, exponentformat: "none" }, xaxis: { type: "category" },
       shapes: ladder.noise_floor_dps ? [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: ladder.noise_floor_dps, y1: ladder.noise_floor_dps, line: { color: colour("good"), dash: "dash" } }] : [],
       annotations: ladder.noise_floor_dps ? [{ xref: "paper", x: 1, y: Math.log10(ladder.noise_floor_dps), text: "noise floor", showarrow: false, xanchor: "right", yanchor: "bottom", font: { color: colour("good"), size: 12 } }] : [],
     },

@@ -47,7 +47,7 @@ function versions(unit, rows, base, explore) {
   return headed("Calibrations", null, table([
     { title: "Version", cell: (row) => h("span", { class: "row" }, h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`), row.certified ? chip("in force", "good") : null) },
     { title: "Model", cell: (row) => h("span", {}, row.model, row.parent ? h("span", { class: "soft small" }, ` from ${row.parent}`) : null) },
-    { title: "Made", cell: (row) => instant(row.created_at) },
+    { title: "Made", cell: (row) => h("span", { class: "nowrap" }, instant(row.created_at)) },
     { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
     { title: "Unseen, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
     { title: "Hash", cell: (row) => h("code", { title: row.hash }, row.hash.slice(0, 10)) },
