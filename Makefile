@@ -11,7 +11,7 @@ demo: install
 	@$(BIN)/labctl demo
 
 test: $(VENV)/.tested
-	@scripts/need-compiler
+	@scripts/need-machine
 	@$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: $(VENV)/.tested

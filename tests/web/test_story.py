@@ -1,0 +1,59 @@
+"""The whole story as a person lives it: run a campaign with a hidden effect, fit, see, learn, add, watch, certify."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.web.conftest import Service
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = pytest.mark.timeout(400)
+
+
+def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    service.post("/api/campaigns", {"recipe": "ojeda2000-121", "hide": ["scale_factor_asymmetry=0.0002"]})
+    page = visit("/bench")
+    expect(page.locator("main")).to_contain_text("ojeda2000-121")
+    service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")  # type: ignore[index]
+
+    page.goto(f"{service.url}/explore")
+    page.get_by_label("Model").select_option("ojeda2000")
+    page.get_by_role("button", name="Fit").click()
+    verdict = page.get_by_role("region", name="Verdict")
+    expect(verdict).to_contain_text("Missing: scale_factor_asymmetry")
+
+    learn = page.get_by_role("region", name="Learn what is missing")
+    learn.get_by_role("button", name="Draw").first.click()
+    expect(learn).to_contain_text("what scale factor asymmetry would explain")
+    learn.get_by_role("button", name="Add", exact=True).first.click()
+    adding = page.get_by_role("region", name="Add it")
+    expect(adding).to_contain_text("Left after the fit")
+    adding.get_by_role("button", name="Make version 2").click()
+    page.wait_for_url("**version=2**")
+    expect(page.get_by_role("region", name="Verdict")).to_contain_text("Nothing is missing")
+    expect(page.get_by_role("region", name="Watch the error fall")).to_contain_text("Version 1: what was left")
+
+    ladder = service.get("/api/units/FOG-0001/ladder")["steps"]  # type: ignore[index]
+    assert ladder[1]["heldout_rms_dps"] < 0.75 * ladder[0]["heldout_rms_dps"]
+
+    page.goto(f"{service.url}/units/FOG-0001")
+    expect(page.get_by_role("region", name="In force")).to_contain_text("No calibration is in force")
+    page.get_by_role("button", name="Certify").first.click()
+    asked = page.get_by_role("dialog")
+    asked.get_by_label("Who").fill("A. Person")
+    asked.get_by_label("Why").fill("the error fell to the floor")
+    asked.get_by_role("button", name="Certify").click()
+    expect(page.get_by_role("region", name="In force")).to_contain_text("version 2")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Download JSON").click()
+    file = json.loads(download.value.path().read_bytes())
+    assert file["serial"] == "FOG-0001"
+    assert "scale_factor_asymmetry" in [term["effect"] for term in file["model"]["terms"]]
