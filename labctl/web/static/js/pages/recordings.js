@@ -1,0 +1,51 @@
+// All recordings, and the place to bring one in.
+
+import { get } from "../core/api.js";
+import { fill, h } from "../core/dom.js";
+import { count, day } from "../core/format.js";
+import { chip, choice, empty, head, headed, table } from "../core/parts.js";
+import { remember } from "../core/router.js";
+import { importing } from "../recordings/import.js";
+
+export async function page({ query, signal }) {
+  const list = h("div", {});
+  let unit = query.unit ?? "";
+  let rows = await get("/api/recordings", { signal });
+
+  const choose = h("div", {});
+  function show() {
+    const units = [...new Set(rows.map((row) => row.serial))].sort();
+    fill(choose, units.length > 1 ? choice("Unit", [["", "all units"], ...units.map((serial) => [serial, serial])], unit, (value) => {
+      unit = value;
+      remember({ unit });
+      show();
+    }) : null);
+    const shown = rows.filter((row) => !unit || row.serial === unit);
+    fill(list, shown.length ? listed(shown) : nothing());
+  }
+  show();
+  const taken = async () => {
+    rows = await get("/api/recordings", { signal });
+    show();
+  };
+  return h("div", { class: "page" }, head("Recordings", "All data sets of one unit in one campaign, or brought in as files."),
+    importing(taken),
+    headed(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list));
+}
+
+const KINDS = { samples: "every reading", points: "one mean per data set", coefficients: "a published table" };
+
+function listed(rows) {
+  return table([
+    { title: "Recording", cell: (row) => [h("a", { href: `/recordings/${row.id}` }, `Recording ${row.id}`), row.notes ? h("span", { class: "soft small beside two-lines", title: row.notes }, row.notes) : null] },
+    { title: "Unit", cell: (row) => h("a", { href: `/units/${encodeURIComponent(row.serial)}`, class: "nowrap" }, row.serial) },
+    { title: "Holds", cell: (row) => chip(KINDS[row.kind] ?? row.kind) },
+    { title: "Data sets", number: true, cell: (row) => count(row.datasets) },
+    { title: "Readings", number: true, cell: (row) => (row.kind === "samples" ? count(row.readings) : "–") },
+    { title: "From", cell: (row) => (row.campaign ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`) : h("span", { class: "soft" }, "import")) },
+    { title: "Since", cell: (row) => h("span", { class: "nowrap" }, day(row.created_at)) },
+    { title: "", cell: (row) => h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(row.serial)}&recording=${row.id}` }, "Explore") },
+  ], rows, { label: "Recordings", first: "13rem" });
+}
+
+const nothing = () => empty(h("p", {}, "There is no recording yet."), h("p", {}, "Drop one above, ", h("a", { href: "/campaigns/new" }, "run a campaign"), ", or ", h("a", { href: "/start" }, "begin with an example"), "."));

@@ -1,0 +1,53 @@
+// Noise at rest: the Allan deviation of each axis, and N, B, K with what they mean and why one may be missing.
+
+import { get } from "../core/api.js";
+import { fill, h } from "../core/dom.js";
+import { axisColour, figure } from "../core/figure.js";
+import { duration, number, withUnit } from "../core/format.js";
+import { headed, later, table, tabs } from "../core/parts.js";
+
+const FIGURES = [["N", "angle random walk"], ["B", "bias instability"], ["K", "rate random walk"]];
+
+/** Of the longest stretch at rest, or of the picked data set. */
+export function allan(state, signal) {
+  const place = h("div", { class: "stack" });
+  const which = h("div", {});
+  let own = false;
+  const show = () => {
+    fill(which, state.dataset ? tabs("Of what", [["rest", "longest stretch at rest"], ["set", `data set ${state.dataset}`]], own ? "set" : "rest", (value) => {
+      own = value === "set";
+      show();
+    }) : null);
+    const dataset = own ? state.dataset : null;
+    later(place, "Working out the Allan deviation", async () => shown(await get(`/api/recordings/${state.id}/allan`, { query: { dataset }, signal })));
+  };
+  show();
+  return Object.assign(headed("Noise at rest", which, place), { redraw: show });
+}
+
+function shown(found) {
+  const axes = Object.entries(found.axes);
+  const [first, last] = [found.datasets[0], found.datasets.at(-1)];
+  const where = `Data set${first === last ? ` ${first}` : `s ${first} to ${last}`}, ${duration(found.duration_s)} at ${withUnit(found.temperature_c, "deg C")}.`;
+  const draw = () => ({
+    data: axes.flatMap(([axis, noise]) => [
+      { type: "scatter", mode: "lines", x: [...noise.tau_s, ...[...noise.tau_s].reverse()], y: [...noise.high_dps, ...[...noise.low_dps].reverse()], fill: "toself", fillcolor: `color-mix(in srgb, ${axisColour(axis)} 18%, transparent)`, line: { width: 0 }, hoverinfo: "skip", showlegend: false, name: `${axis}, 95 %` },
+      { type: "scatter", mode: "lines", x: noise.tau_s, y: noise.model_dps, line: { color: axisColour(axis), dash: "dot", width: 1.2 }, hoverinfo: "skip", showlegend: false, name: `${axis}, fitted` },
+      { type: "scatter", mode: "lines+markers", x: noise.tau_s, y: noise.deviation_dps, line: { color: axisColour(axis), width: 2 }, marker: { size: 5 }, name: `axis ${axis}`, hovertemplate: `${axis}: %{y:.3~g} deg/s over %{x:.3~g} s<extra></extra>` },
+    ]),
+    layout: { xaxis: { type: "log", title: { text: "averaging time, s" } }, yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } }, margin: { l: 70, r: 12, t: 8, b: 46 } },
+  });
+  const csv = () => [["axis", "tau_s", "deviation_dps", "low_dps", "high_dps", "model_dps"], ...axes.flatMap(([axis, noise]) => noise.tau_s.map((tau, k) => [axis, tau, noise.deviation_dps[k], noise.low_dps[k], noise.high_dps[k], noise.model_dps[k]]))];
+  return [h("p", { class: "soft" }, where),
+    figure(`Recording ${found.recording} Allan deviation`, "Band: 95 % interval. Dotted: the fit that N, B and K come from.", draw, { tall: "21rem", csv }),
+    table([
+      { title: "Figure", cell: ([id, name]) => [h("strong", {}, id), h("span", { class: "soft nowrap" }, `, ${name}`)] },
+      ...axes.map(([axis, noise]) => ({ title: `Axis ${axis}`, cell: ([id]) => figureOf(noise[id]) })),
+    ], FIGURES, { label: "Figures of IEEE Std 952", first: "11rem" })];
+}
+
+/** A figure with its uncertainty, or how large it may be at most, and why it has no value. */
+function figureOf(noise) {
+  if (noise?.value !== null && noise?.value !== undefined) return [h("strong", { class: "nowrap" }, `${number(noise.value)} ${noise.unit}`), h("span", { class: "soft small beside" }, `u = ${number(noise.u, 2)} ${noise.unit}`)];
+  return [h("span", { class: "soft nowrap" }, noise?.at_most ? `below ${number(noise.at_most, 2)} ${noise.unit}` : "not seen"), noise?.why ? h("span", { class: "soft small beside" }, noise.why) : null];
+}

@@ -1,0 +1,66 @@
+// Taking a recording in: dropped or picked, and what the service says to it.
+
+import { upload } from "../core/api.js";
+import { fill, h } from "../core/dom.js";
+import { count } from "../core/format.js";
+import { busy, notice } from "../core/parts.js";
+import { filesOf, sorted } from "./dropped.js";
+
+const size = (files) => {
+  const bytes = files.reduce((sum, file) => sum + file.size, 0);
+  return bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+};
+
+/** The card to drop a recording on; `taken(imported)` is called when one is in the database. */
+export function importing(taken) {
+  const told = h("div", { "aria-live": "polite" });
+  const pick = (folder) => {
+    const input = h("input", { type: "file", multiple: true, webkitdirectory: folder, accept: folder ? null : ".toml,.csv,.parquet", "aria-label": folder ? "Folder of a recording" : "Files of a recording", class: "visually-hidden", tabindex: "-1", onchange: () => {
+      const files = [...input.files];
+      input.value = "";
+      if (files.length) take(folder ? sorted(files) : { files, left: [] });
+    } });
+    return [h("button", { type: "button", class: "button", onclick: () => input.click() }, folder ? "Choose a folder" : "Choose files"), input];
+  };
+  const zone = h("div", { class: "drop stack", ondragover: over, ondragenter: over, ondragleave: (event) => zone.contains(event.relatedTarget) || zone.classList.remove("over"), ondrop: async (event) => {
+    event.preventDefault();
+    zone.classList.remove("over");
+    take(await filesOf(event.dataTransfer));
+  } },
+  h("p", { class: "drop-title" }, "Drop a recording here"),
+  h("p", { class: "small" }, h("code", {}, "recording.toml"), ", its data as CSV or Parquet, and the environment file if there is one; or the folder that holds them."),
+  h("div", { class: "row", style: "justify-content: center" }, pick(false), pick(true)));
+
+  function over(event) {
+    event.preventDefault();
+    zone.classList.add("over");
+  }
+
+  async function take({ files, left }) {
+    if (!files.length) return fill(told, refused(new Error("None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.")));
+    fill(told, busy(`Reading ${files.map((file) => file.name).join(", ")} (${size(files)})`));
+    try {
+      const made = await upload("/api/recordings", files);
+      fill(told, accepted(made, left));
+      taken(made);
+    } catch (error) {
+      fill(told, refused(error));
+    }
+    return told;
+  }
+
+  return h("section", { class: "card stack", "aria-label": "Import" }, h("h2", {}, "Import"), zone, told);
+}
+
+function accepted(made, left) {
+  return notice("good", h("p", { class: "told" }, `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`),
+    left.length ? h("p", { class: "small" }, `Left out of the folder: ${left.join(", ")}.`) : null,
+    h("div", { class: "row" },
+      h("a", { class: "button first", href: `/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}` }, "Fit and explore"),
+      h("a", { class: "button", href: `/recordings/${made.recording}` }, "Look at it")));
+}
+
+/** What is wrong, large: it names file, column and row, and that is what has to be looked up. */
+function refused(error) {
+  return notice("bad", h("p", { class: "told" }, error.message), h("p", { class: "small" }, "Nothing of it was kept."));
+}

@@ -1,0 +1,68 @@
+// The data sets of a recording: a table to leaf through, from which one is picked.
+
+import { fill, h } from "../core/dom.js";
+import { count, duration, number, setting } from "../core/format.js";
+import { chip, choice, headed, table } from "../core/parts.js";
+import { remember } from "../core/router.js";
+import { nameOf, unitOf } from "./channels.js";
+
+const A_PAGE = 25;
+const KIND = { complete: "good", running: "accent", open: "accent" };
+
+/** `state` has {sets, dataset, pick(number), output}; `page` is the leaf that the address names, from 1. */
+export function dataSets(state, asked) {
+  const { sets } = state;
+  const place = h("div", {});
+  const leaf = h("div", { class: "row" });
+  let position = asked.position ?? "";
+  let at = Number(asked.page) || null;
+
+  function show() {
+    const rows = sets.number.map((_, k) => k).filter((k) => !position || sets.position[k] === position);
+    const pages = Math.max(1, Math.ceil(rows.length / A_PAGE));
+    const picked = rows.findIndex((k) => sets.number[k] === state.dataset);
+    at = Math.min(Math.max(at ?? (picked >= 0 ? Math.floor(picked / A_PAGE) + 1 : 1), 1), pages);
+    fill(place, listed(state, rows.slice((at - 1) * A_PAGE, at * A_PAGE)));
+    const turn = (text, label, to) => h("button", { type: "button", class: "button tiny", "aria-label": label, disabled: to < 1 || to > pages, onclick: () => {
+      at = to;
+      remember({ page: at === 1 ? null : at });
+      show();
+    } }, text);
+    fill(leaf, pages > 1 ? [turn("« First", "First page", at === 1 ? 0 : 1), turn("‹ Back", "Page before", at - 1), h("span", { class: "soft small", "aria-live": "polite" }, `${at} of ${pages}`), turn("On ›", "Next page", at + 1), turn("Last »", "Last page", at === pages ? 0 : pages)] : null);
+  }
+  show();
+  const positions = [...new Set(sets.position)];
+  const filter = positions.length > 1 ? choice("Position", [["", "all"], ...positions.map((each) => [each, `${each} up`])], position, (value) => {
+    position = value;
+    at = 1;
+    remember({ position, page: null });
+    show();
+  }) : null;
+  const redraw = () => {
+    at = null;
+    show();
+  };
+  return Object.assign(headed(`${count(sets.number.length)} data sets`, filter, place, leaf), { redraw });
+}
+
+function listed(state, rows) {
+  const { sets, output } = state;
+  const gyros = Object.keys(sets.channels).filter((name) => name.startsWith("gyro_"));
+  const of = (name, k, digits) => (sets.channels[name] ? number(sets.channels[name].mean[k], digits) : "–");
+  const timed = sets.t_from_s.some((t) => t !== null);
+  const warm = sets.chamber_setpoint_c.some((t) => t !== null);
+  return table([
+    { title: "Data set", cell: (k) => h("button", { type: "button", class: "button tiny", "aria-pressed": String(sets.number[k] === state.dataset), onclick: (event) => {
+      event.stopPropagation();
+      state.pick(sets.number[k]);
+    } }, `${sets.number[k]}`) },
+    { title: "State", cell: (k) => h("span", { title: sets.reason[k] }, chip(sets.state[k], KIND[sets.state[k]] ?? "warn")) },
+    { title: "Up", cell: (k) => sets.position[k] },
+    { title: "Table rate, deg/s", number: true, cell: (k) => setting(sets.table_rate_dps[k], 6) },
+    warm ? { title: "Set point, deg C", number: true, cell: (k) => setting(sets.chamber_setpoint_c[k] ?? NaN) } : null,
+    { title: "Gyro, deg C", number: true, cell: (k) => of("temperature_c", k, 4) },
+    ...gyros.map((name) => ({ title: `${nameOf(name).replace("gyro output", "Output")}, ${unitOf(name, output)}`, number: true, cell: (k) => [of(name, k, 5), sets.channels[name].std[k] === null ? null : h("span", { class: "soft small" }, ` ± ${number(sets.channels[name].std[k], 2)}`)] })),
+    { title: "Readings", number: true, cell: (k) => count(sets.n[k]) },
+    timed ? { title: "Begins after", number: true, cell: (k) => duration(sets.t_from_s[k] ?? NaN) } : null,
+  ].filter(Boolean), rows, { label: "Data sets", selected: (k) => sets.number[k] === state.dataset, onrow: (k) => state.pick(sets.number[k]) });
+}
