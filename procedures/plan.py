@@ -9,6 +9,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
+from procedures.errors import PlanRefused
 from procedures.limits import BenchLimits, fit_to_bench
 from procedures.recipe import Recipe
 from procedures.schedule import Level, Stay, schedule
@@ -18,6 +19,7 @@ from procedures.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerO
 ROOM_C = 25.0
 CHAMBER_SETTLING_S = 300.0  #: from the end of the ramp until the air is in the band
 HOMING_S = 30.0
+MOST_DATASETS = 100_000  #: half a year of data sets of two minutes
 MOUNTING_S = 600.0  #: a person walks up, turns the units and confirms
 
 _BENCH_FIGURES = {"expected_s"}  #: what depends on the bench's speed, not on what is done
@@ -121,10 +123,24 @@ def make_plan(recipe: Recipe, limits: BenchLimits, *, clip: bool = False) -> Pla
     Raises PlanRefused listing every rate and temperature beyond a limit; with `clip` those points are left out instead
     and named in `Plan.clipped`.
     """
+    _refuse_endless(recipe)
     runnable, clipped = fit_to_bench(recipe, limits, clip=clip)
     writer = _Writer(runnable, limits)
     writer.write()
     return Plan(recipe=runnable, steps=tuple(writer.steps), clipped=clipped)
+
+
+def _refuse_endless(recipe: Recipe) -> None:
+    """Refuse what no bench would ever finish, before it is written down step by step."""
+    rates = len(recipe.rates_dps) * (recipe.repeats + 1)
+    asked = len(recipe.positions) * (len(recipe.temperatures_c) + 1) * rates
+    if recipe.inverted is not None:
+        asked += len(recipe.positions) * len(recipe.inverted.temperatures_c) * len(recipe.inverted.rates_dps)
+    if recipe.power_cycle is not None:
+        asked += recipe.power_cycle.count * len(recipe.power_cycle.rates_dps)
+    if asked > MOST_DATASETS:
+        text = f"about {asked} data sets, where a campaign has at most {MOST_DATASETS}"
+        raise PlanRefused(recipe.name, [text], "Ask for fewer rates, temperatures or repeats.")
 
 
 class _Writer:

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from labctl import web
-from labctl.api import calibrations, campaigns, health, keys, problems, recordings, schedule, units, watchdog
+from labctl.api import calibrations, campaigns, health, keys, plans, problems, recordings, schedule, units, watchdog
 from labctl.api.door import Access, Door
 from labctl.services.house import House
 
@@ -54,7 +54,7 @@ def create_app(house: House, access: Access | None = None) -> FastAPI:
     )
     app.state.house = house
     problems.install(app)
-    rooms = (health, units, calibrations, campaigns, schedule, recordings, keys)
+    rooms = (health, units, calibrations, plans, campaigns, schedule, recordings, keys)
     for room in rooms:
         app.include_router(room.router)
     web.install(app)

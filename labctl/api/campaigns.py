@@ -11,6 +11,7 @@ from fastapi.responses import StreamingResponse
 from labctl.api.rooms import HouseOf
 from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer, ScheduledAnswer
+from labctl.services.plans import CampaignPlanAnswer, campaign_plan
 from labctl.services.scheduling import is_scheduled
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
@@ -38,6 +39,12 @@ def campaigns(house: HouseOf) -> list[CampaignAnswer]:
 def campaign(campaign: int, house: HouseOf) -> CampaignAnswer:
     """State, step, progress, expected end, temperatures, rate and last fault."""
     return house.status(campaign)
+
+
+@router.get("/{campaign}/plan", summary="Its steps")
+def plan(campaign: int, house: HouseOf) -> CampaignPlanAnswer:
+    """The whole plan as it was written down, with what became of each step."""
+    return campaign_plan(house.store, campaign)
 
 
 @router.post("/{campaign}/abort", summary="End a campaign")

@@ -24,7 +24,7 @@ READING = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Answered to anybody: a load balancer asks it.
 OPEN = frozenset({"/health"})
 #: Only asked by POST, because of what the question carries: nothing changes, so a viewer may.
-ASKING = ("/api/units/{serial}/calibrations/{version}/preview",)
+ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview")
 _ASKED = re.compile("|".join(re.sub(r"{\w+}", "[^/]+", path) for path in ASKING))
 UPLOAD = "/api/recordings"
 MIB = 1 << 20

@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
 from procedures.errors import RecipeError
@@ -53,10 +53,22 @@ class CertifyRequest(Request):
     due_days: int | None = Field(default=None, gt=0, le=36_500, description="Days until the unit is due again.")
 
 
+def never_a_path(recipe: str) -> str:
+    """Refuse what would be looked for as a file: a request names a shipped recipe or brings its own text."""
+    if "\n" in recipe or recipe in shipped_recipes():
+        return recipe
+    raise RecipeError(f"no recipe {recipe!r}: send its text, or one of {', '.join(shipped_recipes())}")
+
+
+RecipeSource = Annotated[
+    str, AfterValidator(never_a_path), Field(description="Name of a shipped recipe, or the recipe itself as TOML text.")
+]
+
+
 class CampaignRequest(Request):
     """Which recipe to run on the service's bench."""
 
-    recipe: str = Field(description="Name of a shipped recipe, or the recipe itself as TOML text.")
+    recipe: RecipeSource
     clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
     at: str | None = Field(
         default=None,
@@ -75,13 +87,13 @@ class CampaignRequest(Request):
         description="How much later than due it may begin; 0: a missed start is skipped; absent: any time, once.",
     )
 
-    @field_validator("recipe")
-    @classmethod
-    def never_a_path(cls, recipe: str) -> str:
-        """Refuse what would be looked for as a file: a request names a shipped recipe or brings its own text."""
-        if "\n" in recipe or recipe in shipped_recipes():
-            return recipe
-        raise RecipeError(f"no recipe {recipe!r}: send its text, or one of {', '.join(shipped_recipes())}")
+
+class PlanRequest(Request):
+    """Which recipe to plan on the service's bench."""
+
+    recipe: RecipeSource
+    clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
+    visibility: bool = Field(default=False, description="Also say what the plan could find; it takes some seconds.")
 
 
 class ReasonRequest(Request):

@@ -8,6 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from instruments.bench import BenchFile
 from instruments.clock import Clock
 from labctl.actor import ITSELF, acting
 from labctl.errors import Conflict
@@ -87,6 +88,11 @@ class House:
         self.scheduler = None if runner is None else Scheduler(store, clock, runner, runner.bench.name)
         self._opened_at = clock.utc()
         self._closed = False
+
+    @property
+    def bench(self) -> BenchFile | None:
+        """The bench that this service runs, if it has one."""
+        return None if self._runner is None else self._runner.bench
 
     def start(self) -> None:
         """Make the house ready: a campaign that an earlier process left on this bench is taken up, safe state first.

@@ -16,10 +16,12 @@ from labctl.fitting import FitResult
 from labctl.fitting.context import context_of
 from labctl.fitting.criticism import criticise
 from labctl.fitting.criticism.residuals import residuals_of
+from labctl.fitting.criticism.weigh import weigh, with_noise_of
 from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formula
 from labctl.fitting.fit import fit_context
 from labctl.fitting.model import ErrorModel
 from labctl.fitting.presets import changed
+from labctl.fitting.threads import single_threaded
 from labctl.recording import Recording
 from labctl.services.acts import ImproveRequest
 from labctl.services.answers import Answer, ErrorFigures, FitAnswer, ModelAnswer, Validity
@@ -103,11 +105,19 @@ def _question(store: Store, row: CalibrationRecord, recording: int, request: Imp
     }  # fmt: skip
 
 
+@single_threaded
 def _residuals(store: Store, change: _Change) -> ResidualColumns:
+    """Return what a criticism of the changed model would leave, without all else that it says."""
     model = change.after.fitted.model
     found = criticise(readings_of(store, change.recording), model, CATALOGUE, points=change.points, full=False)
-    left = residuals_of(found.weighed) if found.weighed is not None else {}
-    return residual_columns(found.data, left, change.points, change.after)
+    seen = found.weighed
+    if seen is None:
+        return residual_columns(found.data, {}, change.points, change.after)
+    if found.verdict.terms:  # the floor is the noise beside all that is still missing
+        missing = tuple(replace(term, steady=True) for term in found.verdict.terms.values())
+        whole = seen.model.with_terms((*seen.model.terms, *missing))
+        seen = with_noise_of(seen, weigh(found.data, whole, CATALOGUE))
+    return residual_columns(found.data, residuals_of(seen), change.points)
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:

@@ -111,6 +111,11 @@ def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tup
 def describe_plan(recipe: str, bench: str | None, *, clip: bool, look: Look | None = None) -> PlanAnswer:
     """Say what a campaign would do and how long it takes; `look` also says what it could find."""
     plan, bench_file = plan_for(recipe, bench, clip=clip)
+    return plan_answer(plan, bench_file, look)
+
+
+def plan_answer(plan: Plan, bench_file: BenchFile, look: Look | None = None) -> PlanAnswer:
+    """Return a plan's figures; `look` also says what it could find."""
     return PlanAnswer(
         recipe=plan.recipe.name,
         bench=bench_file.name,

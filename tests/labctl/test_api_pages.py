@@ -142,6 +142,12 @@ def test_a_preview_is_what_improve_makes_and_changes_nothing(
         assert seen[name] == made[name], name
     assert seen["residuals"] == client.get(f"{unit}/2/residuals").json()["columns"]
     assert client.post(f"{path}/preview", json={}).status_code == 400
+    other = {"add": ["scale_factor_odd"]}  # what is missing stays missing, and is no noise
+    seen = client.post(f"{path}/preview", json=other).json()["residuals"]
+    client.post(f"{path}/improve", json=other)
+    kept = client.get(f"{unit}/3/residuals").json()["columns"]
+    for name in ("residual_dps", "floor_dps"):
+        assert seen[name] == pytest.approx(kept[name], rel=0.02, abs=1e-6), name
     assert client.post(f"{path}/preview", json={"add": ["no_such"]}).json()["type"] == "urn:labctl:problem:bad-input"
 
 
