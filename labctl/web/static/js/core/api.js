@@ -82,7 +82,10 @@ export function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** Yield {event, id, data} of a stream of server-sent events until it ends. EventSource cannot send a key. */
+/**
+ * Yield {event, id, data} of a stream of server-sent events until it ends; a comment, by which the service says that it
+ * lives, is {event: "alive"}. EventSource cannot send a key.
+ */
 export async function* events(path, { after, signal } = {}) {
   const response = await answer(path, { headers: headers(after ? { "Last-Event-ID": String(after) } : {}), signal });
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
@@ -108,6 +111,7 @@ function parsed(message) {
     if (field === "data") found.data = JSON.parse(value);
     else if (field === "event") found.event = value;
     else if (field === "id") found.id = Number(value);
+    else if (field === "" && found.data === null) found.event = "alive";
   }
   return found;
 }

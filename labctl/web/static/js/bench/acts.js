@@ -1,0 +1,62 @@
+// What a person does to a campaign or a bench. Each asks who, and why where that will be read later.
+
+import { post } from "../core/api.js";
+import { h } from "../core/dom.js";
+import { button, dialog, toast } from "../core/parts.js";
+
+const WHO = "labctl.who";
+const who = () => ({ name: "by", label: "Your name", value: localStorage.getItem(WHO) ?? "" });
+
+async function asked(title, fields, options) {
+  const said = await dialog(title, fields, options);
+  if (said?.by) localStorage.setItem(WHO, said.by);
+  return said;
+}
+
+const act = (id, name, body) => post(`/api/campaigns/${id}/${name}`, body);
+
+/** The one red button: the campaign ends now, table at rest, chamber at its safe set point. */
+export const stopButton = (id) => Object.assign(button("Safe stop", async () => {
+  const said = await asked("Stop now and leave the bench safe?", [who(), { name: "reason", label: "Why", hint: "It is written beside the campaign." }],
+    { text: "The table comes to rest, the chamber goes to its safe set point, the campaign ends. What was measured is kept, and the campaign can be resumed.", confirm: "Stop now", kind: "stop" });
+  if (!said) return;
+  const answer = await act(id, "abort", said);
+  toast(answer.state === "aborted" ? "good" : "bad", answer.state === "aborted" ? "Stopped. The bench is in its safe state." : `The campaign is ${answer.state}: ${answer.reason}`);
+}, { kind: "stop big" }), { title: "End the campaign now, in the safe state" });
+
+export const pauseButton = (id) => button("Pause", async () => {
+  const said = await asked("Pause after the present data set?", [who(), { name: "reason", label: "Why" }], { confirm: "Pause" });
+  if (said) await act(id, "pause", said);
+});
+
+/** Go on: `whole` when it takes up a campaign that had ended or was interrupted. */
+export const resumeButton = (id, { whole = false } = {}) => button(whole ? "Resume where it was" : "Go on", async () => {
+  const said = await asked(whole ? "Take the campaign up where it was?" : "Go on with the campaign?", [who(), { name: "reason", label: "Why", required: false }],
+    { text: whole ? "First the safe state, then home, temperature and soak again; the first incomplete data set is measured anew." : null, confirm: whole ? "Resume" : "Go on" });
+  if (!said) return;
+  await act(id, "resume", { by: said.by, reason: said.reason });
+  toast("good", whole ? `Campaign ${id} is taken up.` : "It goes on.");
+}, { kind: "first" });
+
+/** Answer the question that waits: it is done, or it cannot be done. */
+export const answerButtons = (id, prompt) => [
+  button("Done", async () => {
+    const said = await asked("Is it done?", [who()], { text: prompt.text, confirm: "It is done" });
+    if (said) await act(id, "confirm", { prompt: prompt.id, by: said.by, confirmed: true });
+  }, { kind: "first" }),
+  button("Cannot be done", async () => {
+    const said = await asked("It cannot be done?", [who(), { name: "reason", label: "Why" }], { text: "The campaign ends, in the safe state.", confirm: "It cannot be done", kind: "stop" });
+    if (said) await act(id, "confirm", { prompt: prompt.id, by: said.by, reason: said.reason, confirmed: false });
+  }),
+];
+
+/** Say that somebody has looked at a bench whose safe state was not confirmed. */
+export const clearButton = (bench, then) => button("I have looked, it is safe", async () => {
+  const said = await asked(`Is bench ${bench} safe?`, [who(), { name: "reason", label: "What you saw", value: "looked at the bench" }], { confirm: "It is safe" });
+  if (!said) return;
+  await post(`/api/benches/${encodeURIComponent(bench)}/clear`, said);
+  toast("good", `Bench ${bench} may be used again.`);
+  then();
+}, { kind: "first" });
+
+export const link = (text, href, kind = "") => h("a", { class: `button ${kind}`, href }, text);

@@ -1,0 +1,42 @@
+// What happened, newest first, by level.
+
+import { fill, h } from "../core/dom.js";
+import { clock, day, setting } from "../core/format.js";
+import { chip, empty } from "../core/parts.js";
+
+const KINDS = { info: "", warning: "warn", error: "bad" };
+const LEVELS = ["info", "warning", "error"];
+const REDRAW_MS = 250;
+
+/** A list that events are given to with `add(event)`; at most `most` are shown, from `level` on upwards. */
+export function eventList(most, level = "info") {
+  const all = [];
+  const element = h("ol", { class: "events", "aria-live": "off" });
+  let least = level;
+  let waiting = null;
+  function show() {
+    waiting = null;
+    const shown = all.filter((event) => LEVELS.indexOf(event.level) >= LEVELS.indexOf(least));
+    const from = shown.slice(-most).reverse();
+    fill(element, from.length ? from.map(line) : empty("Nothing of this kind has happened."), shown.length > most ? h("li", { class: "soft small" }, `and ${shown.length - most} before`) : null);
+  }
+  element.add = (event) => {
+    all.push(event);
+    waiting ??= setTimeout(show, REDRAW_MS);
+  };
+  element.from = (value) => {
+    least = value;
+    show();
+  };
+  element.all = all;
+  show();
+  return element;
+}
+
+function line(event) {
+  const limit = event.value !== null && event.value !== undefined && event.limit !== null && event.limit !== undefined ? ` (${setting(event.value)} ${event.unit ?? ""}, limit ${setting(event.limit)} ${event.unit ?? ""})` : "";
+  return h("li", {},
+    h("time", { datetime: event.at, title: `${day(event.at)}, ${event.t_s.toFixed(1)} s of the campaign` }, clock(event.at)),
+    chip(event.level, KINDS[event.level] ?? ""),
+    h("span", {}, event.device ? h("strong", {}, `${event.device}: `) : null, event.message.replace(/ \[question [^\]]+\]$/, ""), limit));
+}

@@ -1,0 +1,46 @@
+// Follows a campaign: what the service tells, again after a break, and since when it is silent.
+
+import { events, get, Problem } from "../core/api.js";
+
+export const ENDED = new Set(["done", "aborted", "failed"]);
+/** The service says every 10 s that it lives. */
+const SILENT_MS = 25_000;
+const WAITS_MS = [1000, 2000, 4000, 8000, 15_000];
+const LOOK_MS = 1000;
+
+/**
+ * Follow until the campaign ends or `signal` aborts. `told`: {progress(status), event(event), link({stale, since, why})};
+ * `link` is called when that changes: silent since when and why, or heard again.
+ */
+export async function follow(campaign, told, signal) {
+  let [heard, stale, after, tries] = [Date.now(), false, 0, 0];
+  const say = (now, why = "") => {
+    if (now !== stale || now) told.link({ stale: now, since: heard, why });
+    stale = now;
+  };
+  const watch = setInterval(() => Date.now() - heard > SILENT_MS && say(true, "the service says nothing"), LOOK_MS);
+  signal.addEventListener("abort", () => clearInterval(watch));
+  while (!signal.aborted) {
+    try {
+      for await (const message of events(`/api/campaigns/${campaign}/events`, { after, signal })) {
+        [heard, tries] = [Date.now(), 0];
+        say(false);
+        if (message.event === "progress") told.progress(message.data);
+        else if (message.id !== null) {
+          after = message.id;
+          told.event(message.data);
+        }
+      }
+      const status = await get(`/api/campaigns/${campaign}`, { signal });
+      told.progress(status);
+      if (ENDED.has(status.state)) break;
+    } catch (error) {
+      if (signal.aborted) break;
+      say(true, error instanceof Problem ? error.message : "the connection broke");
+      if (error instanceof Problem && error.status < 500) break;
+    }
+    await new Promise((resolve) => setTimeout(resolve, WAITS_MS[Math.min(tries, WAITS_MS.length - 1)]));
+    tries += 1;
+  }
+  clearInterval(watch);
+}

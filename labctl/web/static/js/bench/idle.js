@@ -1,0 +1,32 @@
+// A bench at which nothing runs: what was last, what comes next, and how to begin.
+
+import { h } from "../core/dom.js";
+import { duration, instant, percent } from "../core/format.js";
+import { card, facts, notice } from "../core/parts.js";
+import { canResume, stateChip } from "../campaigns/states.js";
+import { link, resumeButton } from "./acts.js";
+
+export function withoutBench() {
+  return card("This service drives no bench",
+    h("p", {}, "It serves calibrations and takes recordings in. A bench comes with it when it is started so:"),
+    h("pre", { class: "command" }, "labctl serve --simulate\nlabctl serve --bench FILE"),
+    h("p", { class: "soft" }, "The first has a simulated tri-axial bench, as fast as you like with --speed; the second drives the instruments that the bench file names."),
+    h("div", { class: "row" }, link("To the recordings", "/recordings")));
+}
+
+/** `next` is the schedule's next entry, `last` the newest campaign; either may be missing. */
+export function idle(bench, last, next) {
+  return h("div", { class: "columns" },
+    card("Nothing runs",
+      h("p", {}, bench.unconfirmed ? "No campaign starts before the bench was looked at." : `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`),
+      h("div", { class: "row" }, link("Plan a campaign", "/campaigns/new", "first"), link("All campaigns", "/campaigns"))),
+    card("Next on the schedule", next
+      ? [h("p", { class: "told" }, instant(next.due_at)), h("p", { class: "soft" }, `${next.recipe} on ${next.bench}${next.cron ? `, then again: ${next.cron} (${next.time_zone})` : ""}`)]
+      : h("p", { class: "soft" }, "Nothing is scheduled.")),
+    last ? card(`Last: campaign ${last.id}`,
+      h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),
+      facts([["Ended", last.ended_at ? instant(last.ended_at) : "not", "", last.started_at && last.ended_at ? `took ${duration((Date.parse(last.ended_at) - Date.parse(last.started_at)) / 1000)}` : null], ["Progress", percent(last.progress)]]),
+      last.reason ? notice(last.state === "done" ? "good" : "warn", last.reason) : null,
+      h("div", { class: "row" }, Object.entries(last.recordings).map(([serial, recording]) => link(`Explore ${serial}`, `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`)),
+        canResume(last) && last.bench === bench.name ? resumeButton(last.id, { whole: true }) : null)) : null);
+}

@@ -1,0 +1,52 @@
+// What the gyro has just said: the readings of the newest finished data set of the campaign.
+
+import { get } from "../core/api.js";
+import { fill, h } from "../core/dom.js";
+import { axisColour, figure } from "../core/figure.js";
+import { setting } from "../core/format.js";
+import { headed } from "../core/parts.js";
+
+const READINGS = 4000;
+const EVERY_MS = 3000;
+
+/** A card that follows the data sets as they are finished: `tell(status)`. Quiet while there is none. */
+export function output(timeline, signal) {
+  const about = h("span", { class: "soft small" });
+  const place = h("div", {}, h("p", { class: "soft" }, "The first data set has not been measured yet."));
+  let columns = null;
+  let [shown, next, busy] = [null, 0, false];
+  const picture = figure("Gyro output of the last data set", "Every reading, as it was recorded.", () => {
+    const axes = Object.keys(columns ?? {}).filter((name) => name.startsWith("gyro_"));
+    const t = (columns?.t_s ?? []).map((value) => value - columns.t_s[0]);
+    const thirds = axes.length > 1 ? axes.length : 1;
+    return {
+      data: axes.map((name, k) => ({ type: "scatter", mode: "lines", name: `axis ${name.slice(5)}`, x: t, y: columns[name], yaxis: k ? `y${k + 1}` : "y", line: { width: 0.8, color: axisColour(name.slice(5)) }, hovertemplate: "%{y:.6~g} after %{x:.4~f} s<extra></extra>" })),
+      layout: {
+        showlegend: false, margin: { l: 62, r: 12, t: 8, b: 42 }, xaxis: { title: { text: "time in the data set, s" }, anchor: thirds > 1 ? `y${thirds}` : "y" },
+        ...Object.fromEntries(axes.map((name, k) => [k ? `yaxis${k + 1}` : "yaxis", { title: { text: `${name.slice(5)}, ${columns.unit}` }, domain: [1 - (k + 1) / thirds + (k + 1 < thirds ? 0.04 : 0), 1 - k / thirds - (k ? 0.04 : 0)] }])),
+      },
+    };
+  }, { tall: "21rem", csv: () => [["t_s", ...Object.keys(columns).filter((name) => name.startsWith("gyro_"))], ...columns.t_s.map((t, k) => [t, ...Object.keys(columns).filter((name) => name.startsWith("gyro_")).map((name) => columns[name][k])])] });
+
+  async function tell(status) {
+    const until = (status.step ?? 1) - (status.state === "done" ? 0 : 1);
+    const dataset = timeline.dataset.slice(0, until).findLast((each) => each !== null) ?? null;
+    const recording = Object.values(status.recordings)[0];
+    if (busy || !recording || dataset === null || dataset === shown || Date.now() < next) return;
+    [busy, next] = [true, Date.now() + EVERY_MS];
+    try {
+      const found = await get(`/api/recordings/${recording}/samples`, { query: { dataset, limit: READINGS }, signal });
+      columns = { ...found.columns, unit: "deg/s" };
+      const k = timeline.dataset.indexOf(dataset);
+      fill(about, h("a", { href: `/recordings/${recording}?dataset=${dataset}` }, `Data set ${dataset}`), `: ${setting(timeline.rate_dps[k])} deg/s at ${setting(timeline.temperature_c[k])} deg C, ${timeline.position[k] ?? "?"} up`);
+      if (!picture.isConnected) fill(place, picture);
+      picture.redraw();
+      shown = dataset;
+    } catch {
+      // not written yet, or given up: the next one comes soon
+    } finally {
+      busy = false;
+    }
+  }
+  return Object.assign(headed("Gyro output", about, place), { tell });
+}

@@ -1,0 +1,53 @@
+// What the bench is doing now, and the acts upon it.
+
+import { get } from "../core/api.js";
+import { h } from "../core/dom.js";
+import { instant } from "../core/format.js";
+import { chip, head, notice } from "../core/parts.js";
+import { show } from "../core/router.js";
+import { clearButton } from "../bench/acts.js";
+import { idle, withoutBench } from "../bench/idle.js";
+import { running } from "../bench/running.js";
+import { runs } from "../campaigns/states.js";
+
+const LOOK_MS = 5000;
+const AFTER_END_MS = 1500;
+
+export async function page({ signal }) {
+  const [benches, states, campaigns, schedule] = await Promise.all(["/api/benches", "/api/benches/status", "/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })));
+  const bench = benches[0];
+  if (!bench) return h("div", { class: "page" }, head("Bench"), withoutBench());
+  const now = campaigns.find((campaign) => campaign.id === bench.campaign) ?? campaigns.find((campaign) => campaign.bench === bench.name && runs(campaign));
+  const unit = (each) => h("a", { href: `/units/${encodeURIComponent(each.serial)}` }, each.serial);
+  const element = h("div", { class: "page bench" },
+    head("Bench", h("span", { class: "row" }, h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null, h("span", {}, "with ", bench.units.flatMap((each, k) => (k ? [", ", unit(each)] : [unit(each)]))), now ? h("span", {}, "runs ", h("a", { href: `/campaigns/${now.id}` }, `campaign ${now.id}`), `, ${now.recipe}`) : null)));
+  const unsafe = states.filter((each) => each.unconfirmed);
+  for (const each of unsafe) element.append(unconfirmed(each));
+  if (now) {
+    const plan = await get(`/api/campaigns/${now.id}/plan`, { signal });
+    element.append(...running(now, plan, bench, { signal, over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS) }));
+  } else {
+    element.append(idle(bench, campaigns.find((campaign) => campaign.bench === bench.name), schedule.find((each) => each.bench === bench.name)));
+    begun(signal);
+  }
+  return element;
+}
+
+/** While nothing runs, look whether something has begun; the schedule or another person may start it. */
+function begun(signal) {
+  const looking = setInterval(async () => {
+    try {
+      const [bench] = await get("/api/benches", { signal });
+      if (bench?.campaign) show();
+    } catch {
+      // asked again soon; the page says nothing of its own that could be out of date
+    }
+  }, LOOK_MS);
+  signal.addEventListener("abort", () => clearInterval(looking));
+}
+
+function unconfirmed(bench) {
+  return notice("bad", h("p", { class: "told" }, `Bench ${bench.name} was not confirmed safe`),
+    h("p", {}, `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${instant(bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`),
+    h("div", { class: "row" }, clearButton(bench.name, show)));
+}

@@ -1,0 +1,87 @@
+// One campaign: its plan with what became of it, its events, and why it ended.
+
+import { get } from "../core/api.js";
+import { fill, h } from "../core/dom.js";
+import { count, duration, instant, percent } from "../core/format.js";
+import { card, chip, facts, head, headed, notice, tabs } from "../core/parts.js";
+import { go, remember, show as showAgain } from "../core/router.js";
+import { link, resumeButton, stopButton } from "../bench/acts.js";
+import { eventList } from "../bench/events.js";
+import { ENDED, follow } from "../bench/feed.js";
+import { left, passed } from "../bench/history.js";
+import { planPicture } from "../campaigns/picture.js";
+import { canResume, runs, stateChip } from "../campaigns/states.js";
+
+const LEVELS = [["info", "all"], ["warning", "warnings and errors"], ["error", "errors"]];
+const MOST = 200;
+const PLAN_AGAIN_MS = 2500;
+
+export async function page({ params, query, signal }) {
+  const path = `/api/campaigns/${encodeURIComponent(params.id)}`;
+  let [now, plan, benches] = await Promise.all([get(path, { signal }), get(`${path}/plan`, { signal }), get("/api/benches", { signal })]);
+  const here = benches[0]?.name === now.bench;
+  const level = LEVELS.some(([each]) => each === query.level) ? query.level : "info";
+  const events = eventList(MOST, level);
+  const [about, said, silent] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
+  const picture = planPicture(`Campaign ${now.id} plan`, () => ({ timeline: plan.timeline, now_s: runs(now) ? passed(now, plan.expected_s) : null, live: true }), { pick: (dataset) => Object.values(now.recordings)[0] && go(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
+  let asked = Date.now();
+
+  function show(next) {
+    const ended = ENDED.has(next.state) && !ENDED.has(now.state);
+    now = next;
+    fill(about, summary(now, plan));
+    fill(said, verdict(now));
+    if (ended) showAgain();
+    else if (Date.now() - asked > PLAN_AGAIN_MS) again();
+  }
+  async function again() {
+    asked = Date.now();
+    plan = await get(`${path}/plan`, { signal }).catch(() => plan);
+    picture.redraw();
+  }
+  show(now);
+  follow(now.id, {
+    progress: show,
+    event: (event) => events.add(event),
+    link: ({ stale, since, why }) => fill(silent, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `${why}. Trying again.`) : null),
+  }, signal);
+
+  const acts = runs(now) ? [link("To the bench", "/bench"), here ? stopButton(now.id) : null] : [here && canResume(now) ? resumeButton(now.id, { whole: true }) : null, link("Plan the same again", `/campaigns/new?recipe=${encodeURIComponent(now.recipe)}`)];
+  return h("div", { class: "page" },
+    head(`Campaign ${now.id}`, h("span", {}, h("strong", {}, now.recipe), ` on bench ${now.bench}`), ...acts.filter(Boolean)),
+    silent, said, about,
+    headed("Plan", h("span", { class: "soft small" }, "A press on a data set opens its readings."), picture),
+    measured(now),
+    Object.assign(headed("Events", tabs("Events to show", LEVELS, level, (value) => {
+      remember({ level: value === "info" ? null : value });
+      events.from(value);
+    }), events), { id: "events" }));
+}
+
+function summary(now, plan) {
+  const states = plan.timeline.dataset.map((dataset, k) => (dataset === null ? null : plan.timeline.state[k])).filter(Boolean);
+  const done = states.filter((state) => state === "done").length;
+  const took = now.started_at && now.ended_at ? duration((Date.parse(now.ended_at) - Date.parse(now.started_at)) / 1000) : null;
+  return h("div", { class: "card" }, facts([
+    ["State", stateChip(now), "", percent(now.progress)],
+    ["Data sets", `${count(done)} of ${count(states.length)}`, "", `step ${now.step ?? "–"} of ${now.steps}`],
+    ["Begun", instant(now.started_at)],
+    runs(now) ? ["Expected end", instant(now.expected_end), "", `${duration(left(now, plan.expected_s))} left`] : ["Ended", instant(now.ended_at), "", took ? `took ${took}` : null],
+    ["Expected", duration(plan.expected_s), "", "as planned, without interruptions"],
+  ]));
+}
+
+/** Why it stands where it stands, in the service's words. */
+function verdict(now) {
+  const kind = { done: "good", failed: "bad", aborted: "bad" }[now.state] ?? "warn";
+  return [runs(now) && now.state === "running" ? null : notice(kind, h("p", { class: "told" }, now.reason || `It is ${now.state}.`), now.last_error && now.last_error !== now.reason ? h("p", {}, `Last fault: ${now.last_error}`) : null),
+    ...Object.entries(now.dropped).map(([unit, why]) => notice("warn", h("strong", {}, unit), ` took no further part: ${why}`))].filter(Boolean);
+}
+
+function measured(now) {
+  const rows = Object.entries(now.recordings);
+  if (!rows.length) return card("Units and recordings", h("p", { class: "soft" }, "Nothing was recorded."));
+  return card("Units and recordings", h("ul", { class: "plain" }, rows.map(([serial, recording]) => h("li", { class: "row spread" },
+    h("span", { class: "row" }, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), now.dropped[serial] ? chip("dropped", "warn") : null),
+    h("span", { class: "row" }, link(`Recording ${recording}`, `/recordings/${recording}`, "tiny"), link("Fit and explore", `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`, "tiny first"))))));
+}

@@ -1,0 +1,64 @@
+// All campaigns, and what the schedule will begin.
+
+import { get, remove } from "../core/api.js";
+import { fill, h } from "../core/dom.js";
+import { duration, instant, percent } from "../core/format.js";
+import { button, card, chip, empty, head, headed, table } from "../core/parts.js";
+import { link } from "../bench/acts.js";
+import { runs, stateChip } from "../campaigns/states.js";
+
+const AGAIN_MS = 4000;
+
+export async function page({ signal }) {
+  const place = h("div", { class: "page" });
+  const ask = () => Promise.all(["/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })));
+  async function show() {
+    const [campaigns, schedule] = await ask();
+    fill(place, schedule.length ? scheduled(schedule, show) : null,
+      headed(campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`, null, campaigns.length ? listed(campaigns) : empty(h("p", {}, "No campaign has been run yet."), h("p", {}, link("Plan the first", "/campaigns/new", "first")))));
+    return campaigns.some(runs);
+  }
+  let moving = await show();
+  const looking = setInterval(async () => {
+    if (!moving) return;
+    try {
+      moving = await show();
+    } catch {
+      // asked again soon
+    }
+  }, AGAIN_MS);
+  signal.addEventListener("abort", () => clearInterval(looking));
+  return h("div", { class: "page" }, head("Campaigns", "One run of a recipe on a bench.", link("Plan a campaign", "/campaigns/new", "first")), place);
+}
+
+const took = (row) => (row.started_at && row.ended_at ? duration((Date.parse(row.ended_at) - Date.parse(row.started_at)) / 1000) : "–");
+
+function listed(rows) {
+  return table([
+    { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "soft small beside" }, row.recipe)] },
+    { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.reason ? h("span", { class: "soft small beside two-lines", title: row.reason }, row.reason) : null] },
+    { title: "Progress", cell: (row) => h("div", { class: "progress-cell" }, h("div", { class: "meter", role: "img", "aria-label": percent(row.progress) }, h("i", { style: `width: ${100 * row.progress}%` })), h("span", { class: "small" }, percent(row.progress))) },
+    { title: "Bench", cell: (row) => row.bench },
+    { title: "Begun", cell: (row) => h("span", { class: "nowrap" }, instant(row.started_at)) },
+    { title: "Took", number: true, cell: (row) => (runs(row) ? h("span", { class: "soft" }, `ends ${instant(row.expected_end)}`) : took(row)) },
+    { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("span", { class: "nowrap beside" }, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), ", ", h("a", { href: `/recordings/${recording}` }, `recording ${recording}`))) },
+  ], rows, { label: "Campaigns", first: "8rem" });
+}
+
+const OUTCOMES = { started: "good", refused: "bad", missed: "warn", claimed: "accent" };
+
+function scheduled(rows, again) {
+  const came = (event) => h("span", { class: "small beside" }, chip(event.outcome, OUTCOMES[event.outcome] ?? ""), ` ${instant(event.at)} `, event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message);
+  return card("Schedule", table([
+    { title: "Begins", cell: (row) => [h("strong", { class: "nowrap" }, instant(row.due_at)), h("span", { class: "soft small beside" }, row.time_zone)] },
+    { title: "Recipe", cell: (row) => [row.recipe, row.clip ? h("span", { class: "soft small beside" }, "without what the bench cannot do") : null] },
+    { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
+    { title: "Priority", number: true, cell: (row) => row.priority },
+    { title: "May be late by", number: true, cell: (row) => (row.late_limit_s === null ? "any time" : duration(row.late_limit_s)) },
+    { title: "Before", cell: (row) => (row.history.length ? row.history.slice(-2).map(came) : h("span", { class: "soft" }, "–")) },
+    { title: "", cell: (row) => button("Cancel", async () => {
+      await remove(`/api/schedule/${row.id}`);
+      await again();
+    }, { kind: "tiny", done: "Taken out of the schedule." }) },
+  ], rows, { label: "Schedule", first: "9rem" }));
+}
