@@ -10,7 +10,9 @@ from fastapi.responses import StreamingResponse
 from labctl.api.rooms import HouseOf
 from labctl.services import looking
 from labctl.services import recordings as services
+from labctl.services.acts import ExampleRequest, SimulatedRequest
 from labctl.services.answers import Imported
+from labctl.services.beginnings import SimulatedRecording
 from labctl.services.downloads import zip_recording
 from labctl.services.looking import DataSetsAnswer, RecordingAnswer
 from labctl.services.noise_at_rest import AllanAnswer, allan_unit
@@ -25,6 +27,18 @@ def import_recording(files: list[UploadFile], house: HouseOf) -> Imported:
     """Take in a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
     environment file, as parts of one multipart form. All of it or nothing; an error names file, column and row."""
     return services.import_files(house.acts(), [(file.filename or "", file.file) for file in files])
+
+
+@router.post("/simulated", summary="Simulate a recording", status_code=201)
+def simulated(request: SimulatedRequest, house: HouseOf) -> SimulatedRecording:
+    """Walk through a recipe in simulation, with effects hidden in the unit, and take in what it would have given."""
+    return house.acts().simulate_recording(request)
+
+
+@router.post("/example", summary="Take in an example", status_code=201)
+def example(request: ExampleRequest, house: HouseOf) -> Imported:
+    """Take in one of the recordings of real gyros that come with labctl."""
+    return house.acts().import_example(request)
 
 
 @router.get("", summary="All recordings")

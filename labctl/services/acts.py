@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from instruments.bench import SERIAL
 from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
 from procedures.errors import RecipeError
 from procedures.recipe import shipped_recipes
@@ -70,6 +71,11 @@ class CampaignRequest(Request):
 
     recipe: RecipeSource
     clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
+    hide: list[str] = Field(
+        default_factory=list,
+        max_length=20,
+        description="Of a simulated bench, now: effects hidden in its units, EFFECT or EFFECT=SIZE in its unit.",
+    )
     at: str | None = Field(
         default=None,
         max_length=64,
@@ -85,6 +91,28 @@ class CampaignRequest(Request):
         ge=0,
         le=1e9,
         description="How much later than due it may begin; 0: a missed start is skipped; absent: any time, once.",
+    )
+
+
+class SimulatedRequest(Request):
+    """A recording to be made in simulation, with effects hidden in its unit."""
+
+    recipe: RecipeSource
+    hide: list[str] = Field(
+        default_factory=list,
+        max_length=20,
+        description="EFFECT, or EFFECT=SIZE in the catalogue's coefficient unit, or EFFECT=z10: ten noise units.",
+    )
+    seed: int = Field(default=1, ge=0, lt=1 << 63, description="Same seed, same recording.")
+    serial: str | None = Field(default=None, pattern=SERIAL, description="Of the unit; default: the simulated bench's.")
+    clip: bool = Field(default=False, description="Leave out points that the bench or the unit cannot do.")
+
+
+class ExampleRequest(Request):
+    """Which of the recordings that come with labctl to take in."""
+
+    name: str = Field(
+        max_length=100, description="osu-fog: a real fibre-optic gyro; weiss-gyrostar: a published table."
     )
 
 

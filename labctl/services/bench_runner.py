@@ -16,8 +16,9 @@ from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest,
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import ENDED, answer_of, campaign_status
 from labctl.services.leases import BenchHold
-from labctl.services.resuming import prepare_resume, too_often
+from labctl.services.resuming import as_it_was, prepare_resume, too_often
 from labctl.services.running import Prepared, prepare, run
+from labctl.services.simulate import hiding
 from labctl.store import CampaignRow, Store
 from procedures.control import Control
 from procedures.errors import StalePrompt
@@ -87,7 +88,8 @@ class BenchRunner:
         """
         with self._guard:
             self._refuse_unless_free()
-            prepared = prepare(self._store, request.recipe, self._bench, self._make_clock(), clip=request.clip)
+            bench = hiding(self._bench, request.hide)
+            prepared = prepare(self._store, request.recipe, bench, self._make_clock(), clip=request.clip)
             self._begin(prepared)
         return campaign_status(self._store, prepared.id)
 
@@ -121,7 +123,8 @@ class BenchRunner:
             else:
                 self._refuse_unless_free()
                 make_clock = self._make_clock
-                self._begin(prepare_resume(self._store, campaign, self._bench, lambda _: make_clock(), request))
+                bench = as_it_was(self._store.campaigns.get(campaign), self._bench)
+                self._begin(prepare_resume(self._store, campaign, bench, lambda _: make_clock(), request))
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     def take_up_left(self) -> None:

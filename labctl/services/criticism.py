@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-import tomli_w
 
 from labctl.errors import BadInput
 from labctl.fitting.criticism import Criticism, criticise
@@ -133,4 +132,4 @@ def write_next(answer: CriticismAnswer, path: Path) -> None:
     """Write the best next experiment as a recipe that a campaign can be started from. Raises BadInput without one."""
     if not answer.experiments:
         raise BadInput(f"{path}: there is no experiment to write; the verdict is {answer.verdict!r}")
-    path.write_text(tomli_w.dumps(answer.experiments[0]["recipe"]), encoding="utf-8")
+    path.write_text(answer.experiments[0]["toml"], encoding="utf-8")

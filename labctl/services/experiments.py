@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import tomli_w
 from scipy.special import ndtr
 
 from instruments.bench import BenchFile
@@ -54,12 +55,14 @@ def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict
             continue
         delta = min(deltas[rival] for rival in told)
         hours = plan.expected_s / 3600
+        document = changed.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+        document |= {"format": "labctl-recipe/1", "name": f"{recipe.name}-next"}
         ranked.append(
             {
                 "separates": [signal.leader.effect, *told],
                 "do": text,
-                "recipe": changed.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-                | {"format": "labctl-recipe/1", "name": f"{recipe.name}-next"},
+                "recipe": document,
+                "toml": tomli_w.dumps(document),
                 "power": float(ndtr((delta / 2 - LEAD) / np.sqrt(delta))),
                 "hours": hours,
                 "per_hour": min(delta, SURE) / hours,

@@ -9,7 +9,7 @@ from pathlib import Path
 from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
-from labctl.services import calibrations, improving, keys, recordings, scheduling
+from labctl.services import beginnings, calibrations, improving, keys, recordings, scheduling
 from labctl.services.acts import (
     Acts,
     BackupNote,
@@ -17,12 +17,15 @@ from labctl.services.acts import (
     CertifyRequest,
     ClearRequest,
     ConfirmRequest,
+    ExampleRequest,
     FitRequest,
     ImproveRequest,
     ReasonRequest,
     ResumeRequest,
+    SimulatedRequest,
 )
 from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
+from labctl.services.beginnings import SimulatedRecording
 from labctl.services.benches import bench_status
 from labctl.services.campaigns import campaign_status
 from labctl.services.planning import bench_for, load_bench, load_recipe
@@ -39,6 +42,14 @@ class LocalActs:
     def import_recording(self, folder: Path) -> Imported:
         """Take in a recording from a folder."""
         return recordings.import_folder(self._store, folder, self._clock.utc())
+
+    def simulate_recording(self, request: SimulatedRequest) -> SimulatedRecording:
+        """Make a recording in simulation and take it in."""
+        return beginnings.add_simulated(self._store, request, self._clock.utc())
+
+    def import_example(self, request: ExampleRequest) -> Imported:
+        """Take in a recording that comes with labctl."""
+        return self.import_recording(beginnings.example(request.name))
 
     def fit(self, serial: str, request: FitRequest) -> FitAnswer:
         """Fit a model and keep it as the unit's next version."""

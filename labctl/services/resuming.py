@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from instruments.bench import BenchFile
+from pydantic import ValidationError
+
+from instruments.bench import BenchFile, SimulationSettings
 from instruments.clock import Clock, VirtualClock
 from instruments.open import Bench, open_bench
 from labctl.config import default_database
@@ -35,6 +37,24 @@ def plan_of(store: Store, row: CampaignRow) -> Plan:
             "steps": [step.body for step in store.campaigns.steps(row.id)],
         }
     )
+
+
+def as_it_was(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
+    """Return a simulated bench with the simulation that a campaign was begun in: the same units, on the same day.
+
+    A real bench is what it is. Raises Conflict for a simulation that this labctl does not know any more.
+    """
+    was = row.bench.get("simulation")
+    if not bench_file.is_simulated or was is None:
+        return bench_file
+    try:
+        return bench_file.model_copy(update={"simulation": SimulationSettings.model_validate(was)})
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise Conflict(
+            f"campaign {row.id} was simulated by another labctl: simulation.{'.'.join(map(str, first['loc']))}: "
+            f"{first['msg']}; abort it, and start it anew"
+        ) from error
 
 
 def prepare_resume(

@@ -21,6 +21,8 @@ def is_scheduled(request: CampaignRequest) -> bool:
     if request.at is not None and request.cron is not None:
         raise BadInput("a start has a time or a cron line, not both; leave one out")
     if request.at is not None or request.cron is not None:
+        if request.hide:
+            raise BadInput("hide: only for a campaign that begins now; leave it out, or the time")
         return True
     given = [name for name in ("time_zone", "priority", "late_limit_s") if name in request.model_fields_set]
     if given:

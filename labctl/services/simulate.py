@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -53,14 +54,37 @@ class Simulated(Answer):
     folder: str
 
 
+@dataclass(frozen=True)
+class Made:
+    """A simulated recording, and what it was made from."""
+
+    recording: Recording
+    plan: Plan
+    bench: BenchFile
+    hidden: Mapping[str, float]  #: effect id -> size that was hidden
+
+
 def simulate_recording(request: SimulateRequest, out: Path, file_format: Literal["parquet", "csv"]) -> Simulated:
     """Simulate a campaign and write its recording to a new folder. Raises BadInput, RecipeError, PlanRefused."""
+    made = make_recording(request)
+    write_recording(made.recording, out, file_format)
+    return Simulated(
+        serial=made.recording.info.serial, datasets=made.plan.datasets, readings=len(made.recording),
+        hidden=dict(made.hidden), folder=str(out),
+    )  # fmt: skip
+
+
+def make_recording(request: SimulateRequest, serial: str | None = None) -> Made:
+    """Simulate a campaign, the unit under another serial number if one is named.
+
+    Raises BadInput, RecipeError, PlanRefused.
+    """
     recipe = load_recipe(request.recipe)
     bench = load_bench(request.bench or bench_for(recipe))
     gyro = _gyro(bench, request.gyro)
     hidden = hidden_sizes([text for text in request.hide if not _is_z(text)])
     rate_hz = request.sample_rate_hz or DEFAULT_RATE_HZ
-    gyro = gyro.model_copy(update={"sample_rate_hz": rate_hz})
+    gyro = gyro.model_copy(update={"sample_rate_hz": rate_hz, "serial": serial or gyro.serial})
     simulation = (bench.simulation or SimulationSettings()).model_copy(update={"seed": request.seed, "hidden": hidden})
     bench = bench.model_copy(update={"gyros": (gyro,), "simulation": simulation})
     plan = make_plan(recipe, limits_of(bench), clip=request.clip)
@@ -73,11 +97,7 @@ def simulate_recording(request: SimulateRequest, out: Path, file_format: Literal
             hidden[name] = sizing.size_of(name, float(z), known[name])
         simulation = simulation.model_copy(update={"hidden": hidden})
         bench = bench.model_copy(update={"simulation": simulation})
-    recording = simulate(plan, bench, gyro)
-    write_recording(recording, out, file_format)
-    return Simulated(
-        serial=gyro.serial, datasets=plan.datasets, readings=len(recording), hidden=hidden, folder=str(out)
-    )
+    return Made(simulate(plan, bench, gyro), plan, bench, hidden)
 
 
 def _gyro(bench: BenchFile, name: str | None) -> GyroSettings:
@@ -108,9 +128,23 @@ def hidden_sizes(texts: list[str]) -> dict[str, float]:
                 raise ValueError(size)
         except ValueError:
             raise BadInput(
-                f"--hide {text}: size {size!r} is not a finite number (in the effect's coefficient unit)"
+                f"hide {text}: size {size!r} is not a finite number (in the effect's coefficient unit)"
             ) from None
     return sizes
+
+
+def hiding(bench: BenchFile, texts: list[str]) -> BenchFile:
+    """Return a simulated bench with effects hidden in its units, `EFFECT` or `EFFECT=SIZE`. Raises BadInput."""
+    if not texts:
+        return bench
+    if not bench.is_simulated:
+        raise BadInput(
+            f"hide {', '.join(texts)}: bench {bench.name} is not simulated here; effects can be hidden in simulated "
+            "units only, leave the key out"
+        )
+    simulation = bench.simulation or SimulationSettings()
+    hidden = {**simulation.hidden, **hidden_sizes(texts)}
+    return bench.model_copy(update={"simulation": simulation.model_copy(update={"hidden": hidden})})
 
 
 def simulate(plan: Plan, bench: BenchFile, gyro: GyroSettings) -> Recording:

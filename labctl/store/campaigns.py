@@ -74,12 +74,14 @@ class Campaigns:
             for unit in new.units:
                 info = RecordingInfo.model_validate(unit.info)
                 new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
-            what = {
+            what: dict[str, Any] = {
                 "recipe": new.recipe_name,
                 "bench": new.bench_name,
                 "units": [str(unit.info["serial"]) for unit in new.units],
                 "schedule_hash": new.schedule_hash,
             }
+            if hidden := (new.bench.get("simulation") or {}).get("hidden"):
+                what["hidden"] = hidden
             append(connection, at, "campaign start", f"campaign {number}", what)
         return number
 

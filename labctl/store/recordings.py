@@ -42,8 +42,11 @@ class Recordings:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add_import(self, recording: Recording, at: datetime) -> int:
-        """Take in a recording made elsewhere; returns its number. All of it is kept, or nothing."""
+    def add_import(self, recording: Recording, at: datetime, simulated: Mapping[str, Any] | None = None) -> int:
+        """Take in a recording made elsewhere; returns its number. All of it is kept, or nothing.
+
+        `simulated` says what it was made from, for the audit trail, where nobody measured it.
+        """
         info = recording.info
         with self._database.writing() as connection:
             number = new_recording(connection, info, at)
@@ -53,7 +56,8 @@ class Recordings:
                 _add_table(connection, number, recording)
             _add_environment(connection, number, recording)
             what = {"serial": info.serial, "kind": info.kind, "rows": len(recording)}
-            append(connection, at, "import", f"recording {number}", what)
+            act = "import" if simulated is None else "simulate"
+            append(connection, at, act, f"recording {number}", {**what, **(simulated or {})})
         return number
 
     def get(self, recording: int) -> RecordingRow:

@@ -222,6 +222,10 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
         "campaign confirm", lambda c: c.post("/api/campaigns/1/confirm", json={"prompt": "1-mount", "by": "A"}),
     ),
     "/api/recordings": ("import", upload),
+    "/api/recordings/simulated": (
+        "simulate", lambda c: c.post("/api/recordings/simulated", json={"recipe": "short", "serial": "SIM"}),
+    ),
+    "/api/recordings/example": ("import", lambda c: c.post("/api/recordings/example", json={"name": "osu-fog"})),
     "/api/units/{serial}/calibrations": ("fit", lambda c: c.post(UNIT, json={"effects": ["bias", "scale_factor"]})),
     "/api/units/{serial}/calibrations/{version}/improve": (
         "improve", lambda c: c.post(f"{UNIT}/1/improve", json={"remove": ["scale_factor"]}),

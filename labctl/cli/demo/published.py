@@ -2,22 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from instruments.clock import VirtualClock
 from labctl.cli.demo.stage import Stage
-from labctl.errors import NotFound
+from labctl.services.beginnings import example
 from labctl.services.recordings import import_folder
-
-EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
-
-
-def example(name: str) -> Path:
-    """Return an example's folder; raises NotFound where labctl was installed without its sources."""
-    folder = EXAMPLES / name
-    if not folder.is_dir():
-        raise NotFound(f"{folder}: not there; the demo's measured data come with labctl's sources, not with the wheel")
-    return folder
 
 
 def play(stage: Stage) -> None:
