@@ -34,9 +34,10 @@ export function eventList(most, level = "info") {
 }
 
 function line(event) {
-  const limit = event.value !== null && event.value !== undefined && event.limit !== null && event.limit !== undefined ? ` (${setting(event.value)} ${event.unit ?? ""}, limit ${setting(event.limit)} ${event.unit ?? ""})` : "";
+  const said = event.message.replace(/ \[question [^\]]+\]$/, "");
+  const limit = !said.includes("limit") && event.value !== null && event.value !== undefined && event.limit !== null && event.limit !== undefined ? ` (${setting(event.value)} ${event.unit ?? ""}, limit ${setting(event.limit)} ${event.unit ?? ""})` : "";
   return h("li", {},
     h("time", { datetime: event.at, title: `${day(event.at)}, ${event.t_s.toFixed(1)} s of the campaign` }, clock(event.at)),
     chip(event.level, KINDS[event.level] ?? ""),
-    h("span", {}, event.device ? h("strong", {}, `${event.device}: `) : null, event.message.replace(/ \[question [^\]]+\]$/, ""), limit));
+    h("span", {}, event.device && !said.startsWith(event.device) ? h("strong", {}, `${event.device}: `) : null, said, limit));
 }

@@ -5,15 +5,16 @@ import { duration, setting } from "../core/format.js";
 
 /** What becomes of a data set: its colour, in the order of the legend. */
 const STATES = [["done", "good"], ["running", "accent"], ["to come", "line-strong"], ["failed", "bad"], ["interrupted", "bad"], ["skipped", "soft"]];
-const HOUR = 3600;
+/** Shorter plans are drawn in minutes, s. */
+const IN_HOURS = 3 * 3600;
 
-/** Steps in the order of time with begin and end in hours, whether they were run or are only planned. */
-function stepsOf(timeline) {
+/** Steps in the order of time with begin and end in `unit_s`, whether they were run or are only planned. */
+function stepsOf(timeline, unit_s) {
   return timeline.number.map((number, k) => {
     const from = timeline.forecast_s?.[k] ?? timeline.start_s[k];
     const over = timeline.ended_s?.[k];
     const until = Number.isFinite(over) && over >= from ? over : from + (timeline.state?.[k] === "skipped" ? 0 : timeline.expected_s[k]);
-    return { number, kind: timeline.kind[k], from: from / HOUR, until: until / HOUR, warm: timeline.temperature_c[k], rate: timeline.rate_dps[k], position: timeline.position[k], dataset: timeline.dataset[k], state: timeline.state?.[k] ?? "to come" };
+    return { number, kind: timeline.kind[k], from: from / unit_s, until: until / unit_s, warm: timeline.temperature_c[k], rate: timeline.rate_dps[k], position: timeline.position[k], dataset: timeline.dataset[k], state: timeline.state?.[k] ?? "to come" };
   });
 }
 
@@ -54,7 +55,8 @@ export function planPicture(name, give, { tall = "24rem", pick } = {}) {
   const caption = "Above: set point of the chamber, with the data sets on it. Below: their table rates. Bands: which axis of the unit points up.";
   const draw = () => {
     const { timeline, now_s = null, live = false } = give();
-    const steps = stepsOf(timeline);
+    const unit_s = timeline.start_s.at(-1) + timeline.expected_s.at(-1) > IN_HOURS ? 3600 : 60;
+    const steps = stepsOf(timeline, unit_s);
     const sets = steps.filter((step) => step.dataset !== null);
     const narrow = window.innerWidth < 760;
     const marks = STATES.flatMap(([state, shade]) => {
@@ -62,7 +64,7 @@ export function planPicture(name, give, { tall = "24rem", pick } = {}) {
       if (!here.length) return [];
       const common = {
         type: "scatter", mode: "markers", name: live ? `${state} (${here.length})` : "data sets", legendgroup: state, x: here.map((step) => (step.from + step.until) / 2), customdata: here.map((step) => step.dataset),
-        text: here.map((step) => `data set ${step.dataset}: ${setting(step.rate)} deg/s at ${setting(step.warm)} deg C, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * HOUR)}, takes ${duration((step.until - step.from) * HOUR)}`),
+        text: here.map((step) => `data set ${step.dataset}: ${setting(step.rate)} deg/s at ${setting(step.warm)} deg C, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`),
         hovertemplate: "%{text}<extra></extra>", selected: { marker: { opacity: 1 } },
       };
       const fill = colour(live ? shade : "accent");
@@ -75,14 +77,14 @@ export function planPicture(name, give, { tall = "24rem", pick } = {}) {
     const shapes = bands(steps).map((band) => ({ type: "rect", xref: "x", yref: "paper", x0: band.from, x1: band.until, y0: 0, y1: 1, line: { width: 0 }, fillcolor: colour(`axis-${band.position.replace("-", "")}`), opacity: 0.1, layer: "below" }));
     const words = bands(steps).filter((band) => band.until - band.from > end / (narrow ? 12 : 30)).map((band) => ({ text: `<b>${band.position}</b> up`, showarrow: false, xref: "x", yref: "paper", x: (band.from + band.until) / 2, y: 1, yanchor: "bottom", font: { size: 11.5, color: colour(`axis-${band.position.replace("-", "")}`) } }));
     if (now_s !== null) {
-      shapes.push({ type: "line", xref: "x", yref: "paper", x0: now_s / HOUR, x1: now_s / HOUR, y0: 0, y1: 1, line: { color: colour("ink"), width: 1.6, dash: "dot" } });
-      words.push({ text: "now", showarrow: false, xref: "x", yref: "paper", x: now_s / HOUR, y: 0.42, yanchor: "middle", xanchor: now_s / HOUR > end * 0.9 ? "right" : "left", font: { size: 11.5, color: colour("ink") } });
+      shapes.push({ type: "line", xref: "x", yref: "paper", x0: now_s / unit_s, x1: now_s / unit_s, y0: 0, y1: 1, line: { color: colour("ink"), width: 1.6, dash: "dot" } });
+      words.push({ text: "now", showarrow: false, xref: "x", yref: "paper", x: now_s / unit_s, y: 0.42, yanchor: "middle", xanchor: now_s / unit_s > end * 0.9 ? "right" : "left", font: { size: 11.5, color: colour("ink") } });
     }
     return {
       data: [{ type: "scatter", mode: "lines", name: "set point", ...course(steps), line: { color: colour("soft"), width: 1.5 }, hoverinfo: "skip", showlegend: false }, ...marks],
       layout: {
         margin: { l: 56, r: 12, t: live ? 44 : 24, b: 42 }, shapes, annotations: words, legend: { orientation: "h", y: 1.07, yanchor: "bottom", x: 0 },
-        xaxis: { title: { text: "time since the beginning, h" }, anchor: "y2", range: [-0.01 * end, Math.max(end, (now_s ?? 0) / HOUR) * 1.01] },
+        xaxis: { title: { text: `time since the beginning, ${unit_s === 3600 ? "h" : "min"}` }, anchor: "y2", range: [-0.01 * end, Math.max(end, (now_s ?? 0) / unit_s) * 1.01] },
         yaxis: { title: { text: "set point, deg C" }, domain: [0.46, 1] }, yaxis2: { title: { text: "rate, deg/s" }, domain: [0, 0.38], anchor: "x" },
       },
     };

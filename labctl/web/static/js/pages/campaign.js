@@ -74,7 +74,7 @@ function summary(now, plan) {
 /** Why it stands where it stands, in the service's words. */
 function verdict(now) {
   const kind = { done: "good", failed: "bad", aborted: "bad" }[now.state] ?? "warn";
-  return [runs(now) && now.state === "running" ? null : notice(kind, h("p", { class: "told" }, now.reason || `It is ${now.state}.`), now.last_error && now.last_error !== now.reason ? h("p", {}, `Last fault: ${now.last_error}`) : null),
+  return [runs(now) && now.state === "running" ? null : notice(kind, h("p", { class: "told" }, now.reason || `It is ${now.state}.`), now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null),
     ...Object.entries(now.dropped).map(([unit, why]) => notice("warn", h("strong", {}, unit), ` took no further part: ${why}`))].filter(Boolean);
 }
 

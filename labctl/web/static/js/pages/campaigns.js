@@ -38,7 +38,7 @@ function listed(rows) {
     { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "soft small beside" }, row.recipe)] },
     { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.reason ? h("span", { class: "soft small beside two-lines", title: row.reason }, row.reason) : null] },
     { title: "Progress", cell: (row) => h("div", { class: "progress-cell" }, h("div", { class: "meter", role: "img", "aria-label": percent(row.progress) }, h("i", { style: `width: ${100 * row.progress}%` })), h("span", { class: "small" }, percent(row.progress))) },
-    { title: "Bench", cell: (row) => row.bench },
+    { title: "Bench", cell: (row) => h("span", { class: "nowrap" }, row.bench) },
     { title: "Begun", cell: (row) => h("span", { class: "nowrap" }, instant(row.started_at)) },
     { title: "Took", number: true, cell: (row) => (runs(row) ? h("span", { class: "soft" }, `ends ${instant(row.expected_end)}`) : took(row)) },
     { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("span", { class: "nowrap beside" }, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), ", ", h("a", { href: `/recordings/${recording}` }, `recording ${recording}`))) },

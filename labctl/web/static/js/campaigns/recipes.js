@@ -1,0 +1,50 @@
+// Which recipe: one that comes with the house, or one's own as TOML.
+
+import { fill, fresh, h } from "../core/dom.js";
+import { count, duration } from "../core/format.js";
+import { card, chip, field } from "../core/parts.js";
+
+const TYPED_MS = 600;
+
+/** `choice` is {name, text}: `name` "own" means `text`. `chosen(choice)` is called with every other choice. */
+export function recipes(all, choice, chosen) {
+  const group = fresh("recipe");
+  const text = h("textarea", { rows: "16", spellcheck: "false", value: choice.text ?? "", oninput: () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => chosen({ name: "own", text: text.value }), TYPED_MS);
+  } });
+  let waiting = null;
+  const own = h("div", {}, field("Recipe as TOML", text, "Planned again as you type. Nothing moves before you start it."));
+  const shipped = h("details", {}, h("summary", {}, "Its text"), h("pre", { class: "command" }));
+  const edit = h("button", { type: "button", class: "button tiny", onclick: () => {
+    text.value = shipped.querySelector("pre").textContent;
+    all.length && pick("own");
+    radios.get("own").checked = true;
+    text.focus();
+  } }, "Change a copy of it");
+  shipped.append(h("div", { class: "row", style: "margin-top: .5rem" }, edit));
+  const radios = new Map();
+
+  function option(name, title, beside, warning) {
+    const input = h("input", { type: "radio", name: group, value: name, checked: name === choice.name, onchange: () => pick(name) });
+    radios.set(name, input);
+    return h("label", { class: "option" }, input, h("span", { class: "stack", style: "gap: .1rem" }, h("strong", {}, title), h("span", { class: "soft small" }, beside), warning));
+  }
+  function pick(name) {
+    if (name === "own" && !text.value.trim()) text.value = all[0]?.text ?? "";
+    show(name);
+    chosen(name === "own" ? { name, text: text.value } : { name, text: null });
+  }
+  function show(name) {
+    own.hidden = name !== "own";
+    shipped.hidden = name === "own";
+    fill(shipped.querySelector("pre"), all.find((each) => each.name === name)?.text ?? "");
+  }
+  show(choice.name);
+  return card("Recipe",
+    h("div", { class: "options", role: "radiogroup", "aria-label": "Recipe" },
+      all.map((each) => option(each.name, each.name, h("span", {}, `${each.description}. `, each.datasets === null ? null : h("span", { class: "nowrap" }, `${count(each.datasets)} data sets, ${duration(each.expected_s)}`)),
+        each.refused ? chip("beyond the bench", "warn") : each.remark ? h("span", { class: "small warn-ink" }, each.remark) : null)),
+      option("own", "Your own", "A recipe as text.")),
+    shipped, own);
+}
