@@ -20,7 +20,7 @@ export async function page({ query, signal }) {
   let [clip, hide, asked] = [query.clip === "1", [], new AbortController()];
   const [planned, found] = [h("div", { "aria-live": "polite" }), h("div", { class: "stack" })];
   const simulated = !bench || bench.simulated;
-  const hider = simulated ? hiding(catalogue.effects, (list) => { hide = list; }) : null;
+  const hider = simulated ? hiding(catalogue.effects, query.hide, (list) => { hide = list; }) : null;
   const source = () => (choice.name === "own" ? `${choice.text.trimEnd()}\n` : choice.name);
 
   async function plan() {

@@ -1,11 +1,15 @@
-// The catalogue, to read.
+// The catalogue of effects: all of them, or one on a page of its own.
 
-import { get } from "../core/api.js";
-import { h } from "../core/dom.js";
-import { words } from "../core/format.js";
-import { head } from "../core/parts.js";
+import { get, Problem } from "../core/api.js";
+import { book } from "../effects/book.js";
+import { one } from "../effects/one.js";
 
-export async function page({ params, signal }) {
-  const catalogue = await get("/api/effects", { signal });
-  return h("div", { class: "page" }, head("Effects", `${catalogue.effects?.length ?? 0} physical effects`), h("pre", {}, JSON.stringify(catalogue.effects?.[0] ?? catalogue, null, 1)), words(params.id ?? ""));
+let kept = null;
+
+export async function page({ params, query, signal }) {
+  kept ??= (await get("/api/effects", { signal })).effects;
+  if (!params.id) return book(kept, query);
+  const effect = kept.find((each) => each.id === params.id);
+  if (!effect) throw new Problem({ title: "No such effect", detail: `The catalogue has no effect ${params.id}.`, status: 404 });
+  return one(effect, kept);
 }
