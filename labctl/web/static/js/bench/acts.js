@@ -1,8 +1,9 @@
 // What a person does to a campaign or a bench. Each asks who, and why where that will be read later.
 
-import { post } from "../core/api.js";
+import { get, post } from "../core/api.js";
 import { h } from "../core/dom.js";
 import { button, dialog, toast } from "../core/parts.js";
+import { go } from "../core/router.js";
 
 const WHO = "labctl.who";
 const who = () => ({ name: "by", label: "Your name", value: localStorage.getItem(WHO) ?? "" });
@@ -17,11 +18,14 @@ const act = (id, name, body) => post(`/api/campaigns/${id}/${name}`, body);
 
 /** The one red button: the campaign ends now, table at rest, chamber at its safe set point. */
 export const stopButton = (id) => Object.assign(button("Safe stop", async () => {
-  const said = await asked("Stop now and leave the bench safe?", [who(), { name: "reason", label: "Why", hint: "It is written beside the campaign." }],
+  const said = await asked("Stop now and leave the bench safe?", [{ ...who(), required: false }, { name: "reason", label: "Why", value: "stopped by hand", hint: "It is written beside the campaign." }],
     { text: "The table comes to rest, the chamber goes to its safe set point, the campaign ends. What was measured is kept, and the campaign can be resumed.", confirm: "Stop now", kind: "stop" });
   if (!said) return;
   const answer = await act(id, "abort", said);
-  toast(answer.state === "aborted" ? "good" : "bad", answer.state === "aborted" ? "Stopped. The bench is in its safe state." : `The campaign is ${answer.state}: ${answer.reason}`);
+  const unsafe = (await get("/api/benches")).find((bench) => bench.unconfirmed);
+  if (answer.state !== "aborted") toast("bad", `The campaign is ${answer.state}: ${answer.reason}`);
+  else if (unsafe) toast("bad", `Stopped, but the safe state was not confirmed: ${unsafe.unconfirmed}`);
+  else toast("good", "Stopped. The bench is in its safe state.");
 }, { kind: "stop big" }), { title: "End the campaign now, in the safe state" });
 
 export const pauseButton = (id) => button("Pause", async () => {
@@ -36,6 +40,7 @@ export const resumeButton = (id, { whole = false } = {}) => button(whole ? "Resu
   if (!said) return;
   await act(id, "resume", { by: said.by, reason: said.reason });
   toast("good", whole ? `Campaign ${id} is taken up.` : "It goes on.");
+  if (whole) await go("/bench");
 }, { kind: "first" });
 
 /** Answer the question that waits: it is done, or it cannot be done. */

@@ -40,7 +40,7 @@ export function gauges(timeline) {
   const gyro = gauge("Gyro", "deg C", low, high, 2);
   const rate = gauge("Table rate", "deg/s", -most, most, 3);
   const element = h("div", { class: "gauges" }, chamber, gyro, rate);
-  const apart = (value, target) => (Number.isFinite(value) && Number.isFinite(target) ? `set point ${setting(target)} deg C, ${Math.abs(value - target) < 0.005 ? "there" : `${Math.abs(value - target).toFixed(2)} K ${value > target ? "above" : "below"}`}` : "no set point yet");
+  const apart = (value, target) => (Number.isFinite(value) && Number.isFinite(target) ? `set point ${setting(target)} deg C, ${Math.abs(value - target) < 0.005 ? "there" : `${Math.abs(value - target).toFixed(2)} K ${value > target ? "above" : "below"}`}` : Number.isFinite(value) ? "no set point yet" : "no reading yet");
   element.set = (status, setpoint_c) => {
     const number = (value) => (value === null || value === undefined ? NaN : value);
     chamber.set(number(status.chamber_c), setpoint_c ?? NaN, apart(number(status.chamber_c), setpoint_c ?? NaN));
