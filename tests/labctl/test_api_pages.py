@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -231,3 +232,19 @@ def test_pictures_are_figures_with_how_to_read_them(
     assert found["map"]["how_to_read"].startswith("Each cell is")
     assert {"data", "layout"} <= set(found["map"]["figure"])
     assert found["map"]["figure"]["data"][0]["type"] == "heatmap"
+
+
+def test_the_text_of_the_api_needs_nothing_from_outside(client: TestClient) -> None:
+    page = client.get("/api-docs")
+    assert page.status_code == 200
+    linked = re.findall(r'(?:href|src)="([^"]+)"', page.text)
+    assert len(linked) == 5
+    for address in linked:
+        assert "//" not in address
+        found = client.get(f"/{address}")
+        assert found.status_code == 200, address
+        assert found.content
+    assert "://" not in client.get("/api-docs/start.js").text
+    assert client.get("/api-docs/core.py").status_code == 404
+    for outside in ("/docs", "/redoc"):
+        assert client.get(outside).status_code == 404
