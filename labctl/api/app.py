@@ -9,7 +9,19 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from labctl import web
-from labctl.api import calibrations, campaigns, health, keys, plans, problems, recordings, schedule, units, watchdog
+from labctl.api import (
+    api_docs,
+    calibrations,
+    campaigns,
+    health,
+    keys,
+    plans,
+    problems,
+    recordings,
+    schedule,
+    units,
+    watchdog,
+)
 from labctl.api.door import Access, Door
 from labctl.services.house import House
 
@@ -50,11 +62,13 @@ def create_app(house: House, access: Access | None = None) -> FastAPI:
         version=version("labctl"),
         description=DESCRIPTION,
         lifespan=lifespan,
+        docs_url=None,  # the framework's own pages load their scripts from outside
+        redoc_url=None,
         form_limits={"max_files": MOST_FILES, "max_fields": MOST_FILES},
     )
     app.state.house = house
     problems.install(app)
-    rooms = (health, units, calibrations, plans, campaigns, schedule, recordings, keys)
+    rooms = (health, units, calibrations, plans, campaigns, schedule, recordings, keys, api_docs)
     for room in rooms:
         app.include_router(room.router)
     web.install(app)

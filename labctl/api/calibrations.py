@@ -14,7 +14,9 @@ from labctl.services import criticism as criticism_services
 from labctl.services.acts import CertifyRequest, FitRequest, ImproveRequest
 from labctl.services.answers import CalibrationRow, Certified, CriticismAnswer, FitAnswer, LadderAnswer, VersionAnswer
 from labctl.services.improving import PreviewAnswer, preview_unit
+from labctl.services.pictures import PictureAnswer, pictures_unit
 from labctl.services.residuals import ResidualsAnswer
+from labctl.services.surfaces import SurfaceAnswer, surface_of
 from labctl.services.uncertainty import UncertaintyAnswer, uncertainty_at
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
@@ -89,6 +91,24 @@ def criticism(
 def residuals(serial: str, version: int, house: HouseOf, recording: RecordingNumber = None) -> ResidualsAnswer:
     """The rows behind the map of the criticism, one per data set and axis: measured, modelled, and what is left."""
     return criticism_services.residuals_unit(house.store, serial, version, recording)
+
+
+@router.get("/calibrations/{version}/pictures", summary="The pictures of a criticism")
+def pictures(serial: str, version: int, house: HouseOf, recording: RecordingNumber = None) -> list[PictureAnswer]:
+    """Every picture that there is something to draw in, as a Plotly figure, with how to read it."""
+    return pictures_unit(house.store, serial, version, recording)
+
+
+@router.get("/calibrations/{version}/surface", summary="The modelled error over rate and temperature")
+def surface(
+    serial: str,
+    version: int,
+    house: HouseOf,
+    rate_points: Annotated[int, Query(ge=2, le=401)] = 41,
+    temperature_points: Annotated[int, Query(ge=2, le=201)] = 25,
+) -> SurfaceAnswer:
+    """What the calibration takes off each axis, turned about itself, on a grid over what was calibrated."""
+    return surface_of(house.store, serial, version, rate_points, temperature_points)
 
 
 @router.post("/calibrations/{version}/preview", summary="What a changed model would be")

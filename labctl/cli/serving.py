@@ -34,7 +34,7 @@ def serve(
         if as_json:
             print_json({"url": url}, one_line=True)
         else:
-            console.print(f"labctl listens on {url}  (API text: {url}/docs)", markup=False)
+            console.print(f"labctl listens on {url}  (API text: {url}/api-docs)", markup=False)
 
     with one_clear_line():
         request = ServeRequest(

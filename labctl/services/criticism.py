@@ -66,8 +66,13 @@ def _criticise(store: Store, recording: int, model: ErrorModel, catalogue: Mappi
 
 
 def readings_of(store: Store, recording: int) -> Recording:
-    """Return a recording's readings at no more than criticism needs, data set by data set; points as they are."""
+    """Return a recording's readings at no more than criticism needs, data set by data set; points as they are.
+
+    Raises BadInput for a table of coefficients: there is nothing measured in it to hold a model against.
+    """
     head = store.recordings.get(recording)
+    if head.kind == "coefficients":
+        raise BadInput(f"recording {recording} is a table of coefficients: a model is held against readings or means")
     points = store.recordings.points(recording)
     if head.kind != "samples":
         return points

@@ -32,6 +32,11 @@ def test_examples_come_with_the_package(client: TestClient) -> None:  # noqa: F8
     assert fog.json().items() >= {"serial": "OSU-FOG-2024", "datasets": 695, "suggested_model": "ojeda2000"}.items()
     table = client.post("/api/recordings/example", json={"name": "weiss-gyrostar"}).json()
     assert table["suggested_model"] == "weiss1995"
+    client.post("/api/units/WEISS-ENV05S/calibrations", json={"model": "weiss1995"})
+    for view in ("criticism", "residuals", "pictures"):
+        nothing = client.get(f"/api/units/WEISS-ENV05S/calibrations/1/{view}")
+        assert (nothing.status_code, "table of coefficients" in nothing.json()["detail"]) == (400, True)
+    assert client.get("/api/units/WEISS-ENV05S/calibrations/1/surface").status_code == 200
     refused = client.post("/api/recordings/example", json={"name": "../.."})
     assert (refused.status_code, "there are osu-fog, weiss-gyrostar" in refused.json()["detail"]) == (400, True)
 

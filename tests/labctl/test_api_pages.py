@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
+from labctl.compensator import Compensator
 from labctl.recording import Recording
 from labctl.services import criticism
 from labctl.services.bench_runner import BenchRunner
@@ -182,3 +184,67 @@ def test_recordings_and_their_data_sets(fog: TestClient) -> None:
     assert imported["channels"]["gyro_z"]["mean"] == points["gyro_z"]
     assert imported["table_rate_dps"] == points["table_rate_dps"]
     assert fog.get("/api/recordings/3/datasets").status_code == 404
+
+
+def test_a_surface_is_what_the_calibration_takes_off(client: TestClient, triaxial: Callable[[int], Any]) -> None:
+    taken_in(client, triaxial(3).campaign(3))
+    path = "/api/units/SIM-3/calibrations"
+    client.post(path, json={"model": "yang2018"})
+    answer = client.get(f"{path}/1/surface", params={"rate_points": 9, "temperature_points": 5}).json()
+    assert set(answer["axes"]) == {"x", "y", "z"}
+    assert (answer["held"], answer["left_out"]) == ({}, [])
+    surface = answer["axes"]["y"]
+    low, high = answer["validity"]["temperature_c"]
+    assert surface["temperature_c"] == pytest.approx(list(np.linspace(low, high, 5)))
+    assert np.array(surface["error_dps"]).shape == (5, 9)
+    rows = client.get(f"{path}/1/residuals").json()["columns"]
+    modelled = by_cell(rows, "modelled_error_dps", "own_rate_dps", "temperature_c", "position")
+    fine = client.get(f"{path}/1/surface", params={"rate_points": 81, "temperature_points": 181}).json()["axes"]["y"]
+    for (axis, _), (error, rate, warm, position) in modelled.items():
+        if axis == position == "y":
+            row = int(np.argmin(np.abs(np.array(fine["temperature_c"]) - warm)))
+            line = np.interp(rate, fine["rate_dps"], fine["error_dps"][row])
+            assert line == pytest.approx(error, abs=0.01)
+    assert client.get(f"{path}/1/surface", params={"rate_points": 1}).status_code == 422
+    assert client.get(f"{path}/2/surface").status_code == 404
+
+
+def test_a_law_of_the_output_has_its_error_at_true_rates(fog: TestClient) -> None:
+    answer = fog.get(f"{FOG}/calibrations/1/surface").json()  # ojeda2000 subtracts a function of the output
+    surface = answer["axes"]["z"]
+    compensator = Compensator.from_bytes(fog.get(f"{FOG}/calibration", params={"version": 1}).content)
+    rate = np.array(surface["rate_dps"])
+    for warm, errors in zip(surface["temperature_c"], surface["error_dps"], strict=True):
+        corrected = compensator.compensate((rate + np.array(errors))[:, None], np.full(len(rate), warm)).rate_dps
+        assert corrected[:, 0] == pytest.approx(rate, abs=1e-9)
+
+
+def test_pictures_are_figures_with_how_to_read_them(
+    client: TestClient, make_points: Callable[..., Recording], grid_11_by_11: tuple[np.ndarray, np.ndarray]
+) -> None:
+    rate, warm = grid_11_by_11
+    noise = np.random.default_rng(1).normal(0, 0.001, len(rate))
+    taken_in(client, make_points(rate, warm, 1.01 * rate + 0.002 * np.abs(rate) + noise))
+    client.post("/api/units/ONE/calibrations", json={"effects": ["bias", "scale_factor"]})
+    pictures = client.get("/api/units/ONE/calibrations/1/pictures").json()
+    found = {picture["id"]: picture for picture in pictures}
+    assert {"map", "ladder"} <= set(found)
+    assert found["map"]["how_to_read"].startswith("Each cell is")
+    assert {"data", "layout"} <= set(found["map"]["figure"])
+    assert found["map"]["figure"]["data"][0]["type"] == "heatmap"
+
+
+def test_the_text_of_the_api_needs_nothing_from_outside(client: TestClient) -> None:
+    page = client.get("/api-docs")
+    assert page.status_code == 200
+    linked = re.findall(r'(?:href|src)="([^"]+)"', page.text)
+    assert len(linked) == 5
+    for address in linked:
+        assert "//" not in address
+        found = client.get(f"/{address}")
+        assert found.status_code == 200, address
+        assert found.content
+    assert "://" not in client.get("/api-docs/start.js").text
+    assert client.get("/api-docs/core.py").status_code == 404
+    for outside in ("/docs", "/redoc"):
+        assert client.get(outside).status_code == 404

@@ -24,7 +24,7 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 UNIT = "OSU-FOG-2024"
 THERE = {"serial": UNIT, "version": 1, "recording": 1}
 #: Seconds of work each: of these only few reach a version that is there.
-COSTLY = ("/criticism", "/improve", "/preview", "/residuals")
+COSTLY = ("/criticism", "/improve", "/preview", "/residuals", "/pictures")
 #: Of each operation; drawn from the same seed every time.
 EXAMPLES_EACH, SEED = 10, 1
 

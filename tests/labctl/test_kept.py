@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from labctl.services import kept as keeping
-from labctl.services.answers import LadderAnswer
-from labctl.services.kept import kept
+from labctl.services.answers import Answer, Certified, LadderAnswer
+from labctl.services.kept import kept, kept_among
 from labctl.store import open_store
 from tests.labctl.test_cli import Lab
 from tests.labctl.test_criticism import single_axis
+
+CERTIFIED = {"serial": "A", "version": 1, "act": "certify", "by": "B", "reason": "C", "at": "2026-01-05T08:00Z"}
 
 
 class Work:
@@ -42,6 +46,24 @@ def test_the_same_question_is_answered_once(work: Work, ask: Callable[..., Ladde
     assert work.times == 1
     ask(version=2)
     assert work.times == 2
+
+
+def test_whoever_asks_the_same_meanwhile_waits_for_the_answer() -> None:
+    begun, go_on, times = threading.Event(), threading.Event(), []
+
+    def work() -> list[Answer]:
+        times.append(1)
+        begun.set()
+        go_on.wait(30)
+        return [LadderAnswer(serial="A", steps=[], noise_floor_dps=1.0), Certified.model_validate(CERTIFIED)]
+
+    with ThreadPoolExecutor(2) as pool:
+        first = pool.submit(kept_among, LadderAnswer, {"version": 1}, work)
+        assert begun.wait(30)
+        second = pool.submit(kept_among, Certified, {"version": 1}, work)
+        go_on.set()
+        assert (first.result().serial, second.result().by) == ("A", "B")
+    assert len(times) == 1
 
 
 def test_other_code_answers_anew(work: Work, ask: Callable[..., LadderAnswer], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,7 +105,9 @@ def test_every_path_asks_for_its_role_and_no_more(guarded: Guarded, method: str,
             assert f"{role.value} is {role.value}; this asks for" in answer.json()["detail"]
 
 
-@pytest.mark.parametrize("path", ["/", "/docs", "/openapi.json", "/api/nowhere", "/health/", "/health/x", "//health"])
+@pytest.mark.parametrize(
+    "path", ["/", "/api-docs", "/openapi.json", "/api/nowhere", "/health/", "/health/x", "//health"]
+)
 def test_nothing_else_is_open(guarded: Guarded, path: str) -> None:
     assert guarded.ask("get", path, None).status_code == 401
     assert guarded.ask("post", path, None).status_code == 401

@@ -33,7 +33,7 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
             certify(store, serial, newest, "certify", request, VirtualClock().utc())
         served.play(stage, serials)
         stage.title("Where to look")
-        stage.say(f"labctl serve --simulate --database {location}     then http://127.0.0.1:8420/docs")
+        stage.say(f"labctl serve --simulate --database {location}     then http://127.0.0.1:8420/api-docs")
         stage.say(f"labctl campaign list --database {location};  labctl calibration FOG-0001 --database {location}")
     return stage.figures
 

@@ -50,6 +50,8 @@ STEPS = 4
 LEAST_VISIBLE = 0.15
 #: From this evidence on, an effect is worth refining its shape.
 NOTICED = 1.0
+#: How many of the strongest are tried as the first of a pair.
+LEADERS = 4
 #: How many suspects are fitted in full.
 SHOWN = 6
 #: The drift is larger than the data sheet says from this factor on.
@@ -209,23 +211,40 @@ def _has_rival(weighed: Weighed) -> bool:
 
 
 def _pair(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> Verdict | None:
-    """Return two effects that explain together what looked like something else, and leave nothing; or None."""
-    leader, smooth = first.leader(smooth=False), first.leader(smooth=True)
-    if leader is None or smooth is None or leader.term is None or leader.log_bf < ENOUGH:
+    """Return two effects that explain together what looked like something else, and leave nothing; or None.
+
+    The first of a pair need not be the strongest alone: two laws of the rate mix into one that a third resembles.
+    """
+    smooth = first.leader(smooth=True)
+    leaders = [c for c in first.candidates if not c.smooth and c.term is not None and c.log_bf >= ENOUGH][:LEADERS]
+    pairs = [_beside(data, model, first, leader, catalogue) for leader in leaders]
+    best = max((pair for pair in pairs if pair is not None), key=lambda pair: pair.log_bf, default=None)
+    if best is None or smooth is None or best.log_bf < smooth.log_bf + LEAD:
         return None
+    both = model.with_terms((*model.terms, *(replace(term, steady=True) for term in best.terms.values())))
+    if _judged(weigh(data, both, catalogue), catalogue, first=False)[1].form != "adequate":
+        return None
+    return Verdict("missing", tuple((name,) for name in best.terms), terms=best.terms)
+
+
+@dataclass(frozen=True)
+class _Pair:
+    terms: dict[str, Term]
+    log_bf: float
+
+
+def _beside(
+    data: Compressed, model: ErrorModel, first: Weighed, leader: Candidate, catalogue: Mapping[str, Effect]
+) -> _Pair | None:
+    """Return an effect with the one that is then named beside it; None where none is."""
     terms = {leader.id: refined(first, leader)}
     beside = model.with_terms((*model.terms, replace(terms[leader.id], steady=True)))
     weighed, step = _judged(weigh(data, beside, catalogue), catalogue, first=False)
     second = step.leader
     if step.form != "missing" or second is None or second.term is None or second.id == leader.id:
         return None
-    if leader.log_bf + second.log_bf < smooth.log_bf + LEAD:
-        return None
     terms[second.id] = refined(weighed, second)
-    both = beside.with_terms((*beside.terms, replace(terms[second.id], steady=True)))
-    if _judged(weigh(data, both, catalogue), catalogue, first=False)[1].form != "adequate":
-        return None
-    return Verdict("missing", tuple((name,) for name in terms), terms=terms)
+    return _Pair(terms, leader.log_bf + second.log_bf)
 
 
 def _explained(first: Weighed) -> float:
