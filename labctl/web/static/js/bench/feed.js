@@ -18,11 +18,17 @@ export async function follow(campaign, told, signal) {
     if (now !== stale || now) told.link({ stale: now, since: heard, why });
     stale = now;
   };
-  const watch = setInterval(() => Date.now() - heard > SILENT_MS && say(true, "the service says nothing"), LOOK_MS);
+  let [listening, asked] = [new AbortController(), Date.now()];
+  const watch = setInterval(() => {
+    if (Date.now() - heard <= SILENT_MS || listening.signal.aborted) return;
+    say(true, "the service says nothing");
+    if (Date.now() - asked > SILENT_MS) listening.abort(); // a connection that went to sleep never ends by itself
+  }, LOOK_MS);
   signal.addEventListener("abort", () => clearInterval(watch));
   while (!signal.aborted) {
+    [listening, asked] = [new AbortController(), Date.now()];
     try {
-      for await (const message of events(`/api/campaigns/${campaign}/events`, { after, signal })) {
+      for await (const message of events(`/api/campaigns/${campaign}/events`, { after, signal: AbortSignal.any([signal, listening.signal]) })) {
         [heard, tries] = [Date.now(), 0];
         say(false);
         if (message.event === "progress") told.progress(message.data);
@@ -36,7 +42,7 @@ export async function follow(campaign, told, signal) {
       if (ENDED.has(status.state)) break;
     } catch (error) {
       if (signal.aborted) break;
-      say(true, error instanceof Problem ? error.message : "the connection broke");
+      say(true, error instanceof Problem ? error.message : error.name === "AbortError" ? "the service says nothing" : "the connection broke");
       if (error instanceof Problem && error.status < 500) break;
     }
     await new Promise((resolve) => setTimeout(resolve, WAITS_MS[Math.min(tries, WAITS_MS.length - 1)]));
