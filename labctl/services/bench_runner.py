@@ -26,8 +26,9 @@ from procedures.operator import Operator, PersonOperator
 from procedures.progress import Progress
 from procedures.shield import uninterrupted
 
-#: How long closing waits for a campaign to reach its safe state.
+#: How long a request to abort waits for the safe state before it says how far the campaign is.
 SAFE_WITHIN_S = 120.0
+STOPS = "the service stops"
 
 
 @dataclass
@@ -54,6 +55,7 @@ class BenchRunner:
         self._guard = threading.Lock()
         self._job: _Job | None = None
         self._left = False  #: a campaign was left half done here, and nobody has taken it up yet
+        self._stops = False
         self._listeners: list[Callable[[], None]] = []
 
     @property
@@ -69,7 +71,7 @@ class BenchRunner:
     @property
     def free(self) -> bool:
         """Whether a campaign may begin now: nothing runs, or waits to be taken up, and the bench may be driven."""
-        return self._job is None and not self._left and self._may_drive
+        return self._job is None and not self._left and not self._stops and self._may_drive
 
     @property
     def _may_drive(self) -> bool:
@@ -92,6 +94,8 @@ class BenchRunner:
         return campaign_status(self._store, prepared.id)
 
     def _refuse_unless_free(self) -> None:
+        if self._stops:
+            raise BenchBusy(f"bench {self._bench.name}: {STOPS}; nothing is begun any more")
         if self._job is not None:
             raise BenchBusy(
                 f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
@@ -104,6 +108,8 @@ class BenchRunner:
         job = _Job(self._store.campaigns.get(prepared.id), prepared.operator, control)
         job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
         self._job = job
+        if self._stops:  # while the bench was being opened
+            control.abort(STOPS)
         job.thread.start()
 
     def resume(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
@@ -236,12 +242,23 @@ class BenchRunner:
             "unconfirmed": self._store.benches.unconfirmed(self._bench.name),
         }
 
+    def end_soon(self) -> None:
+        """Begin nothing more, and let what runs go to its end in the safe state; returns at once."""
+        self._stops = True
+        if (job := self._job) is not None:
+            job.control.abort(STOPS)
+
     def close(self) -> None:
-        """End what runs, in the safe state, and let the bench go."""
-        job = self._job
-        if job is not None and job.thread is not None:
-            job.control.abort("the service stops")
-            with uninterrupted():  # an impatient Ctrl-C must not leave the bench as it is
-                job.thread.join(SAFE_WITHIN_S)
-        if self._hold is not None and not (job and job.thread and job.thread.is_alive()):
-            self._hold.close()
+        """End what runs, in the safe state, and let the bench go.
+
+        Waits as long as that takes, and every part of the safe state has an end of its own: whoever had the bench or
+        the database before the table stands could drive it too.
+        """
+        with uninterrupted():  # an impatient Ctrl-C must not leave the bench as it is
+            self.end_soon()
+            with self._guard:  # what is being begun is begun, and ended
+                job = self._job
+            if job is not None and job.thread is not None:
+                job.thread.join()
+            if self._hold is not None:
+                self._hold.close()
