@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 
 from instruments.bench import BenchFile
 from instruments.clock import Clock, VirtualClock
+from instruments.errors import InstrumentError
 from instruments.open import Bench, open_bench
 from labctl.config import default_database
 from labctl.errors import Conflict
@@ -21,6 +23,7 @@ from procedures.operator import Operator
 from procedures.plan import Plan
 from procedures.progress import Progress
 from procedures.recipe import Recipe
+from procedures.safe import make_safe
 from procedures.takeup import Restart
 
 #: A campaign that was taken up so often without finishing a step needs a person.
@@ -100,6 +103,20 @@ def too_often(standing: Standing) -> str | None:
     if standing.tries < MOST_TRIES:
         return None
     return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
+
+
+def leave_safe(store: Store, bench_file: BenchFile, clock: Clock) -> None:
+    """Make a bench safe whose campaign is not taken up; what cannot be confirmed stays on its status."""
+    if bench_file.is_simulated:  # it ended with its process
+        return
+    complaints: tuple[str, ...] = ()
+    try:
+        with closing(open_bench(bench_file, clock)) as bench:
+            complaints = make_safe(bench, clock)
+    except (InstrumentError, OSError) as error:
+        complaints = (*complaints, str(error))
+    if complaints:
+        store.benches.mark(bench_file.name, "; ".join(complaints), clock.utc())
 
 
 def resume_here(

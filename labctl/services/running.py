@@ -174,10 +174,12 @@ def run(
     try:
         engine.run(prepared.start_at, prepared.restart)
     finally:
-        if engine.complaints:
-            bench = store.campaigns.get(prepared.id).bench_name
-            store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
-        prepared.bench.close()
+        try:
+            if engine.complaints:
+                bench = store.campaigns.get(prepared.id).bench_name
+                store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
+        finally:
+            prepared.bench.close()
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
 
 
