@@ -51,3 +51,17 @@ def uninterrupted(noted: Callable[[int], None] = lambda _: None) -> Iterator[Non
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def afterwards() -> Iterator[None]:
+    """Let Ctrl-C or a signal come only after the block, which has to be short: a write that is torn in the middle
+    leaves a connection behind that nobody can write with, and then not even the end can be written.
+    """
+    heard: list[int] = []
+    try:
+        with uninterrupted(heard.append):
+            yield
+    finally:
+        for number in heard[:1]:
+            signal.raise_signal(number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 
 from pydantic import Field
@@ -30,6 +31,7 @@ from procedures.operator import HandOperator, Operator, PersonOperator
 from procedures.plan import Plan, make_plan
 from procedures.progress import Progress
 from procedures.safe import stop_table
+from procedures.shield import uninterrupted
 from procedures.takeup import Restart
 
 Observe = Callable[[CampaignAnswer], None]
@@ -174,12 +176,10 @@ def run(
     try:
         engine.run(prepared.start_at, prepared.restart)
     finally:
-        try:
+        with uninterrupted(), closing(prepared.bench):
             if engine.complaints:
                 bench = store.campaigns.get(prepared.id).bench_name
                 store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
-        finally:
-            prepared.bench.close()
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
+import sqlalchemy as sa
 
 from instruments.bench import BenchFile
 from instruments.clock import VirtualClock
@@ -23,6 +25,7 @@ from labctl.store import Store, open_store
 from labctl.store.database import Database
 from procedures.control import Control
 from procedures.journal import CampaignState
+from procedures.shield import afterwards
 
 BENCH = load_bench("single-axis-sim")
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -168,3 +171,41 @@ def test_a_runner_that_stops_begins_nothing_and_waits_until_the_bench_is_safe(st
     runner.close()
     row = store.campaigns.get(campaign)
     assert (row.state, "the service stops" in row.reason) == ("aborted", True)
+
+
+@pytest.mark.parametrize("at", [1, 2, 3])
+def test_interrupts_inside_a_write_leave_a_database_that_can_be_written(store: Store, at: int) -> None:
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    engine, inserted = store.audit._database._engine, [0]
+
+    def interrupt(*_: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    def at_insert(_cursor: Any, statement: str, *_: Any) -> None:
+        inserted[0] += statement.startswith("INSERT INTO events")
+        if inserted[0] == at and statement.startswith("INSERT INTO events"):
+            sa.event.listen(engine, "rollback", interrupt, once=True)  # impatient: while the first is being heeded
+            sa.event.listen(engine.pool, "invalidate", interrupt, once=True)
+            interrupt()
+
+    sa.event.listen(engine, "do_execute", at_insert)
+    with pytest.raises(KeyboardInterrupt):
+        run(store, prepared)
+    row = store.campaigns.get(prepared.id)
+    assert (row.state, row.reason) == ("aborted", "interrupted (Ctrl-C or a signal)")
+
+
+def interrupted_write(reached: list[str], error: Exception | None) -> None:
+    with afterwards():
+        signal.raise_signal(signal.SIGINT)
+        reached.append("the end")
+        if error is not None:
+            raise error
+
+
+@pytest.mark.parametrize("error", [None, StoreError("the disk is full")])
+def test_an_interrupt_waits_for_the_end_of_a_write_and_is_not_lost_when_that_fails(error: Exception | None) -> None:
+    reached: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_write(reached, error)
+    assert reached == ["the end"]
