@@ -52,8 +52,10 @@ class ServiceActs(LocalActs):
         """Let a paused campaign go on, or take up one that was interrupted."""
         if self._runner is None:
             raise Conflict(NO_BENCH)
+        paused = self._runner.runs(campaign)  # what is taken up is noted with its rows
         answer = self._runner.resume(campaign, request)
-        self._note_campaign("resume", campaign, request.reason)
+        if paused:
+            self._note_campaign("resume", campaign, f"{request.reason or 'goes on'} ({request.by})")
         return answer
 
     def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:

@@ -17,9 +17,17 @@ from labctl.services.campaigns import answer_of
 from labctl.services.leases import holding, open_for
 from labctl.services.planning import load_bench
 from labctl.services.power import boot_id, power_failed
-from labctl.services.running import Observe, Prepared, clock_for, operator_of, refuse_unconfirmed, run
+from labctl.services.running import (
+    Attend,
+    Observe,
+    Prepared,
+    answers_noted,
+    clock_for,
+    operator_of,
+    refuse_unconfirmed,
+    run,
+)
 from labctl.store import CampaignRow, Standing, Store, TakeUp, open_store
-from procedures.operator import Operator
 from procedures.plan import Plan
 from procedures.progress import Progress
 from procedures.recipe import Recipe
@@ -126,7 +134,7 @@ def resume_here(
     speed: float | None,
     request: ResumeRequest,
     observe: Observe | None = None,
-    attend: Callable[[Operator], None] | None = None,
+    attend: Attend | None = None,
 ) -> CampaignAnswer:
     """Take up a campaign in this process and run it to its end; without a number the newest that is not over."""
     location = database or default_database()
@@ -141,7 +149,7 @@ def resume_here(
 
         prepared = prepare_resume(store, row.id, bench_file, make_clock, request)
         if attend is not None:
-            attend(prepared.operator)
+            attend(prepared.operator, answers_noted(store, prepared))
 
         def seen(progress: Progress) -> None:
             if observe is not None:

@@ -35,6 +35,7 @@ from procedures.shield import uninterrupted
 from procedures.takeup import Restart
 
 Observe = Callable[[CampaignAnswer], None]
+Attend = Callable[[Operator, Callable[[str], None]], None]
 
 
 class StartRequest(Request):
@@ -183,11 +184,21 @@ def run(
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
 
 
+def answers_noted(store: Store, prepared: Prepared) -> Callable[[str], None]:
+    """Return what writes an answer that was given at this terminal into the audit trail."""
+
+    def note(said: str) -> None:
+        at, subject = prepared.clock.utc(), f"campaign {prepared.id}"
+        store.audit.record(at, "campaign confirm", subject, {"reason": said})
+
+    return note
+
+
 def run_here(
     database: str | None,
     request: StartRequest,
     observe: Observe | None = None,
-    attend: Callable[[Operator], None] | None = None,
+    attend: Attend | None = None,
 ) -> CampaignAnswer:
     """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks."""
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
@@ -196,7 +207,7 @@ def run_here(
         prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip)
         row = store.campaigns.get(prepared.id)
         if attend is not None:
-            attend(prepared.operator)
+            attend(prepared.operator, answers_noted(store, prepared))
 
         def seen(progress: Progress) -> None:
             if observe is not None:
