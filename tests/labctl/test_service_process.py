@@ -206,3 +206,13 @@ def test_a_service_with_keys_asks_the_command_line_too(tmp_path: Path) -> None:
         told = [(row["who"], row["action"], row["detail"]["via"]) for row in rows]
         assert told == [("operator", "import", "key"), ("approver", "key revoke", "key")]
         assert service.http.get("/health").json().keys() == {"status", "version"}
+
+
+def test_a_proxy_of_the_laboratory_is_neither_asked_nor_told_a_key(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
+    monkeypatch.setenv("ALL_PROXY", "http://127.0.0.1:9")
+    service.run("backup", str(service.database.parent / "copy.sqlite"))
+    service.run("campaign", "schedule", "cancel", "7", status=2)
+    assert "scheduled start 7 is not" in service.run("campaign", "schedule", "cancel", "7", status=2).stderr
