@@ -20,7 +20,7 @@ class Control:
     """A wish that may be read and changed from any thread. Abort is final."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a signal may come while its own thread is in here
         self._wish = Wish()
 
     @property

@@ -48,7 +48,7 @@ class Board:
         self._plan = plan
         self._clock = clock
         self._observer = observer
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a signal during the safe state is told here too, whatever its thread is doing
         self._progress = Progress(steps=len(plan.steps))
         self._expected_s = [step.expected_s for step in plan.steps]
         self._left_after_s = self._remaining(self._expected_s)

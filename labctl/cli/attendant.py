@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import getpass
 import sys
+import termios
 import threading
+from collections.abc import Callable
+from contextvars import copy_context
 from typing import TYPE_CHECKING
 
 from instruments.clock import SystemClock
 from labctl.cli.output import complaints
+from labctl.config import os_user
+from labctl.errors import StoreError
 from procedures.errors import StalePrompt
 from procedures.operator import PersonOperator
 
@@ -21,30 +25,37 @@ LOOK_S = 0.5
 class Attendant:
     """Prints each question and takes the next line for its answer: empty for done, anything else says why not."""
 
-    def attend(self, operator: Operator) -> None:
-        """Answer for an operator from now on, in the background. A bench that helps itself asks nobody."""
-        if isinstance(operator, PersonOperator):
-            threading.Thread(target=self._serve, args=(operator,), daemon=True).start()
+    def attend(self, operator: Operator, note: Callable[[str], None]) -> None:
+        """Answer for an operator from now on, in the background; `note` is told of each answer.
 
-    def _serve(self, operator: PersonOperator) -> None:
+        A bench that helps itself asks nobody.
+        """
+        if isinstance(operator, PersonOperator):
+            here = copy_context()  # in the name of whoever gave the command
+            threading.Thread(target=here.run, args=(self._serve, operator, note), daemon=True).start()
+
+    def _serve(self, operator: PersonOperator, note: Callable[[str], None]) -> None:
         clock, asked = SystemClock(), ""
         while True:
             prompt = operator.pending
             if prompt is not None and prompt.id != asked:
                 asked = prompt.id
-                self._put(operator, prompt)
+                self._put(operator, prompt, note)
             clock.sleep(LOOK_S)
 
     @staticmethod
-    def _put(operator: PersonOperator, prompt: Prompt) -> None:
+    def _put(operator: PersonOperator, prompt: Prompt, note: Callable[[str], None]) -> None:
+        if sys.stdin.isatty():  # an Enter from before the question is no answer to it
+            termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
         complaints.print(f"{prompt.text}. Press Enter when it is done, or type why it cannot be.", markup=False)
         line = sys.stdin.readline()
         if not line:  # nobody sits there
             return
         try:
             if why := line.strip():
-                operator.decline(prompt.id, getpass.getuser(), why)
+                operator.decline(prompt.id, os_user(), why)
             else:
-                operator.confirm(prompt.id, getpass.getuser())
-        except StalePrompt as error:
+                operator.confirm(prompt.id, os_user())
+            note(f"{prompt.id}: {f'cannot be done; {why}' if why else 'done'}; {prompt.text}")
+        except (StalePrompt, StoreError) as error:
             complaints.print(f"labctl: {error}", markup=False)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from labctl.cli.errors import one_clear_line
+from labctl.cli.errors import ending_is_an_interrupt, one_clear_line
 from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import console, print_json
 
@@ -36,7 +36,8 @@ def serve(
         else:
             console.print(f"labctl listens on {url}  (API text: {url}/api-docs)", markup=False)
 
-    with one_clear_line():
+    # the HTTP server, once stopped, raises the signal again: with its own meaning that would end us before the bench
+    with one_clear_line(), ending_is_an_interrupt():
         request = ServeRequest(
             bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
             require_keys=require_keys, max_upload_mib=max_upload_mib,

@@ -11,12 +11,12 @@ from typing import Any
 from instruments.bench import BenchFile
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
-from labctl.errors import BenchBusy, Conflict, LabctlError
+from labctl.errors import BenchBusy, Conflict, LabctlError, StoreError
 from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer
 from labctl.services.campaigns import ENDED, answer_of, campaign_status
 from labctl.services.leases import BenchHold
-from labctl.services.resuming import as_it_was, prepare_resume, too_often
+from labctl.services.resuming import as_it_was, leave_safe, prepare_resume, too_often
 from labctl.services.running import Prepared, prepare, run
 from labctl.services.simulate import hiding
 from labctl.store import CampaignRow, Store
@@ -27,8 +27,9 @@ from procedures.operator import Operator, PersonOperator
 from procedures.progress import Progress
 from procedures.shield import uninterrupted
 
-#: How long closing waits for a campaign to reach its safe state.
+#: How long a request to abort waits for the safe state before it says how far the campaign is.
 SAFE_WITHIN_S = 120.0
+STOPS = "the service stops"
 
 
 @dataclass
@@ -40,6 +41,14 @@ class _Job:
     control: Control
     progress: Progress | None = None
     thread: threading.Thread | None = None
+
+
+@dataclass(frozen=True)
+class _Unsaid:
+    """A campaign that ended when the database could not be written: its rows do not say so yet."""
+
+    campaign: int
+    why: str
 
 
 class BenchRunner:
@@ -55,6 +64,8 @@ class BenchRunner:
         self._guard = threading.Lock()
         self._job: _Job | None = None
         self._left = False  #: a campaign was left half done here, and nobody has taken it up yet
+        self._unsaid: _Unsaid | None = None
+        self._stops = False
         self._listeners: list[Callable[[], None]] = []
 
     @property
@@ -70,7 +81,8 @@ class BenchRunner:
     @property
     def free(self) -> bool:
         """Whether a campaign may begin now: nothing runs, or waits to be taken up, and the bench may be driven."""
-        return self._job is None and not self._left and self._may_drive
+        nothing_open = self._job is None and not self._left and self._unsaid is None
+        return nothing_open and not self._stops and self._may_drive
 
     @property
     def _may_drive(self) -> bool:
@@ -94,10 +106,13 @@ class BenchRunner:
         return campaign_status(self._store, prepared.id)
 
     def _refuse_unless_free(self) -> None:
+        if self._stops:
+            raise BenchBusy(f"bench {self._bench.name}: {STOPS}; nothing is begun any more")
         if self._job is not None:
             raise BenchBusy(
                 f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
             )
+        self._say_end()
         if self._hold is not None:
             self._hold.check()
 
@@ -106,6 +121,8 @@ class BenchRunner:
         job = _Job(self._store.campaigns.get(prepared.id), prepared.operator, control)
         job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
         self._job = job
+        if self._stops:  # while the bench was being opened
+            control.abort(STOPS)
         job.thread.start()
 
     def resume(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
@@ -132,8 +149,8 @@ class BenchRunner:
 
         Without the lease nothing is touched: whoever has it by now may be taking it up.
         """
-        self._left = not self._may_drive
-        if self._left:
+        self._left = True
+        if not self._may_drive:
             return
         for row in self._store.campaigns.unfinished():
             if row.bench_name != self._bench.name:
@@ -142,18 +159,34 @@ class BenchRunner:
             try:
                 if why_not is None:
                     self.resume(row.id, ResumeRequest(by="the service"))
-                    return
+                    break
             except BenchBusy:  # somebody was quicker, or the lease went just now
-                self._left = True
                 return
             except (LabctlError, InstrumentError) as error:
                 why_not = f"not taken up: {error}"
+            with self._guard:  # whatever hinders the campaign, its last process may have left the bench as it was
+                leave_safe(self._store, self._bench, self._make_clock())
             self._store.campaigns.close_unfinished(row.id, why_not, self._make_clock().utc())
+        self._left = False
 
     def take_up_cut_short(self) -> None:
         """Once the bench may be driven again, take up the campaign that was cut short when it was lost."""
+        self._say_end()
         if self._left and self._job is None and self._may_drive:
             self.take_up_left()
+
+    def _say_end(self) -> None:
+        """Write down the end of a campaign that could not be written when it came. Raises StoreError."""
+        if (unsaid := self._unsaid) is None:
+            return
+        at = self._make_clock().utc()
+        text = (
+            f"campaign {unsaid.campaign} ended while nothing could be written; whether the bench is safe is not known"
+        )
+        self._store.benches.mark(self._bench.name, text, at)
+        if self._store.campaigns.get(unsaid.campaign).state not in ENDED:
+            self._store.campaigns.close_unfinished(unsaid.campaign, unsaid.why, at)
+        self._unsaid = None
 
     def pause(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
         """Ask the running campaign to hold after the present data set. Raises Conflict when it does not run here."""
@@ -190,6 +223,9 @@ class BenchRunner:
         try:
             answer = run(self._store, prepared, job.control, seen)
             self._left = self._left or answer.state == CampaignState.INTERRUPTED
+        except StoreError as error:
+            self._unsaid = _Unsaid(job.row.id, str(error))
+            raise
         finally:
             self._job = None
             self._ring()
@@ -239,12 +275,23 @@ class BenchRunner:
             "unconfirmed": self._store.benches.unconfirmed(self._bench.name),
         }
 
+    def end_soon(self) -> None:
+        """Begin nothing more, and let what runs go to its end in the safe state; returns at once."""
+        self._stops = True
+        if (job := self._job) is not None:
+            job.control.abort(STOPS)
+
     def close(self) -> None:
-        """End what runs, in the safe state, and let the bench go."""
-        job = self._job
-        if job is not None and job.thread is not None:
-            job.control.abort("the service stops")
-            with uninterrupted():  # an impatient Ctrl-C must not leave the bench as it is
-                job.thread.join(SAFE_WITHIN_S)
-        if self._hold is not None and not (job and job.thread and job.thread.is_alive()):
-            self._hold.close()
+        """End what runs, in the safe state, and let the bench go.
+
+        Waits as long as that takes, and every part of the safe state has an end of its own: whoever had the bench or
+        the database before the table stands could drive it too.
+        """
+        with uninterrupted():  # an impatient Ctrl-C must not leave the bench as it is
+            self.end_soon()
+            with self._guard:  # what is being begun is begun, and ended
+                job = self._job
+            if job is not None and job.thread is not None:
+                job.thread.join()
+            if self._hold is not None:
+                self._hold.close()

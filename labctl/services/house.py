@@ -20,6 +20,7 @@ from labctl.services.campaigns import ENDED, event_answer, from_rows, looked_aft
 from labctl.services.opening import LocalActs
 from labctl.services.scheduler import Scheduler
 from labctl.store import Store
+from procedures.shield import told_first
 
 #: An open event stream says that it is alive after this long without an event.
 HEARTBEAT_S = 10.0
@@ -52,8 +53,10 @@ class ServiceActs(LocalActs):
         """Let a paused campaign go on, or take up one that was interrupted."""
         if self._runner is None:
             raise Conflict(NO_BENCH)
+        paused = self._runner.runs(campaign)  # what is taken up is noted with its rows
         answer = self._runner.resume(campaign, request)
-        self._note_campaign("resume", campaign, request.reason)
+        if paused:
+            self._note_campaign("resume", campaign, f"{request.reason or 'goes on'} ({request.by})")
         return answer
 
     def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
@@ -87,7 +90,7 @@ class House:
         self._runner = runner
         self.scheduler = None if runner is None else Scheduler(store, clock, runner, runner.bench.name)
         self._opened_at = clock.utc()
-        self._closed = False
+        self._stops = self._closed = False
 
     @property
     def bench(self) -> BenchFile | None:
@@ -97,13 +100,23 @@ class House:
     def start(self) -> None:
         """Make the house ready: a campaign that an earlier process left on this bench is taken up, safe state first.
 
-        Then the schedule runs: what is due waits for that campaign.
+        Then the schedule runs: what is due waits for that campaign. A signal to end is heard here first: an HTTP server
+        waits for its requests before it closes the house, and a listener may stay for hours.
         """
+        told_first(self.end_soon)
         with acting(ITSELF):  # nobody asked for it
             if self._runner is not None:
                 self._runner.take_up_left()
             if self.scheduler is not None:
                 self.scheduler.start()
+
+    def end_soon(self) -> None:
+        """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
+        self._stops = True
+        if self.scheduler is not None:
+            self.scheduler.end_soon()
+        if self._runner is not None:
+            self._runner.end_soon()
 
     def close(self) -> None:
         """Begin nothing more, end what runs, leave the bench safe, close the store. Safe to call twice."""
@@ -135,8 +148,11 @@ class House:
         live = self._runner.status(campaign) if self._runner is not None else None
         if live is not None:
             return live
-        runs = self._runner is not None and self._runner.runs(campaign)
-        return looked_after(from_rows(self.store, self.store.campaigns.get(campaign)), by_somebody=runs)
+        row = self.store.campaigns.get(campaign)
+        return looked_after(from_rows(self.store, row), by_somebody=self._runs(campaign))
+
+    def _runs(self, campaign: int) -> bool:
+        return self._runner is not None and self._runner.runs(campaign)
 
     def campaigns(self) -> list[CampaignAnswer]:
         """Return every campaign, newest first."""
@@ -169,7 +185,7 @@ class House:
                 if now != shown:
                     shown = now
                     yield now
-                if state in ENDED:
+                if state in ENDED or (self._stops and not self._runs(campaign)):
                     return
                 try:
                     await asyncio.wait_for(bell.wait(), HEARTBEAT_S)

@@ -113,8 +113,8 @@ class BenchHold:
                 self._renewed_s = None
                 found = self._store.leases.holder(self._bench)
                 self._why_lost = described(found) if found else "its lease was taken away"
-        except LabctlError as error:  # the next try may do better; until then `held` counts the time
-            self._why_lost = str(error)
+        except Exception as error:  # noqa: BLE001  the next try may do better; until then `held` counts the time
+            self._why_lost = str(error) or type(error).__name__
 
     def control(self) -> Control:
         """Return the control of a campaign that is interrupted when the bench may no longer be driven."""

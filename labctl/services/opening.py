@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from instruments.bench import BenchFile
 from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
@@ -30,6 +31,9 @@ from labctl.services.benches import bench_status
 from labctl.services.campaigns import campaign_status
 from labctl.services.planning import bench_for, load_bench, load_recipe
 from labctl.store import Store, holder_of, open_store
+
+#: What a campaign is called while its bench may move or be hot; one that was interrupted had its safe state.
+UNDER_WAY = frozenset({"running", "paused", "waiting"})
 
 
 class LocalActs:
@@ -73,7 +77,13 @@ class LocalActs:
         if answer.state in {"done", "aborted", "failed"}:
             raise Conflict(f"campaign {campaign} is over already: {answer.state}")
         self._note_campaign("abort", campaign, reason)
-        self._store.campaigns.close_unfinished(campaign, f"left unfinished; {reason}", self._clock.utc())
+        row, at = self._store.campaigns.get(campaign), self._clock.utc()
+        said = f"left unfinished; {reason}"
+        if row.state in UNDER_WAY and not BenchFile.model_validate(dict(row.bench)).is_simulated:
+            text = f"the process that ran campaign {campaign} ended before it could make the bench safe"
+            self._store.benches.mark(row.bench_name, text, at)
+            said += f". Nobody has made bench {row.bench_name} safe: look at it, then `labctl bench clear`"
+        self._store.campaigns.close_unfinished(campaign, said, at, "aborted")
         return campaign_status(self._store, campaign)
 
     def _note_campaign(self, act: str, campaign: int, reason: str) -> None:

@@ -45,7 +45,8 @@ class RemoteActs:
         shown = key()
         # without a key, the name only says who claims to ask; a service that wants a key does not read it
         identity = {"Authorization": f"Bearer {shown}"} if shown else {USER_HEADER: quote(os_user())}
-        self._client = httpx.Client(base_url=url, timeout=TIMEOUT_S, headers=identity)
+        # whoever holds the database is near: a proxy is neither asked nor told a key
+        self._client = httpx.Client(base_url=url, timeout=TIMEOUT_S, headers=identity, trust_env=False)
 
     def _post(self, path: str, **content: Any) -> Any:
         return self._ask("POST", path, **content)
@@ -136,7 +137,9 @@ class RemoteActs:
 
     def clear_bench(self, bench: str, request: ClearRequest) -> BenchStatus:
         """Say that a bench was looked at."""
-        return BenchStatus.model_validate(self._post(f"/api/benches/{bench}/clear", json=request.model_dump()))
+        return BenchStatus.model_validate(
+            self._post(f"/api/benches/{quote(bench, safe='')}/clear", json=request.model_dump())
+        )
 
     def campaign(self, campaign: int) -> CampaignAnswer:
         """Return a campaign as the service sees it now."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 
 from pydantic import ValidationError
 
 from instruments.bench import BenchFile, SimulationSettings
 from instruments.clock import Clock, VirtualClock
+from instruments.errors import InstrumentError
 from instruments.open import Bench, open_bench
 from labctl.config import default_database
 from labctl.errors import Conflict
@@ -17,12 +19,21 @@ from labctl.services.campaigns import answer_of
 from labctl.services.leases import holding, open_for
 from labctl.services.planning import load_bench
 from labctl.services.power import boot_id, power_failed
-from labctl.services.running import Observe, Prepared, clock_for, operator_of, refuse_unconfirmed, run
+from labctl.services.running import (
+    Attend,
+    Observe,
+    Prepared,
+    answers_noted,
+    clock_for,
+    operator_of,
+    refuse_unconfirmed,
+    run,
+)
 from labctl.store import CampaignRow, Standing, Store, TakeUp, open_store
-from procedures.operator import Operator
 from procedures.plan import Plan
 from procedures.progress import Progress
 from procedures.recipe import Recipe
+from procedures.safe import make_safe
 from procedures.takeup import Restart
 
 #: A campaign that was taken up so often without finishing a step needs a person.
@@ -122,6 +133,20 @@ def too_often(standing: Standing) -> str | None:
     return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
 
 
+def leave_safe(store: Store, bench_file: BenchFile, clock: Clock) -> None:
+    """Make a bench safe whose campaign is not taken up; what cannot be confirmed stays on its status."""
+    if bench_file.is_simulated:  # it ended with its process
+        return
+    complaints: tuple[str, ...] = ()
+    try:
+        with closing(open_bench(bench_file, clock)) as bench:
+            complaints = make_safe(bench, clock)
+    except (InstrumentError, OSError) as error:
+        complaints = (*complaints, str(error))
+    if complaints:
+        store.benches.mark(bench_file.name, "; ".join(complaints), clock.utc())
+
+
 def resume_here(
     database: str | None,
     campaign: int | None,
@@ -129,7 +154,7 @@ def resume_here(
     speed: float | None,
     request: ResumeRequest,
     observe: Observe | None = None,
-    attend: Callable[[Operator], None] | None = None,
+    attend: Attend | None = None,
 ) -> CampaignAnswer:
     """Take up a campaign in this process and run it to its end; without a number the newest that is not over."""
     location = database or default_database()
@@ -144,7 +169,7 @@ def resume_here(
 
         prepared = prepare_resume(store, row.id, bench_file, make_clock, request)
         if attend is not None:
-            attend(prepared.operator)
+            attend(prepared.operator, answers_noted(store, prepared))
 
         def seen(progress: Progress) -> None:
             if observe is not None:

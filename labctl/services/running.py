@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 
 from pydantic import Field
@@ -30,9 +31,11 @@ from procedures.operator import HandOperator, Operator, PersonOperator
 from procedures.plan import Plan, make_plan
 from procedures.progress import Progress
 from procedures.safe import stop_table
+from procedures.shield import uninterrupted
 from procedures.takeup import Restart
 
 Observe = Callable[[CampaignAnswer], None]
+Attend = Callable[[Operator, Callable[[str], None]], None]
 
 
 class StartRequest(Request):
@@ -174,18 +177,28 @@ def run(
     try:
         engine.run(prepared.start_at, prepared.restart)
     finally:
-        if engine.complaints:
-            bench = store.campaigns.get(prepared.id).bench_name
-            store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
-        prepared.bench.close()
+        with uninterrupted(), closing(prepared.bench):
+            if engine.complaints:
+                bench = store.campaigns.get(prepared.id).bench_name
+                store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
+
+
+def answers_noted(store: Store, prepared: Prepared) -> Callable[[str], None]:
+    """Return what writes an answer that was given at this terminal into the audit trail."""
+
+    def note(said: str) -> None:
+        at, subject = prepared.clock.utc(), f"campaign {prepared.id}"
+        store.audit.record(at, "campaign confirm", subject, {"reason": said})
+
+    return note
 
 
 def run_here(
     database: str | None,
     request: StartRequest,
     observe: Observe | None = None,
-    attend: Callable[[Operator], None] | None = None,
+    attend: Attend | None = None,
 ) -> CampaignAnswer:
     """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks."""
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
@@ -194,7 +207,7 @@ def run_here(
         prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip)
         row = store.campaigns.get(prepared.id)
         if attend is not None:
-            attend(prepared.operator)
+            attend(prepared.operator, answers_noted(store, prepared))
 
         def seen(progress: Progress) -> None:
             if observe is not None:

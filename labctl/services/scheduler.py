@@ -58,9 +58,13 @@ class Scheduler:
         self._thread = threading.Thread(target=self._watch, name="scheduler", daemon=True)
         self._thread.start()
 
+    def end_soon(self) -> None:
+        """Begin nothing more; returns at once."""
+        self._over.set()
+
     def close(self) -> None:
         """Begin nothing more."""
-        self._over.set()
+        self.end_soon()
         if self._thread is not None:
             self._thread.join()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, Literal
 
 import sqlalchemy as sa
 
@@ -172,12 +172,14 @@ class Campaigns:
         """Return campaigns that a process left without an end."""
         return self._rows(tables.campaigns.c.state.in_(("planned", "running", "paused", "waiting", "interrupted")))
 
-    def close_unfinished(self, campaign: int, reason: str, at: datetime) -> None:
-        """Mark a campaign that nobody runs any more as failed, saying why."""
+    def close_unfinished(
+        self, campaign: int, reason: str, at: datetime, state: Literal["failed", "aborted"] = "failed"
+    ) -> None:
+        """Mark a campaign that nobody runs any more as over, saying why."""
         with self._database.writing() as connection:
             connection.execute(
                 sa.update(tables.campaigns)
                 .where(tables.campaigns.c.id == campaign)
-                .values(state="failed", reason=reason, ended_at=at)
+                .values(state=state, reason=reason, ended_at=at)
             )
-            append(connection, at, "campaign state", f"campaign {campaign}", {"state": "failed", "reason": reason})
+            append(connection, at, "campaign state", f"campaign {campaign}", {"state": state, "reason": reason})

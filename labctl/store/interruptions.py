@@ -10,6 +10,7 @@ import sqlalchemy as sa
 
 from labctl.errors import Conflict
 from labctl.store import tables
+from labctl.store.audit import append
 from labctl.store.database import Database
 from labctl.store.journal import StoreJournal
 from labctl.store.recordings import blocks_of
@@ -137,6 +138,7 @@ class Interruptions:
             self._mark(connection, mine & s.c.number.in_(standing.complete), "done", how, "its data set was complete")
             running = mine & (s.c.state == "running")
             self._mark(connection, running, "interrupted", how, "the process that ran it ended")
+            append(connection, how.at, "campaign resume", f"campaign {campaign}", {"reason": how.reason})
             connection.execute(
                 sa.insert(tables.events).values(
                     campaign_id=campaign,

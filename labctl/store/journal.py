@@ -6,6 +6,8 @@ that is open, which is redone anyway; closing a data set, and every change of st
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from typing import Any
 
@@ -20,6 +22,7 @@ from labctl.store.database import Database
 from labctl.store.means import means_rows
 from labctl.store.recordings import block_row, blocks_of, scaled
 from procedures.journal import CampaignState, DataSetHeader, DataSetState, EnvironmentSample, Event
+from procedures.shield import afterwards
 from procedures.steps import StepResult
 
 #: Made once: a statement that is built anew for every second of a campaign costs more than writing it.
@@ -46,6 +49,11 @@ class StoreJournal:
         #: What the open data sets' blocks hold, so that closing one need not read it back.
         self._open: dict[tuple[int, str], list[dict[str, NDArray[Any]]]] = {}
 
+    @contextmanager
+    def _writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
+        with afterwards(), self._database.writing(synced=synced) as connection:
+            yield connection
+
     def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:
         """Record a change of state and why, as the campaign's state and as an event."""
         values: dict[str, Any] = {"state": state.value, "reason": reason}
@@ -57,7 +65,7 @@ class StoreJournal:
             values["ended_at"] = at
         level = "error" if state is CampaignState.FAILED else "info"
         message = f"campaign {state.value}" + (f": {reason}" if reason else "")
-        with self._database.writing() as connection:
+        with self._writing() as connection:
             connection.execute(
                 sa.update(tables.campaigns).where(tables.campaigns.c.id == self._campaign).values(**values)
             )
@@ -75,7 +83,7 @@ class StoreJournal:
 
     def _mark(self, index: int, **values: Any) -> None:
         s = tables.steps
-        with self._database.writing() as connection:
+        with self._writing() as connection:
             connection.execute(
                 sa.update(s).where(s.c.campaign_id == self._campaign, s.c.number == index).values(**values)
             )
@@ -84,19 +92,19 @@ class StoreJournal:
         """Record that the units were switched on."""
         self._power_on_s = t_s
         c = tables.campaigns
-        with self._database.writing() as connection:
+        with self._writing() as connection:
             connection.execute(sa.update(c).where(c.c.id == self._campaign).values(powered_on_s=t_s))
 
     def unit_dropped(self, gyro: str, reason: str) -> None:
         """Record that a unit takes no further part."""
         r = tables.recordings
-        with self._database.writing() as connection:
+        with self._writing() as connection:
             connection.execute(sa.update(r).where(r.c.id == self._recordings[gyro]).values(dropped=reason))
 
     def dataset_opened(self, header: DataSetHeader) -> int:
         """Record a data set of every unit before its first reading; returns its number."""
         s, d = header.step, tables.data_sets
-        with self._database.writing() as connection:
+        with self._writing() as connection:
             last = connection.scalar(
                 sa.select(sa.func.max(d.c.number)).where(d.c.recording_id.in_(self._recordings.values()))
             )
@@ -134,7 +142,7 @@ class StoreJournal:
         recording = self._recordings[gyro]
         parts = self._open.setdefault((dataset, gyro), [])
         d = tables.data_sets
-        with self._database.writing(synced=False) as connection:
+        with self._writing(synced=False) as connection:
             if len(readings):
                 columns = _columns(readings, chamber_c)
                 row = block_row(recording, dataset, len(parts), blocks.pack(columns))
@@ -149,7 +157,7 @@ class StoreJournal:
 
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
         """Record that no more readings follow: figures are derived and blocks packed into one, in one transaction."""
-        with self._database.writing() as connection:
+        with self._writing() as connection:
             d = tables.data_sets.c
             mine = d.recording_id.in_(self._recordings.values())
             this_one = (mine, d.number == dataset, d.state == DataSetState.OPEN.value)
@@ -204,12 +212,12 @@ class StoreJournal:
             if gyro in sample.gyro_c
         ]
         if rows:
-            with self._database.writing(synced=False) as connection:
+            with self._writing(synced=False) as connection:
                 connection.execute(_ADD_ENVIRONMENT, rows)
 
     def event(self, event: Event, t_s: float, at: datetime) -> None:
         """Record something worth telling a person."""
-        with self._database.writing() as connection:
+        with self._writing() as connection:
             self._add_event(connection, event, t_s, at)
 
     def _add_event(self, connection: sa.Connection, event: Event, t_s: float, at: datetime) -> None:

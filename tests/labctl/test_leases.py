@@ -235,3 +235,20 @@ def test_a_service_that_lost_its_bench_begins_nothing(shared: Store) -> None:
     assert shared.campaigns.all() == []
     runner.close()
     assert shared.leases.holder(BENCH) is None
+
+
+def test_whatever_hinders_a_renewal_the_next_is_tried(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = VirtualClock(AT)
+    hold = BenchHold(store, BENCH, clock)
+    hold.take()
+
+    def broken(*_: object) -> bool:
+        raise OSError("no file descriptor is left")
+
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(store.leases, "renew", broken)
+        clock.sleep(STOP_S)
+        hold.renew()
+    assert (hold.held, hold.why_not) == (False, "no file descriptor is left")
+    hold.renew()
+    assert hold.held

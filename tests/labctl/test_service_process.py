@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,9 +17,10 @@ from typing import Any
 import httpx
 import pytest
 
+from instruments.clock import SystemClock
 from labctl.config import os_user
 from labctl.services.keys import KeyRequest, Role, create_key
-from labctl.store import check, open_store
+from labctl.store import check, holder_of, open_store
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
@@ -133,6 +135,45 @@ def test_sigterm_ends_the_campaign_in_the_safe_state(service: Service) -> None:
     assert "the service stops" in answer["reason"]
 
 
+def state_of(service: Service, campaign: int) -> str:
+    with open_store(str(service.database), write=False) as store:
+        return store.campaigns.get(campaign).state
+
+
+def test_a_listener_does_not_keep_a_service_from_making_its_bench_safe(service: Service) -> None:
+    campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
+    with service.http.stream("GET", f"/api/campaigns/{campaign}/events") as stream:
+        told = stream.iter_lines()
+        next(told)
+        service.process.send_signal(signal.SIGTERM)
+        assert "event: state" in list(told)  # the stream ends by itself, with the campaign
+    assert service.process.wait(timeout=60) == 0
+    with open_store(str(service.database), write=False) as store:
+        row = store.campaigns.get(campaign)
+    assert (row.state, "the service stops" in row.reason) == ("aborted", True)
+    assert row.started_at is not None
+    assert row.ended_at is not None
+    assert (row.ended_at - row.started_at).total_seconds() < 0.5 * row.expected_s  # not at its own end
+
+
+def test_a_request_that_never_ends_does_not_either(service: Service) -> None:
+    campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
+    address = service.url.partition("://")[2]
+    with socket.create_connection(("127.0.0.1", int(address.rpartition(":")[2]))) as stalled:
+        body = "Content-Type: multipart/form-data; boundary=x\r\nContent-Length: 1000\r\n\r\n"
+        stalled.sendall(f"POST /api/recordings HTTP/1.1\r\nHost: {address}\r\n{body}".encode())
+        assert service.http.get("/health").status_code == 200  # by now it waits for that body
+        service.process.send_signal(signal.SIGTERM)
+        for _ in range(600):
+            if state_of(service, campaign) == "aborted":
+                break
+            SystemClock().sleep(0.1)  # another process has its own pace
+        assert state_of(service, campaign) == "aborted"
+        service.process.send_signal(signal.SIGINT)
+        assert service.process.wait(timeout=60) == 0
+    assert holder_of(str(service.database)) is None
+
+
 def test_a_page_that_a_browser_was_led_to_cannot_reach_the_service(service: Service) -> None:
     assert service.http.get("/api/units").status_code == 200
     assert service.http.get("/api/units", headers={"Host": "evil.example"}).status_code == 403
@@ -165,3 +206,13 @@ def test_a_service_with_keys_asks_the_command_line_too(tmp_path: Path) -> None:
         told = [(row["who"], row["action"], row["detail"]["via"]) for row in rows]
         assert told == [("operator", "import", "key"), ("approver", "key revoke", "key")]
         assert service.http.get("/health").json().keys() == {"status", "version"}
+
+
+def test_a_proxy_of_the_laboratory_is_neither_asked_nor_told_a_key(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
+    monkeypatch.setenv("ALL_PROXY", "http://127.0.0.1:9")
+    service.run("backup", str(service.database.parent / "copy.sqlite"))
+    service.run("campaign", "schedule", "cancel", "7", status=2)
+    assert "scheduled start 7 is not" in service.run("campaign", "schedule", "cancel", "7", status=2).stderr

@@ -1,0 +1,211 @@
+"""What a campaign leaves that nobody takes up: its bench made safe, or said to be unsafe, and its end written."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sqlalchemy as sa
+
+from instruments.bench import BenchFile
+from instruments.clock import VirtualClock
+from instruments.errors import NoReply
+from labctl.errors import BenchBusy, Conflict, DiskFull, StoreError
+from labctl.services import bench_runner, resuming
+from labctl.services.acts import CampaignRequest
+from labctl.services.bench_runner import BenchRunner
+from labctl.services.opening import LocalActs
+from labctl.services.planning import load_bench
+from labctl.services.running import prepare, run
+from labctl.store import Store, open_store
+from labctl.store.database import Database
+from procedures.control import Control
+from procedures.journal import CampaignState
+from procedures.shield import afterwards
+
+BENCH = load_bench("single-axis-sim")
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as opened:
+        yield opened
+
+
+@pytest.fixture
+def real(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the bench be one that outlives the process that drove it."""
+    monkeypatch.setattr(BenchFile, "is_simulated", property(lambda _: False))
+
+
+def left_running(store: Store) -> int:
+    """Leave a campaign as a process does that is killed."""
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    store.campaigns.journal(prepared.id).campaign_state(CampaignState.RUNNING, "started", 0.0, AT)
+    prepared.bench.close()
+    return prepared.id
+
+
+def rest(runner: BenchRunner) -> None:
+    job = runner._job
+    if job is not None and job.thread is not None:
+        job.thread.join()
+
+
+@pytest.mark.usefixtures("real")
+def test_a_bench_that_is_silent_when_its_campaign_is_to_be_taken_up_is_not_held_safe(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left_running(store)
+
+    def silent(*_: Any) -> None:
+        raise NoReply("table", "no answer")
+
+    monkeypatch.setattr(resuming, "open_bench", silent)
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    runner.take_up_left()
+    assert store.campaigns.get(1).state == "failed"
+    assert "no answer" in store.benches.unconfirmed(BENCH.name)
+    with pytest.raises(Conflict, match="not confirmed safe"):
+        runner.start(CampaignRequest(recipe="short"))
+
+
+@pytest.mark.usefixtures("real")
+def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    left_running(store)
+    states: list[str] = []
+
+    def safe(*_: Any) -> tuple[str, ...]:
+        states.append(store.campaigns.get(1).state)
+        return ("table to rest: it still moves",)
+
+    monkeypatch.setattr(bench_runner, "too_often", lambda _: "taken up 5 times")
+    monkeypatch.setattr(resuming, "make_safe", safe)
+    BenchRunner(store, BENCH, VirtualClock).take_up_left()
+    assert states == ["running"]
+    assert store.campaigns.get(1).reason == "taken up 5 times"
+    assert store.benches.unconfirmed(BENCH.name) == "table to rest: it still moves"
+
+
+@pytest.mark.usefixtures("real")
+def test_ending_by_hand_what_no_process_runs_says_that_nobody_made_the_bench_safe(store: Store) -> None:
+    campaign = left_running(store)
+    answer = LocalActs(store, VirtualClock()).abort_campaign(campaign, "the computer died")
+    assert (answer.state, "Nobody has made bench" in answer.reason) == ("aborted", True)
+    assert f"campaign {campaign} ended before" in store.benches.unconfirmed(BENCH.name)
+
+
+def test_a_simulated_bench_ended_with_its_process(store: Store) -> None:
+    answer = LocalActs(store, VirtualClock()).abort_campaign(left_running(store), "enough")
+    assert (answer.state, store.benches.unconfirmed(BENCH.name)) == ("aborted", "")
+
+
+class FullDisk:
+    """A disk that takes nothing more while `full`."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.full = False
+        real = Database.writing
+
+        def writing(database: Database, *, synced: bool = True) -> Any:
+            if self.full:
+                raise DiskFull("the disk is full")
+            return real(database, synced=synced)
+
+        monkeypatch.setattr(Database, "writing", writing)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_end_that_could_not_be_written_is_written_before_anything_else_begins(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = FullDisk(monkeypatch)
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    stop = runner.listen(lambda: setattr(disk, "full", True))
+    campaign = runner.start(CampaignRequest(recipe="short")).id
+    rest(runner)
+    stop()
+    assert store.campaigns.get(campaign).state == "planned"
+    assert not runner.free
+    with pytest.raises(StoreError, match="the disk is full"):
+        runner.start(CampaignRequest(recipe="short"))
+    disk.full = False
+    runner.take_up_cut_short()
+    row = store.campaigns.get(campaign)
+    assert (row.state, "the disk is full" in row.reason) == ("failed", True)
+    assert f"campaign {campaign} ended while" in store.benches.unconfirmed(BENCH.name)
+    assert runner.free
+
+
+def test_a_bench_is_closed_even_if_what_is_wrong_with_it_cannot_be_written(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    closed: list[str] = []
+    monkeypatch.setattr(type(prepared.bench), "close", lambda bench: closed.append(bench.table.name))
+    monkeypatch.setattr("procedures.engine.make_safe", lambda *_: ("table to rest: no answer",))
+
+    def full(*_: Any) -> None:
+        raise StoreError("the disk is full")
+
+    monkeypatch.setattr(store.benches, "mark", full)
+    control = Control()
+    control.abort("enough")
+    with pytest.raises(StoreError):
+        run(store, prepared, control)
+    assert closed == ["table"]
+
+
+def test_a_runner_that_stops_begins_nothing_and_waits_until_the_bench_is_safe(store: Store) -> None:
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    campaign = runner.start(CampaignRequest(recipe="short")).id
+    runner.end_soon()
+    with pytest.raises(BenchBusy, match="the service stops"):
+        runner.start(CampaignRequest(recipe="short"))
+    assert not runner.free
+    runner.close()
+    row = store.campaigns.get(campaign)
+    assert (row.state, "the service stops" in row.reason) == ("aborted", True)
+
+
+@pytest.mark.parametrize("at", [1, 2, 3])
+def test_interrupts_inside_a_write_leave_a_database_that_can_be_written(store: Store, at: int) -> None:
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    engine, inserted = store.audit._database._engine, [0]
+
+    def interrupt(*_: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    def at_insert(_cursor: Any, statement: str, *_: Any) -> None:
+        inserted[0] += statement.startswith("INSERT INTO events")
+        if inserted[0] == at and statement.startswith("INSERT INTO events"):
+            sa.event.listen(engine, "rollback", interrupt, once=True)  # impatient: while the first is being heeded
+            sa.event.listen(engine.pool, "invalidate", interrupt, once=True)
+            interrupt()
+
+    sa.event.listen(engine, "do_execute", at_insert)
+    with pytest.raises(KeyboardInterrupt):
+        run(store, prepared)
+    row = store.campaigns.get(prepared.id)
+    assert (row.state, row.reason) == ("aborted", "interrupted (Ctrl-C or a signal)")
+
+
+def interrupted_write(reached: list[str], error: Exception | None) -> None:
+    with afterwards():
+        signal.raise_signal(signal.SIGINT)
+        reached.append("the end")
+        if error is not None:
+            raise error
+
+
+@pytest.mark.parametrize("error", [None, StoreError("the disk is full")])
+def test_an_interrupt_waits_for_the_end_of_a_write_and_is_not_lost_when_that_fails(error: Exception | None) -> None:
+    reached: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_write(reached, error)
+    assert reached == ["the end"]
