@@ -4,6 +4,7 @@ import { h } from "../core/dom.js";
 import { duration, instant, percent } from "../core/format.js";
 import { card, facts, notice } from "../core/parts.js";
 import { canResume, stateChip } from "../campaigns/states.js";
+import { due } from "../campaigns/when.js";
 import { link, resumeButton } from "./acts.js";
 
 export function withoutBench() {
@@ -21,7 +22,7 @@ export function idle(bench, last, next) {
       h("p", {}, bench.unconfirmed ? "No campaign starts before the bench was looked at." : `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`),
       h("div", { class: "row" }, link("Plan a campaign", "/campaigns/new", "first"), link("All campaigns", "/campaigns"))),
     card("Next on the schedule", next
-      ? [h("p", { class: "told" }, instant(next.due_at)), h("p", { class: "soft" }, `${next.recipe} on ${next.bench}${next.cron ? `, then again: ${next.cron} (${next.time_zone})` : ""}`)]
+      ? [h("p", { class: "told" }, due(next)), h("p", { class: "soft" }, `${next.recipe} on ${next.bench}`, next.cron ? [", then again: ", h("code", {}, next.cron)] : null)]
       : h("p", { class: "soft" }, "Nothing is scheduled.")),
     last ? card(`Last: campaign ${last.id}`,
       h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),

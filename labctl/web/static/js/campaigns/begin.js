@@ -32,7 +32,7 @@ export function begin(bench, order) {
     if (hide.length) throw new Error("An effect can be hidden only in a campaign that begins now.");
     if (chosen === "at" && !at.value) throw new Error("Say when it is to begin.");
     const made = await post("/api/campaigns", { ...rest, ...(chosen === "at" ? { at: at.value } : { cron: cron.value }), time_zone: zone.value || null, priority: Number(priority.value), ...(late.value === "" ? {} : { late_limit_s: Number(late.value) * HOUR_S }) });
-    toast("good", `It begins ${instant(made.due_at)}.`);
+    toast("good", `It begins ${instant(made.due_at)}, your time.`);
     await go("/campaigns");
   }
   async function simulated() {

@@ -6,6 +6,7 @@ import { duration, instant, percent } from "../core/format.js";
 import { button, card, chip, empty, head, headed, table } from "../core/parts.js";
 import { link } from "../bench/acts.js";
 import { runs, stateChip } from "../campaigns/states.js";
+import { due } from "../campaigns/when.js";
 
 const AGAIN_MS = 4000;
 
@@ -50,7 +51,7 @@ const OUTCOMES = { started: "good", refused: "bad", missed: "warn", claimed: "ac
 function scheduled(rows, again) {
   const came = (event) => h("span", { class: "small beside" }, chip(event.outcome, OUTCOMES[event.outcome] ?? ""), ` ${instant(event.at)} `, event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message);
   return card("Schedule", table([
-    { title: "Begins", cell: (row) => [h("strong", { class: "nowrap" }, instant(row.due_at)), h("span", { class: "soft small beside" }, row.time_zone)] },
+    { title: "Begins", cell: due },
     { title: "Recipe", cell: (row) => [row.recipe, row.clip ? h("span", { class: "soft small beside" }, "without what the bench cannot do") : null] },
     { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
     { title: "Priority", number: true, cell: (row) => row.priority },

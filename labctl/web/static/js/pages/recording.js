@@ -2,11 +2,13 @@
 
 import { download, get } from "../core/api.js";
 import { h } from "../core/dom.js";
+import { plotly } from "../core/figure.js";
 import { count, day, number, setting } from "../core/format.js";
 import { button, card, facts, head, notice } from "../core/parts.js";
 import { remember } from "../core/router.js";
 import { allan } from "../recordings/allan.js";
 import { unitOf } from "../recordings/channels.js";
+import { means } from "../recordings/means.js";
 import { readings } from "../recordings/readings.js";
 import { dataSets } from "../recordings/sets.js";
 import { trace } from "../recordings/trace.js";
@@ -14,6 +16,7 @@ import { trace } from "../recordings/trace.js";
 const AGREED = { samples: "every reading", points: "one mean per data set", coefficients: "a published table, no readings" };
 
 export async function page({ params, query, signal }) {
+  plotly(); // loads while the service answers
   const path = `/api/recordings/${encodeURIComponent(params.id)}`;
   const [about, sets] = await Promise.all([get(path, { signal }), get(`${path}/datasets`, { signal })]);
   const { info } = about;
@@ -34,6 +37,7 @@ export async function page({ params, query, signal }) {
       parts.trace.scrollIntoView({ block: "start", behavior: "smooth" });
     };
   }
+  if (!timed && sets.number.length) parts.means = means(state);
   if (about.kind === "samples") parts.allan = allan(state, signal);
   state.pick = (dataset) => {
     state.dataset = dataset === state.dataset ? null : dataset;
@@ -41,7 +45,7 @@ export async function page({ params, query, signal }) {
     for (const part of Object.values(parts)) part.redraw();
     if (state.dataset !== null) parts.raw.scrollIntoView({ block: "nearest", behavior: "smooth" });
   };
-  element.append(...[parts.trace, parts.raw, parts.table, parts.allan].filter(Boolean));
+  element.append(...[parts.trace, parts.means, parts.raw, parts.table, parts.allan].filter(Boolean));
   return element;
 }
 

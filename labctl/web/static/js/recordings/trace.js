@@ -40,7 +40,7 @@ export function trace(state, signal) {
         { type: "scatter", mode: few ? "lines+markers" : "lines", name: "mean", line: { color: line, width: 1.3 }, marker: { size: 4 }, ...joined(t, found.mean, tips, pieces), hovertemplate: `%{y:.6~g} ${found.unit}<br>at %{x:.6~f} ${unit}<br>%{text}<extra></extra>` },
       ],
       layout: {
-        showlegend: false, xaxis: { title: { text: `time, ${unit}` }, range: [low / seconds, high / seconds] }, yaxis: { title: { text: name }, fixedrange: true }, margin: { l: 64, r: 12, t: 8, b: 46 },
+        labctlConfig: { showTips: false }, showlegend: false, xaxis: { title: { text: `time, ${unit}` }, range: [low / seconds, high / seconds] }, yaxis: { title: { text: name }, fixedrange: true }, margin: { l: 64, r: 12, t: 8, b: 46 },
         shapes: set < 0 ? [] : [{ type: "rect", xref: "x", yref: "paper", x0: state.sets.t_from_s[set] / seconds, x1: state.sets.t_until_s[set] / seconds, y0: 0, y1: 1, line: { width: 1, color: colour("warn") }, fillcolor: colour("warn"), opacity: 0.22 }],
       },
     };
