@@ -53,7 +53,8 @@ function top(about, path) {
   const unit = encodeURIComponent(about.serial);
   const file = (format, text) => button(text, () => download(`${path}/file?format=${format}`, `recording-${about.id}-${format}.zip`));
   const from = about.campaign ? h("a", { href: `/campaigns/${about.campaign}` }, `campaign ${about.campaign}`) : "an import";
-  return head(`Recording ${about.id}`, h("span", {}, "Of ", h("a", { href: `/units/${unit}` }, about.serial), ", from ", from, `, ${day(about.created_at)}. Holds ${AGREED[about.kind] ?? about.kind}.`),
+  const made = [about.info.model, about.info.technology?.toUpperCase()].filter(Boolean);
+  return head(`Recording ${about.id}`, h("span", {}, "Of ", h("a", { href: `/units/${unit}` }, about.serial), made.length ? ` (${made.join(", ")})` : "", ", from ", from, `, ${day(about.created_at)}. Holds ${AGREED[about.kind] ?? about.kind}.`),
     h("a", { class: "button first", href: `/explore?unit=${unit}&recording=${about.id}` }, "Explore"),
     ...(about.kind === "coefficients" ? [] : [file("parquet", "Save as Parquet"), file("csv", "Save as CSV")]));
 }
@@ -66,8 +67,7 @@ function who({ info, datasets, readings: n, kind }, sets) {
   const warm = span(sets.channels.temperature_c?.mean);
   const rates = span(sets.table_rate_dps);
   const units = [...new Set(info.axes.map((axis) => unitOf(`gyro_${axis}`, info.output)))];
-  const card_ = card("Unit and conditions", facts([
-    ["Model", info.model || "not named", "", info.technology ? info.technology.toUpperCase() : null],
+  const card_ = card("Conditions", facts([
     ["Axes", info.axes.join(", "), "", `output in ${units.join(", ")}`],
     datasets ? ["Data sets", count(datasets)] : null,
     kind === "samples" ? ["Readings", count(n), "", info.sample_rate_hz ? `${setting(info.sample_rate_hz)} per second` : null] : null,

@@ -1,10 +1,10 @@
 // Noise at rest: the Allan deviation of each axis, and N, B, K with what they mean and why one may be missing.
 
-import { get } from "../core/api.js";
+import { get, Problem } from "../core/api.js";
 import { fill, h } from "../core/dom.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
-import { headed, later, table, tabs } from "../core/parts.js";
+import { headed, later, notice, table, tabs } from "../core/parts.js";
 
 const FIGURES = [["N", "angle random walk"], ["B", "bias instability"], ["K", "rate random walk"]];
 
@@ -19,7 +19,14 @@ export function allan(state, signal) {
       show();
     }) : null);
     const dataset = own ? state.dataset : null;
-    later(place, "Working out the Allan deviation", async () => shown(await get(`/api/recordings/${state.id}/allan`, { query: { dataset }, signal })));
+    later(place, "Working out the Allan deviation", async () => {
+      try {
+        return shown(await get(`/api/recordings/${state.id}/allan`, { query: { dataset }, signal }));
+      } catch (error) {
+        if (error instanceof Problem && error.status < 500) return notice("", error.message); // too little at rest is no fault
+        throw error;
+      }
+    });
   };
   show();
   return Object.assign(headed("Noise at rest", which, place), { redraw: show });

@@ -15,15 +15,16 @@ export function means(state) {
   const scale = [0, 0.25, 0.5, 0.75, 1].map((share) => [share, warmth(share)]);
   const tips = sets.number.map((number, k) => `data set ${number}: ${setting(sets.table_rate_dps[k], 6)} deg/s${warm ? ` at ${setting(warm[k])} deg C` : ""}, ${sets.position[k]} up`);
   const spot = (k) => (sets.number[k] === state.dataset ? 13 : 5);
+  const rim = () => ({ width: sets.number.map((number) => (number === state.dataset ? 2.5 : 0)), color: colour("ink") });
   const drawRate = () => ({
     data: gyros.map((name, g) => ({
       type: "scatter", mode: "markers", name: `axis ${name.slice(5)}`, x: sets.table_rate_dps, y: sets.channels[name].mean, customdata: sets.number, text: tips, hovertemplate: `%{y:.6~g} ${unitOf(name, output)}<br>%{text}<extra></extra>`,
-      marker: { size: sets.number.map((_, k) => spot(k)), ...(warm ? { color: warm, colorscale: scale, cmin: low, cmax: high, showscale: g === 0, colorbar: { title: { text: "deg C" }, thickness: 12, outlinewidth: 0 } } : { color: axisColour(name.slice(5)) }) },
+      marker: { size: sets.number.map((_, k) => spot(k)), line: rim(), ...(warm ? { color: warm, colorscale: scale, cmin: low, cmax: high, showscale: g === 0, colorbar: { title: { text: "deg C" }, thickness: 12, outlinewidth: 0 } } : { color: axisColour(name.slice(5)) }) },
     })),
     layout: { showlegend: false, margin: { l: 66, r: 12, t: 8, b: 46 }, xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: `output, ${unitOf(gyros[0], output)}` } } },
   });
   const drawWarm = () => ({
-    data: [{ type: "scatter", mode: "lines+markers", name: "gyro temperature", x: sets.number, y: warm, customdata: sets.number, text: tips, hovertemplate: "%{text}<extra></extra>", line: { color: colour("accent"), width: 1 }, marker: { size: sets.number.map((_, k) => spot(k) - 2), color: colour("accent") } }],
+    data: [{ type: "scatter", mode: "lines+markers", name: "gyro temperature", x: sets.number, y: warm, customdata: sets.number, text: tips, hovertemplate: "%{text}<extra></extra>", line: { color: colour("accent"), width: 1 }, marker: { size: sets.number.map((_, k) => spot(k) - 2), line: rim(), color: colour("accent") } }],
     layout: { showlegend: false, margin: { l: 58, r: 12, t: 8, b: 46 }, xaxis: { title: { text: "data set" } }, yaxis: { title: { text: "gyro temperature, deg C" } } },
   });
   const pictures = [figure(`Recording ${state.id} output over rate`, "One point for each data set; its colour is the gyro's temperature.", drawRate, { tall: "19rem" }), warm ? figure(`Recording ${state.id} temperature`, "In the order of the data sets. Press a point to pick its data set.", drawWarm, { tall: "19rem" }) : null].filter(Boolean);

@@ -1,0 +1,111 @@
+"""The bench as a person beside it uses the page: mounting, pause, stop, silence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from labctl.services import running
+from procedures.operator import PersonOperator
+from tests.web.conftest import Faults, Service
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = pytest.mark.timeout(300)
+
+
+@pytest.fixture
+def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+    """A bench on which a person turns and switches the units."""
+    monkeypatch.setattr(running, "operator_of", lambda _: PersonOperator())
+    serving = Service(tmp_path)
+    serving.start()
+    yield serving
+    serving.stop()
+
+
+def start(service: Service) -> None:
+    service.post("/api/campaigns", {"recipe": "short"})
+    service.until("/api/campaigns/1", lambda answer: answer["prompt"] is not None)  # type: ignore[index]
+
+
+def answered(page: Page, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+    asked = page.get_by_role("dialog")
+    asked.get_by_label("Your name").fill("Ann")
+    asked.get_by_role("button", name="It is done").click()
+
+
+def test_mounted_paused_and_stopped_by_hand(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    start(service)
+    page = visit("/bench")
+    expect(page.get_by_role("img", name="The unit with its z axis pointing up")).to_be_visible()
+    answered(page, "Done")
+    expect(page.get_by_role("alert", name="A question for you")).to_contain_text("Switch the units on")
+
+    page.get_by_role("button", name="Safe stop").click()
+    stop = page.get_by_role("dialog")
+    stop.get_by_label("Your name").fill("Ann")
+    stop.get_by_label("Why").fill("smoke")
+    stop.get_by_role("button", name="Stop now").click()
+    expect(page.locator(".toasts")).to_contain_text("safe state")
+    expect(page.get_by_role("region", name="Nothing runs")).to_be_visible()
+    ended = service.get("/api/campaigns/1")
+    assert ended["state"] == "aborted"  # type: ignore[index]
+    assert "smoke (Ann)" in ended["reason"]  # type: ignore[index]
+
+    page.get_by_role("button", name="Resume where it was").click()
+    page.get_by_role("dialog").get_by_role("button", name="Resume", exact=True).click()
+    expect(page.get_by_role("region", name="What the bench is doing")).to_be_visible()
+
+
+def test_what_cannot_be_done_ends_the_campaign(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    start(service)
+    page = visit("/bench")
+    page.get_by_role("button", name="Cannot be done").click()
+    asked = page.get_by_role("dialog")
+    asked.get_by_label("Your name").fill("Ann")
+    asked.get_by_label("Why").fill("no wrench")
+    asked.get_by_role("button", name="It cannot be done").click()
+    expect(page.get_by_role("region", name="Nothing runs")).to_be_visible()
+    assert "no wrench" in service.get("/api/campaigns/1")["reason"]  # type: ignore[index]
+
+
+def test_says_that_it_is_stale_and_goes_on_where_it_was(
+    service: Service, visit: Callable[..., Page], faults: Faults
+) -> None:
+    from playwright.sync_api import expect
+
+    start(service)
+    page = visit("/bench")
+    expect(page.get_by_role("list")).to_contain_text("campaign running")
+    page.context.set_offline(True)
+    service.stop()
+    expect(page.get_by_text("Nothing new since")).to_be_visible()
+    page.context.set_offline(False)
+    service.start()
+    expect(page.get_by_text("Nothing new since")).not_to_be_visible()
+    # taken up by the service itself, or ended by its stopping: either is told
+    expect(page.locator("main")).to_contain_text("campaign 1")
+    faults.clear()
+
+
+def test_a_service_without_a_bench_says_how_to_start_one(tmp_path: Path, chromium: object) -> None:
+    serving = Service(tmp_path / "none", bench=None)
+    (tmp_path / "none").mkdir()
+    serving.start()
+    try:
+        page = chromium.new_page()  # type: ignore[attr-defined]
+        page.goto(f"{serving.url}/bench")
+        page.get_by_text("labctl serve --simulate").wait_for()
+        page.close()
+    finally:
+        serving.stop()

@@ -1,0 +1,79 @@
+"""Planning, starting, scheduling and looking back at campaigns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.web.conftest import NARROW, Faults, Service
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/campaigns/new?recipe=short&hide=scale_factor_asymmetry")
+    expect(page.get_by_role("region", name="What it would do")).to_contain_text("15")
+    expect(page.get_by_role("region", name="What it could find")).to_contain_text("It could find")
+    expect(page.get_by_role("spinbutton", name="Size")).not_to_have_value("")
+    page.get_by_role("button", name="Start on").click()
+    page.wait_for_url("**/bench")
+    service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")  # type: ignore[index]
+
+    page.goto(f"{service.url}/campaigns")
+    page.get_by_role("link", name="Campaign 1").click()
+    expect(page.locator("main")).to_contain_text("all steps done")
+    expect(page.locator("main")).to_contain_text("15 of 15")
+    expect(page.get_by_role("list")).to_contain_text(["campaign running"])
+    page.get_by_role("button", name="errors", exact=True).click()
+    assert "level=error" in page.url
+    expect(page.get_by_role("region", name="Events")).to_contain_text("Nothing of this kind")
+
+
+def test_what_the_bench_cannot_do_is_refused_or_left_out(visit: Callable[..., Page], faults: Faults) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/campaigns/new?recipe=table1-x-table2", size=NARROW)
+    expect(page.get_by_role("alert")).to_contain_text("400")
+    page.get_by_label("Leave out what the bench or the unit cannot do").check()
+    expect(page.get_by_role("region", name="What it would do")).to_contain_text("points are left out")
+    assert "clip=1" in page.url
+    faults.clear()  # the browser notes the refusal as an error
+
+
+def test_own_recipe_is_planned_as_it_is_typed_and_is_in_the_address(visit: Callable[..., Page], faults: Faults) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/campaigns/new?recipe=short")
+    page.get_by_text("Its text").click()
+    page.get_by_role("button", name="Change a copy of it").click()
+    text = page.get_by_label("Recipe as TOML")
+    text.fill(text.input_value().replace("[24, 26, 28]", "[24, 26]"))
+    expect(page.get_by_role("region", name="What it would do").locator("dd").first).to_contain_text("10")
+    assert "toml=" in page.url
+    text.fill('format = "labctl-recipe/1"\nname = "x"\ntemperatures_c = "warm"\n')
+    expect(page.get_by_role("alert")).to_contain_text("temperatures_c")
+    faults.clear()
+
+
+def test_a_start_is_put_on_the_schedule_and_taken_out(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/campaigns/new?recipe=short")
+    page.get_by_role("button", name="Again and again").click()
+    page.get_by_label("Cron line").fill("0 20 * * FRI")
+    page.get_by_label("Time zone").fill("Europe/Berlin")
+    page.get_by_role("button", name="Put on the schedule").click()
+    page.wait_for_url("**/campaigns")
+    entry = page.get_by_role("region", name="Schedule").first
+    expect(entry).to_contain_text("20:00")
+    expect(entry).to_contain_text("Europe/Berlin")
+    entry.get_by_role("button", name="Cancel").click()
+    expect(page.locator(".toasts")).to_contain_text("Taken out")
+    assert service.get("/api/schedule") == []
