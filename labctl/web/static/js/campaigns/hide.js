@@ -22,7 +22,7 @@ export function hiding(effects, asked, chosen) {
       row.size = input.value;
       tell();
     } });
-    const hint = can?.visible && can.smallest_size ? `This plan shows it from ${number(can.smallest_size, 2)} ${unit}${unit ? "" : `(${sizeWords(can.smallest_size, "1")}) `}on.` : can ? "This plan would not show it." : null;
+    const hint = can?.visible && can.smallest_size ? `This plan shows it from ${number(can.smallest_size, 2)} ${unit || `(${sizeWords(can.smallest_size, "1")})`} on.` : can ? "This plan would not show it." : null;
     return fill(beside, field(unit ? `Size, ${unit}` : "Size", input, hint), h("p", { class: "soft small", style: "flex: 1 1 14rem" }, about?.sentence ?? ""));
   }
   const pick = choice("Effect to hide", [["", "none"], ...effects.map((each) => [each.id, words(each.id)])], row.effect, (value) => {

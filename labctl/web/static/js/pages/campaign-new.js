@@ -29,7 +29,7 @@ export async function page({ query, signal }) {
     asked.abort();
     asked = new AbortController();
     const given = AbortSignal.any([signal, asked.signal]);
-    fill(found, busy("Working out what it could find"));
+    fill(found, busy("Working out what it could find; for a long plan that takes some seconds."));
     try {
       const answer = await post("/api/plans", { recipe: source(), clip }, { signal: given });
       fill(planned, shown(answer));
@@ -55,6 +55,7 @@ export async function page({ query, signal }) {
   plan();
   return h("div", { class: "page" },
     head("Plan a campaign", bench ? h("span", { class: "row" }, "On bench ", h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null) : "For the simulated bench that fits the recipe best."),
+    query.recipe && named.name !== query.recipe && !query.toml ? notice("warn", `No recipe ${query.recipe} comes with labctl; ${named.name} is shown. Its text can be pasted under "Your own".`) : null,
     h("div", { class: "planning" },
       h("div", { class: "stack" }, recipes(all, choice, (next) => {
         Object.assign(choice, next);

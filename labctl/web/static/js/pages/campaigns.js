@@ -43,7 +43,7 @@ function listed(rows) {
     { title: "Begun", cell: (row) => h("span", { class: "nowrap" }, instant(row.started_at)) },
     { title: "Took", number: true, cell: (row) => (runs(row) ? h("span", { class: "soft" }, `ends ${instant(row.expected_end)}`) : took(row)) },
     { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("span", { class: "nowrap beside" }, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), ", ", h("a", { href: `/recordings/${recording}` }, `recording ${recording}`))) },
-  ], rows, { label: "Campaigns", first: "8rem" });
+  ], rows, { label: "Every campaign", first: "8rem" });
 }
 
 const OUTCOMES = { started: "good", refused: "bad", missed: "warn", claimed: "accent" };
@@ -57,9 +57,9 @@ function scheduled(rows, again) {
     { title: "Priority", number: true, cell: (row) => row.priority },
     { title: "May be late by", number: true, cell: (row) => (row.late_limit_s === null ? "any time" : duration(row.late_limit_s)) },
     { title: "Before", cell: (row) => (row.history.length ? row.history.slice(-2).map(came) : h("span", { class: "soft" }, "–")) },
-    { title: "", cell: (row) => button("Cancel", async () => {
+    { title: h("span", { class: "visually-hidden" }, "Cancel"), cell: (row) => button("Cancel", async () => {
       await remove(`/api/schedule/${row.id}`);
       await again();
     }, { kind: "tiny", done: "Taken out of the schedule." }) },
-  ], rows, { label: "Schedule", first: "9rem" }));
+  ], rows, { label: "What begins when", first: "9rem" }));
 }

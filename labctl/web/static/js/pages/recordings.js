@@ -44,7 +44,7 @@ function listed(rows) {
     { title: "Readings", number: true, cell: (row) => (row.kind === "samples" ? count(row.readings) : "–") },
     { title: "From", cell: (row) => (row.campaign ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`) : h("span", { class: "soft" }, "import")) },
     { title: "Since", cell: (row) => h("span", { class: "nowrap" }, day(row.created_at)) },
-    { title: "", cell: (row) => h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(row.serial)}&recording=${row.id}` }, "Explore") },
+    { title: h("span", { class: "visually-hidden" }, "Explore"), cell: (row) => h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(row.serial)}&recording=${row.id}` }, "Explore") },
   ], rows, { label: "Recordings", first: "13rem" });
 }
 

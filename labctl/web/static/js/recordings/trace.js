@@ -4,7 +4,7 @@ import { get } from "../core/api.js";
 import { fill, h } from "../core/dom.js";
 import { colour, figure } from "../core/figure.js";
 import { count, duration, number } from "../core/format.js";
-import { choice, headed, notice } from "../core/parts.js";
+import { busy, choice, headed, notice } from "../core/parts.js";
 import { remember } from "../core/router.js";
 import { nameOf, titleOf } from "./channels.js";
 
@@ -18,7 +18,7 @@ export function trace(state, signal) {
   let asked = new AbortController();
   let waiting = null;
   const told = h("p", { class: "soft small", "aria-live": "polite" });
-  const place = h("div", {});
+  const place = h("div", { style: "min-height: 24rem" }, busy("Reading"));
   const picture = figure(`Recording ${state.id} trace`, "Band: from the least to the greatest reading of a column; line: their mean. Drag across to look closer, press a data set to open its readings.", draw, { tall: "21rem", csv: () => [["t_s", `min_${state.channel}`, `max_${state.channel}`, `mean_${state.channel}`, "n"], ...found.t_s.map((t, k) => [t, found.min[k], found.max[k], found.mean[k], found.n[k]])] });
   const channels = h("div", {});
 
