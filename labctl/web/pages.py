@@ -1,4 +1,4 @@
-"""Serves the pages: one shell for every address, and the files it loads. No page knows anything that the API does not say."""
+"""Serves the pages: one shell for every address, and the files it loads. No page knows what the API does not say."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def test_measured_and_modelled_are_compared_in_every_view(visit: Callable[..., P
 
     page = visit(explored)
     compare = page.get_by_role("region", name="Compare")
-    compare.get_by_role("button", name=view).click()
+    compare.get_by_role("button", name=view, exact=True).click()
     expect(compare.locator(".plot .main-svg").first).to_be_attached()
     assert compare.locator(".notice.bad").count() == 0
     with page.expect_download() as download:

@@ -25,7 +25,7 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")  # type: ignore[index]
 
     page.goto(f"{service.url}/explore")
-    page.get_by_label("Model").select_option("ojeda2000")
+    page.get_by_label("Model", exact=True).select_option("ojeda2000")
     page.get_by_role("button", name="Fit").click()
     verdict = page.get_by_role("region", name="Verdict")
     expect(verdict).to_contain_text("Missing: scale_factor_asymmetry")

@@ -14,8 +14,8 @@ export function output(timeline, signal) {
   const about = h("span", { class: "soft small" });
   const place = h("div", {}, h("p", { class: "soft" }, "The first data set has not been measured yet."));
   let columns = null;
-  let [shown, next, busy] = [null, 0, false];
-  const picture = figure("Gyro output of the last data set", "Every reading, as it was recorded.", () => {
+  let [shown, next, busy, unit] = [null, 0, false, null];
+  const picture = figure("Gyro output of the last data set", `As recorded; of a long data set the first ${READINGS} readings.`, () => {
     const axes = Object.keys(columns ?? {}).filter((name) => name.startsWith("gyro_"));
     const t = (columns?.t_s ?? []).map((value) => value - columns.t_s[0]);
     const thirds = axes.length > 1 ? axes.length : 1;
@@ -36,7 +36,8 @@ export function output(timeline, signal) {
     [busy, next] = [true, Date.now() + EVERY_MS];
     try {
       const found = await get(`/api/recordings/${recording}/samples`, { query: { dataset, limit: READINGS }, signal });
-      columns = { ...found.columns, unit: "deg/s" };
+      unit ??= await unitOf(recording, found.columns, signal);
+      columns = { ...found.columns, unit };
       const k = timeline.dataset.indexOf(dataset);
       fill(about, h("a", { href: `/recordings/${recording}?dataset=${dataset}` }, `Data set ${dataset}`), `: ${setting(timeline.rate_dps[k])} deg/s at ${setting(timeline.temperature_c[k])} deg C, ${timeline.position[k] ?? "?"} up`);
       if (!picture.isConnected) fill(place, picture);
@@ -49,4 +50,11 @@ export function output(timeline, signal) {
     }
   }
   return Object.assign(headed("Gyro output", about, place), { tell });
+}
+
+/** The unit of an output: the trace names it, also of a few seconds. */
+async function unitOf(recording, columns, signal) {
+  const channel = Object.keys(columns).find((name) => name.startsWith("gyro_"));
+  const asked = { channel, from_s: columns.t_s[0], until_s: columns.t_s.at(-1), points: 200 };
+  return (await get(`/api/recordings/${recording}/trace`, { query: asked, signal })).unit;
 }

@@ -85,7 +85,7 @@ function stripOf(status, plan, bench) {
     bar.style.width = `${(100 * now.progress).toFixed(2)}%`;
     meter.setAttribute("aria-valuenow", String(Math.round(100 * now.progress)));
     fill(beside, `Step ${now.step ?? "–"} of ${now.steps}, ${(100 * now.progress).toFixed(1)} %. `,
-      now.expected_end ? `${duration(left(now, plan.expected_s))} left, end ${instant(now.expected_end)}${bench.simulated ? " on the simulated bench's own clock" : ""}.` : "",
+      now.expected_end ? `${duration(left(now, plan.expected_s))} left, end ${instant(now.expected_end)}` : "", now.expected_end && bench.simulated ? h("span", { class: "wide-only" }, " on the simulated bench's own clock") : "", now.expected_end ? "." : "",
       now.wish === "pause" ? h("strong", {}, " Pauses after this data set.") : now.wish === "abort" ? h("strong", {}, " Stops now.") : null);
     const wanted = now.state === "paused" || now.wish === "pause" ? "resume" : "pause";
     if (wanted !== mode) fill(acts, wanted === "resume" ? resumeButton(now.id) : pauseButton(now.id));

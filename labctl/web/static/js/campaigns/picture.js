@@ -76,7 +76,7 @@ export function planPicture(name, give, { tall = "24rem", pick } = {}) {
     const end = steps.at(-1)?.until ?? 1;
     const shapes = bands(steps).map((band) => ({ type: "rect", xref: "x", yref: "paper", x0: band.from, x1: band.until, y0: 0, y1: 1, line: { width: 0 }, fillcolor: colour(`axis-${band.position.replace("-", "")}`), opacity: 0.1, layer: "below" }));
     const words = bands(steps).filter((band) => band.until - band.from > end / (narrow ? 12 : 30)).map((band) => ({ text: `<b>${band.position}</b> up`, showarrow: false, xref: "x", yref: "paper", x: (band.from + band.until) / 2, y: 1, yanchor: "bottom", font: { size: 11.5, color: colour(`axis-${band.position.replace("-", "")}`) } }));
-    if (now_s !== null) {
+    if (Number.isFinite(now_s)) {
       shapes.push({ type: "line", xref: "x", yref: "paper", x0: now_s / unit_s, x1: now_s / unit_s, y0: 0, y1: 1, line: { color: colour("ink"), width: 1.6, dash: "dot" } });
       words.push({ text: "now", showarrow: false, xref: "x", yref: "paper", x: now_s / unit_s, y: 0.42, yanchor: "middle", xanchor: now_s / unit_s > end * 0.9 ? "right" : "left", font: { size: 11.5, color: colour("ink") } });
     }
@@ -84,7 +84,7 @@ export function planPicture(name, give, { tall = "24rem", pick } = {}) {
       data: [{ type: "scatter", mode: "lines", name: "set point", ...course(steps), line: { color: colour("soft"), width: 1.5 }, hoverinfo: "skip", showlegend: false }, ...marks],
       layout: {
         margin: { l: 56, r: 12, t: live ? 44 : 24, b: 42 }, shapes, annotations: words, legend: { orientation: "h", y: 1.07, yanchor: "bottom", x: 0 },
-        xaxis: { title: { text: `time since the beginning, ${unit_s === 3600 ? "h" : "min"}` }, anchor: "y2", range: [-0.01 * end, Math.max(end, (now_s ?? 0) / unit_s) * 1.01] },
+        xaxis: { title: { text: `time since the beginning, ${unit_s === 3600 ? "h" : "min"}` }, anchor: "y2", range: [-0.01 * end, Math.max(end, (now_s || 0) / unit_s) * 1.01] },
         yaxis: { title: { text: "set point, deg C" }, domain: [0.46, 1] }, yaxis2: { title: { text: "rate, deg/s" }, domain: [0, 0.38], anchor: "x" },
       },
     };

@@ -2,7 +2,7 @@
 
 const routes = [];
 let leave = new AbortController();
-let shown = null;
+let moved = false; // the first page is where a reader begins, not where one was led
 
 /** Say which module shows addresses like `/units/:serial`. A module has `page(context)`, which returns an element. */
 export const route = (pattern, load) => routes.push({ parts: pattern.split("/").filter(Boolean), load });
@@ -50,11 +50,11 @@ export async function show() {
     const module = await (found ? found.load() : import("../pages/missing.js"));
     const element = await module.page({ params: found?.params ?? {}, query: query(), signal });
     if (signal.aborted) return;
-    shown = element;
     main.replaceChildren(element);
     const heading = element.querySelector("h1");
     document.title = heading ? `${heading.textContent} · labctl` : "labctl";
-    if (document.activeElement === document.body || main.contains(document.activeElement)) main.focus({ preventScroll: true });
+    if (moved && (document.activeElement === document.body || main.contains(document.activeElement))) main.focus({ preventScroll: true });
+    moved = true;
   } catch (error) {
     if (signal.aborted || error.name === "AbortError") return;
     const { trouble } = await import("./parts.js");

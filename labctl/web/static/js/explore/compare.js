@@ -60,7 +60,7 @@ function family(rows, state, along, by, name, unit, other) {
 }
 
 async function surface(rows, state, path, signal) {
-  const grid = (await get(`${path}/surface`, { signal }))[state.axis] ?? (await get(`${path}/surface`, { signal })).axes?.[state.axis];
+  const grid = (await get(`${path}/surface`, { signal })).axes[state.axis];
   const draw = () => ({
     data: [
       { type: "surface", name: "model", x: grid.rate_dps, y: grid.temperature_c, z: grid.error_dps, colorscale: "Viridis", opacity: 0.85, colorbar: { title: { text: "deg/s" }, thickness: 12 }, hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>modelled %{z:.4g} deg/s<extra></extra>" },

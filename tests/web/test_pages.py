@@ -1,0 +1,110 @@
+"""Every page, wide and narrow, light and dark: it opens without complaint, nothing sticks out, axe finds no fault."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.web.conftest import NARROW, WIDE, Faults, Service
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = pytest.mark.timeout(400)
+SERIOUS = {"serious", "critical"}
+
+
+@pytest.fixture
+def furnished(service: Service) -> Service:
+    """A house with a campaign that is done, a unit with two versions, one in force, and a table that was imported."""
+    service.post("/api/campaigns", {"recipe": "short"})
+    service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")  # type: ignore[index]
+    unit = "/api/units/FOG-0001/calibrations"
+    service.post(unit, {"effects": ["bias", "scale_factor"]})
+    service.post(f"{unit}/1/improve", {"add": ["scale_factor_odd"]})
+    service.post(f"{unit}/1/certify", {"by": "A. Person", "reason": "fits", "due_days": 365})
+    service.post("/api/recordings/example", {"name": "osu-fog"})
+    return service
+
+
+PAGES = {
+    "/": "labctl",
+    "/bench": "Bench",
+    "/campaigns": "Campaigns",
+    "/campaigns/1": "Campaign 1",
+    "/campaigns/new?recipe=short": "Plan a campaign",
+    "/units": "Units",
+    "/units/FOG-0001?beside=1": "FOG-0001",
+    "/explore?unit=FOG-0001": "Explore",
+    "/recordings": "Recordings",
+    "/recordings/1": "Recording 1",
+    "/effects": "Effects",
+    "/effects/scale_factor_asymmetry": "Scale factor asymmetry",
+}
+
+
+def settled(page: Page) -> None:
+    """Wait until the page has what it asked for."""
+    page.wait_for_selector("main h1")
+    page.wait_for_function("() => !document.querySelector('main[aria-busy], .busy')")
+
+
+def test_every_page_opens_in_every_dress(furnished: Service, visit: Callable[..., Page]) -> None:
+    from axe_playwright_python.sync_playwright import Axe
+
+    wrong: list[str] = []
+    for size, dark in ((WIDE, False), (NARROW, True)):
+        page = visit("/", size=size, dark=dark)
+        for path, title in PAGES.items():
+            page.goto(furnished.url + path)
+            settled(page)
+            heading = page.locator("main h1").inner_text()
+            if title not in heading:
+                wrong.append(f"{path}: headed {heading!r}, not {title!r}")
+            beyond = page.evaluate("() => document.documentElement.scrollWidth - innerWidth")
+            if beyond > 1:
+                wrong.append(f"{path}: sticks out by {beyond} px at {size['width']} px")
+            found: dict[str, Any] = Axe().run(page).response
+            wrong += [
+                f"{path} ({size['width']} px): {each['id']}: {each['help']}: {each['nodes'][0]['html'][:160]}"
+                for each in found["violations"]
+                if each["impact"] in SERIOUS
+            ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_an_empty_house_leads_to_a_first_calibration_in_one_press(visit: Callable[..., Page], service: Service) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/")
+    expect(page.get_by_role("heading", name="Begin", exact=True)).to_be_visible()
+    page.get_by_role("button", name="Open the real gyro").click()
+    page.wait_for_url("**/explore?unit=OSU-FOG-2024**")
+    expect(page.get_by_role("region", name="Verdict")).to_contain_text("Cannot tell which")
+    assert service.get("/api/units/OSU-FOG-2024/ladder")["steps"][0]["model"] == "bias_scale"  # type: ignore[index]
+
+
+def test_pages_that_do_not_exist_and_units_that_do_not(visit: Callable[..., Page], faults: Faults) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/units/NOBODY")
+    expect(page.locator("main")).to_contain_text("NOBODY")
+    page.goto(page.url.replace("/units/NOBODY", "/effects/nothing/at/all"))
+    expect(page.get_by_role("heading", name="No such page")).to_be_visible()
+    faults.clear()  # the browser itself logs each 404
+
+
+def test_a_person_without_a_mouse_gets_there(visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/")
+    settled(page)
+    page.keyboard.press("Tab")
+    expect(page.get_by_role("link", name="To the page")).to_be_focused()
+    for _ in range(6):
+        page.keyboard.press("Tab")
+    expect(page.get_by_role("link", name="Recordings")).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("heading", name="Recordings", level=1)).to_be_visible()

@@ -1,0 +1,133 @@
+"""What goes wrong beside a page: reloads, a service that restarts, wrong files, wrong keys, two people at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import httpx
+import pytest
+
+from labctl.services.keys import KeyRequest, Role
+from tests.web.conftest import Faults, Service
+from tests.web.test_pages import settled
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+pytestmark = pytest.mark.timeout(300)
+UNIT = "/api/units/OSU-FOG-2024/calibrations"
+
+
+@pytest.fixture
+def fog(service: Service) -> Service:
+    service.post("/api/recordings/example", {"name": "osu-fog"})
+    service.post(UNIT, {"model": "bias_scale"})
+    return service
+
+
+def test_a_reload_in_the_middle_shows_the_same(fog: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/explore?unit=OSU-FOG-2024&version=1&view=rest")
+    before = page.get_by_role("region", name="Verdict").inner_text()
+    expect(page.get_by_role("button", name="At rest", exact=True)).to_have_attribute("aria-pressed", "true")
+    page.reload()
+    expect(page.get_by_role("region", name="Verdict")).to_have_text(before, use_inner_text=True)
+    expect(page.get_by_role("button", name="At rest", exact=True)).to_have_attribute("aria-pressed", "true")
+
+
+def test_a_service_that_restarts_is_said_and_then_answers_again(
+    fog: Service, visit: Callable[..., Page], faults: Faults
+) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/explore?unit=OSU-FOG-2024&version=1")
+    page.get_by_role("region", name="Verdict").wait_for()
+    page.get_by_label("Add an effect").select_option("sine_response")
+    fog.stop()
+    page.get_by_role("button", name="Preview").click()
+    expect(page.get_by_role("alert")).to_contain_text("The service does not answer")
+    fog.start()
+    page.get_by_role("button", name="Preview").click()
+    expect(page.get_by_role("button", name="Make version 2")).to_be_visible()
+    faults.clear()  # the browser itself logs that nobody answered
+
+
+def test_a_wrong_file_is_refused_with_the_place_of_the_fault(
+    service: Service, visit: Callable[..., Page], tmp_path: Path, faults: Faults
+) -> None:
+    from playwright.sync_api import expect
+
+    source = Path(__file__).resolve().parents[2] / "examples" / "weiss-gyrostar"
+    wrong = tmp_path / "wrong"
+    wrong.mkdir()
+    for file in source.iterdir():
+        if file.suffix in {".toml", ".csv"}:
+            text = file.read_text()
+            if file.suffix == ".csv":
+                lines = text.splitlines()
+                lines[3] = ",".join(["twelve", *lines[3].split(",")[1:]])
+                text = "\n".join(lines) + "\n"
+            (wrong / file.name).write_text(text)
+    page = visit("/recordings")
+    settled(page)
+    page.locator("input[type=file]").first.set_input_files(sorted(wrong.iterdir()))
+    expect(page.locator("main")).to_contain_text("twelve")
+    assert service.get("/api/recordings") == []
+    faults.clear()  # the browser itself logs each refusal
+
+
+def test_two_people_at_once_make_two_versions(fog: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    pages = [visit("/explore?unit=OSU-FOG-2024&version=1") for _ in range(2)]
+    for page, effect in zip(pages, ("sine_response", "scale_factor_odd"), strict=True):
+        page.get_by_role("region", name="Verdict").wait_for()
+        page.get_by_label("Add an effect").select_option(effect)
+        page.get_by_role("button", name="Preview").click()
+        page.get_by_role("button", name="Make version 2").wait_for()
+    for page in pages:
+        page.get_by_role("button", name="Make version 2").click()
+        expect(page.get_by_role("region", name="Watch the error fall")).to_contain_text("Version 1: what was left")
+    steps = fog.get("/api/units/OSU-FOG-2024/ladder")["steps"]  # type: ignore[index]
+    assert [(step["version"], step["parent"]) for step in steps] == [(1, None), (2, 1), (3, 1)]
+
+
+@pytest.fixture
+def guarded(tmp_path: Path) -> Iterator[tuple[Service, str, str]]:
+    """A service that asks for keys: the service, a viewer's key, an operator's."""
+    service = Service(tmp_path, keys=True)
+    service.start()
+    made = [
+        service.house.acts().create_key(KeyRequest(name=role.name.lower(), role=role)).key
+        for role in (Role.VIEWER, Role.OPERATOR)
+    ]
+    headers = {"Authorization": f"Bearer {made[1]}"}
+    for path, body in (("/api/recordings/example", {"name": "osu-fog"}), (UNIT, {"model": "bias_scale"})):
+        httpx.post(service.url + path, json=body, headers=headers, timeout=120).raise_for_status()
+    yield service, made[0], made[1]
+    service.stop()
+
+
+def test_a_viewer_may_look_and_preview_and_nothing_else(guarded: tuple[Service, str, str], chromium: Browser) -> None:
+    from playwright.sync_api import expect
+
+    service, viewer, _ = guarded
+    context = chromium.new_context()
+    context.set_default_timeout(45_000)
+    page = context.new_page()
+    page.goto(f"{service.url}/explore?unit=OSU-FOG-2024&version=1")
+    asked = page.get_by_role("dialog")
+    expect(asked).to_contain_text("asks for a key")
+    asked.get_by_label("Key").fill(viewer)
+    asked.get_by_role("button", name="Use it").click()
+    page.get_by_role("region", name="Verdict").wait_for()
+    page.get_by_label("Add an effect").select_option("sine_response")
+    page.get_by_role("button", name="Preview").click()
+    page.get_by_role("button", name="Make version 2").click()
+    expect(page.get_by_role("alert")).to_contain_text("operator")
+    headers = {"Authorization": f"Bearer {viewer}"}
+    assert len(httpx.get(service.url + UNIT, headers=headers, timeout=30).json()) == 1
+    context.close()
