@@ -12,6 +12,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock
+from labctl import web
 from labctl.api import create_app
 from labctl.api.door import ASKING, LOOPBACK_NAMES, Access
 from labctl.errors import BadInput, Conflict, NotFound
@@ -105,8 +106,16 @@ def test_every_path_asks_for_its_role_and_no_more(guarded: Guarded, method: str,
             assert f"{role.value} is {role.value}; this asks for" in answer.json()["detail"]
 
 
+@pytest.mark.parametrize("path", ["/", "/units/FOG-0001", "/static/js/main.js"])
+def test_pages_are_open_and_hold_nothing_of_the_house(guarded: Guarded, path: str) -> None:
+    answer = guarded.ask("get", path, None)
+    assert answer.status_code == 200
+    folder = Path(web.__file__).parent / "static"
+    assert answer.content in {file.read_bytes() for file in (folder / "index.html", folder / "js" / "main.js")}
+
+
 @pytest.mark.parametrize(
-    "path", ["/", "/api-docs", "/openapi.json", "/api/nowhere", "/health/", "/health/x", "//health"]
+    "path", ["/api-docs", "/openapi.json", "/api/nowhere", "/health/", "/health/x", "/staticly", "/units-of-mine"]
 )
 def test_nothing_else_is_open(guarded: Guarded, path: str) -> None:
     assert guarded.ask("get", path, None).status_code == 401

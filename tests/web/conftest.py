@@ -94,6 +94,18 @@ class Service:
         return answer
 
 
+@pytest.fixture(scope="session")
+def _kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("kept")
+
+
+@pytest.fixture(autouse=True)
+def cache(_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """All pages share their kept answers: the same criticism is worked out once, as it is for a person."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(_kept))
+    return _kept
+
+
 @pytest.fixture
 def service(tmp_path: Path) -> Iterator[Service]:
     serving = Service(tmp_path)
