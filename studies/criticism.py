@@ -121,8 +121,15 @@ class _Stopwatch:
 
 def _said(found: Criticism) -> dict[str, Any]:
     top = [(c.id, c.smooth, round(c.log_bf, 2)) for c in found.weighed.candidates[:4]] if found.weighed else []
-    return {"verdict": found.verdict.form, "named": list(found.verdict.named), "nodes": nodes(found),
-            "alike": alike(found), "depends_on": list(found.verdict.depends_on)[:3], "top": top}  # fmt: skip
+    return {
+        "verdict": found.verdict.form,
+        "named": list(found.verdict.named),
+        "groups": [list(group) for group in found.verdict.groups],
+        "nodes": nodes(found),
+        "alike": alike(found),
+        "depends_on": list(found.verdict.depends_on)[:3],
+        "top": top,
+    }
 
 
 def alike(found: Criticism) -> float:

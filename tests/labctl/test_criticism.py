@@ -109,6 +109,12 @@ def test_two_at_once_are_both_named() -> None:
     assert set(found.verdict.named) == {"scale_factor_asymmetry", "rate_hysteresis"}
 
 
+def test_a_small_one_is_named_where_a_large_one_does_nothing() -> None:
+    """Waves within data sets, however large, leave no drift between them: that is a second cause, no wrong shape."""
+    found = held(single_axis(6, magnetic_sensitivity=0.003, supply_sensitivity=0.06))
+    assert {"magnetic_sensitivity", "supply_sensitivity"} <= set(found.verdict.named)
+
+
 def without(recording: Recording, *names: str) -> Recording:
     return replace(recording, columns={k: v for k, v in recording.columns.items() if k not in names})
 

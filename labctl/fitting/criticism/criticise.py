@@ -11,30 +11,23 @@ from scipy.special import chdtrc
 
 from labctl.errors import LabctlError
 from labctl.fitting.context import Context, context_of
+from labctl.fitting.criticism.asking import ask
 from labctl.fitting.criticism.candidates import untestable_channels
 from labctl.fitting.criticism.compress import Compressed, compress
 from labctl.fitting.criticism.evidence import visible_share
-from labctl.fitting.criticism.refine import refined, sharpened
+from labctl.fitting.criticism.refine import refined
 from labctl.fitting.criticism.residuals import Residuals, maps, residuals_of, where_it_fails, worst_data_sets
 from labctl.fitting.criticism.verdict import (
     ENOUGH,
-    FAR,
-    LEAD,
-    NEXT_SHARE,
-    NEXT_SHARE_UNTOLD,
-    Form,
-    Step,
     Verdict,
     alias_group,
-    channels_behind,
     coefficients_of,
-    judge,
     probabilities,
     share_removed,
 )
 from labctl.fitting.criticism.views import views_of
 from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh, with_noise_of
-from labctl.fitting.effects import CATALOGUE, Effect, Term
+from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.fit import FitResult, fit_context
 from labctl.fitting.model import ErrorModel
 from labctl.fitting.presets import changed
@@ -44,14 +37,8 @@ from labctl.recording import Recording
 
 #: Data sets beyond the base's coefficients that a verdict needs.
 LEAST_SPARE = 6
-#: How many effects may be found missing one after the other.
-STEPS = 4
 #: Less of an effect than this beside the base, and the schedule cannot see it.
 LEAST_VISIBLE = 0.15
-#: From this evidence on, an effect is worth refining its shape.
-NOTICED = 1.0
-#: How many of the strongest are tried as the first of a pair.
-LEADERS = 4
 #: How many suspects are fitted in full.
 SHOWN = 6
 #: The drift is larger than the data sheet says from this factor on.
@@ -121,7 +108,7 @@ def criticise(
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, base, None, None)
     weighed = weigh(data, forward, catalogue)
-    verdict, explained, last = _ask(data, forward, weighed, catalogue)
+    verdict, begun, last = ask(data, forward, weighed, catalogue)
     if not full:
         return Criticism(verdict, data, None, None, weighed)
     assert base is not None
@@ -130,7 +117,8 @@ def criticise(
     direct = fit_context(context, _direct(model)).error.rms_dps if model.argument == "output" else None
     return Criticism(
         verdict, data, base, direct, weighed, left,
-        tuple(_suspects(weighed, seen, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)), explained,
+        tuple(_suspects(weighed, seen, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)),
+        _explained(begun),
         views_of(seen, left, recording, catalogue),
     )  # fmt: skip
 
@@ -159,92 +147,6 @@ def _too_little(data: Compressed, model: ErrorModel) -> str | None:
             f"measure at least {needed - len(data)} more data sets, at other rates and temperatures"
         )
     return None
-
-
-def _ask(
-    data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]
-) -> tuple[Verdict, float, Weighed]:
-    """Ask, add what is named, and ask again, until nothing more is; returns also what was weighed last."""
-    depends = channels_behind(first)
-    weighed, step = _judged(first, catalogue)
-    explained = _explained(weighed)
-    if step.form == "unexplained":
-        pair = _pair(data, model, weighed, catalogue)
-        found = replace(pair, depends_on=depends) if pair else Verdict(step.form, depends_on=step.depends_on or depends)
-        return found, explained, weighed
-    form: Form = step.form
-    groups: list[tuple[str, ...]] = []
-    terms: dict[str, Term] = {}
-    while step.form in {"missing", "ambiguous"} and len(groups) < STEPS:
-        leader = step.leader
-        if leader is None or leader.term is None:
-            break
-        groups.append(step.group)
-        terms[leader.id] = refined(weighed, leader)
-        model = model.with_terms((*model.terms, replace(terms[leader.id], steady=True)))
-        least = leader.gain * (NEXT_SHARE if len(step.group) == 1 else NEXT_SHARE_UNTOLD)
-        weighed, step = _judged(weigh(data, model, catalogue), catalogue, first=False)
-        if step.leader is not None and (step.leader.gain < least or _known(groups) & set(step.group)):
-            break  # what is left of a named effect is its shape, not another cause
-    if len(groups) > 1:
-        form = "missing" if all(len(group) == 1 for group in groups) else "ambiguous"
-    return Verdict(form, tuple(groups), depends if groups else (), terms=terms), explained, weighed
-
-
-def _known(groups: list[tuple[str, ...]]) -> set[str]:
-    return {name for group in groups for name in group}
-
-
-def _judged(weighed: Weighed, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Weighed, Step]:
-    """Judge, and where the answer is no single name, or hardly, judge again with the leaders' shapes refined."""
-    step = judge(weighed, first=first)
-    if step.form == "adequate" or (step.form == "missing" and not _has_rival(weighed)):
-        return weighed, step
-    weighed = sharpened(weighed, catalogue, NOTICED)
-    return weighed, judge(weighed, first=first)
-
-
-def _has_rival(weighed: Weighed) -> bool:
-    """Whether another effect is so near the leader that its shape may decide."""
-    effects = [c for c in weighed.candidates if not c.smooth][:2]
-    return len(effects) == 2 and effects[1].log_bf > max(NOTICED, effects[0].log_bf - FAR)
-
-
-def _pair(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> Verdict | None:
-    """Return two effects that explain together what looked like something else, and leave nothing; or None.
-
-    The first of a pair need not be the strongest alone: two laws of the rate mix into one that a third resembles.
-    """
-    smooth = first.leader(smooth=True)
-    leaders = [c for c in first.candidates if not c.smooth and c.term is not None and c.log_bf >= ENOUGH][:LEADERS]
-    pairs = [_beside(data, model, first, leader, catalogue) for leader in leaders]
-    best = max((pair for pair in pairs if pair is not None), key=lambda pair: pair.log_bf, default=None)
-    if best is None or smooth is None or best.log_bf < smooth.log_bf + LEAD:
-        return None
-    both = model.with_terms((*model.terms, *(replace(term, steady=True) for term in best.terms.values())))
-    if _judged(weigh(data, both, catalogue), catalogue, first=False)[1].form != "adequate":
-        return None
-    return Verdict("missing", tuple((name,) for name in best.terms), terms=best.terms)
-
-
-@dataclass(frozen=True)
-class _Pair:
-    terms: dict[str, Term]
-    log_bf: float
-
-
-def _beside(
-    data: Compressed, model: ErrorModel, first: Weighed, leader: Candidate, catalogue: Mapping[str, Effect]
-) -> _Pair | None:
-    """Return an effect with the one that is then named beside it; None where none is."""
-    terms = {leader.id: refined(first, leader)}
-    beside = model.with_terms((*model.terms, replace(terms[leader.id], steady=True)))
-    weighed, step = _judged(weigh(data, beside, catalogue), catalogue, first=False)
-    second = step.leader
-    if step.form != "missing" or second is None or second.term is None or second.id == leader.id:
-        return None
-    terms[second.id] = refined(weighed, second)
-    return _Pair(terms, leader.log_bf + second.log_bf)
 
 
 def _explained(first: Weighed) -> float:

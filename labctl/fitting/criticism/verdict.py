@@ -21,6 +21,8 @@ Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_
 
 #: Less evidence than this for the best candidate: nothing is missing.
 ENOUGH = 4.5
+#: The same beside a cause that was found already: two at once are rarer than one.
+ENOUGH_NEXT = 7.0
 #: A lead of less than this over another candidate leaves both.
 LEAD = 3.0
 #: A rival that leaves less of the leader's signal than this (chi2), or a smaller share than that, is not told apart.
@@ -33,10 +35,6 @@ EXPLAINED = 0.90
 #: The same for time, which is never a cause.
 EXPLAINED_TIME = 0.75
 SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
-#: The next effect is only named when it takes off at least this share of what the first did: less is shape error.
-NEXT_SHARE = 0.04
-#: The same after effects that could not be told apart: one of the others may fit better than the one that was added.
-NEXT_SHARE_UNTOLD = 0.08
 #: An effect that takes off less than this share of the excess chi2 is not named alone at the first step.
 LEAST_SHARE = 0.3
 #: Columns that are the same up to rounding have the same evidence within this.
@@ -78,15 +76,16 @@ class Verdict:
 
 
 def judge(weighed: Weighed, *, first: bool = True) -> Step:
-    """Judge one round of evidence."""
+    """Judge one round of evidence: the first, or one beside causes that were found already."""
+    enough = ENOUGH if first else ENOUGH_NEXT
     effect, smooth = weighed.leader(smooth=False), weighed.leader(smooth=True)
     strongest = max((c.log_bf for c in (effect, smooth) if c is not None), default=-np.inf)
-    if strongest < ENOUGH:
+    if strongest < enough:
         return Step("adequate", (), effect)
     depends = channels_behind(weighed)
     if smooth is not None and (effect is None or _is_unexplained(weighed, effect, smooth)):
         return Step("unexplained", (), smooth, depends or (smooth.id,))
-    if effect is None or effect.log_bf < ENOUGH:
+    if effect is None or effect.log_bf < enough:
         return Step("unexplained", (), smooth, depends)
     share = share_removed(weighed, effect)
     group = alias_group(weighed, effect)
