@@ -59,6 +59,13 @@ class BadCalibrationFile(BadInput):
     slug = "bad-calibration-file"
 
 
+class Stopped(LabctlError):
+    """A person stopped what ran here, by Ctrl-C or a signal; the text says how the bench was left."""
+
+    exit_status = 130
+    slug = "stopped"
+
+
 class NotFound(LabctlError):
     """No such unit, recording, calibration or campaign."""
 

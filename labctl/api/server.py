@@ -63,8 +63,8 @@ def open_house(request: ServeRequest, url: str | None) -> House:
         raise
 
 
-def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> None:
-    """Serve until interrupted.
+def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> str:
+    """Serve until interrupted; returns how the bench was left, nothing where there is none.
 
     Raises BadInput for an address that others can reach while there is no key to ask them for, Conflict, BadBench.
     """
@@ -101,6 +101,7 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> None:
                 server.run(sockets=[listener])
         finally:
             house.close()  # a second Ctrl-C makes the server skip it
+        return house.left
 
 
 def access_for(request: ServeRequest, house: House, at: str) -> Access:

@@ -163,7 +163,8 @@ def check(as_json: Json = False, database: Database = None) -> None:
         for finding in answer.findings:
             console.print(f"{finding.part}: {finding.text}", markup=False, soft_wrap=True)
         looked = f"{answer.blocks} blocks, {answer.calibrations} calibrations, {answer.audit_rows} audit rows"
-        verdict = "all as it was written" if answer.ok else f"{len(answer.findings)} findings"
+        number = len(answer.findings)
+        verdict = "all as it was written" if answer.ok else f"{number} finding{'s' if number > 1 else ''}"
         console.print(f"{answer.database}: {looked}: {verdict}", markup=False, soft_wrap=True)
     if not answer.ok:
         raise typer.Exit(1)

@@ -9,13 +9,20 @@ import typer
 
 from labctl.cli.errors import ending_is_an_interrupt, one_clear_line
 from labctl.cli.options import BenchName, Database, Json
-from labctl.cli.output import console, print_json
+from labctl.cli.output import complaints, console, print_json
 
 
 def serve(
     bench: BenchName = None,
     simulate: Annotated[bool, typer.Option("--simulate", help="A simulated bench; default triaxial-sim.")] = False,
-    speed: Annotated[float, typer.Option("--speed", metavar="X", help="Simulated bench, X times as fast.")] = 1.0,
+    speed: Annotated[
+        float,
+        typer.Option(
+            "--speed",
+            metavar="X",
+            help="Simulated bench, X times as fast; 0: as it can. Too fast for this machine, it loses readings.",
+        ),
+    ] = 1.0,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", metavar="N", help="Port; 0 takes a free one.")] = 8420,
     require_keys: Annotated[
@@ -42,7 +49,8 @@ def serve(
             bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
             require_keys=require_keys, max_upload_mib=max_upload_mib,
         )  # fmt: skip
-        serve_forever(request, ready)
+        left = serve_forever(request, ready)
+    complaints.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
 
 
 def simulator(

@@ -152,14 +152,20 @@ class BenchRunner:
         self._left = True
         if not self._may_drive:
             return
-        for row in self._store.campaigns.unfinished():
+        taken_up = None
+        for row in self._store.campaigns.unfinished():  # newest first
             if row.bench_name != self._bench.name:
+                continue
+            if taken_up is not None:
+                text = f"not taken up: campaign {taken_up} goes on here; then `labctl campaign resume {row.id}`"
+                self._store.campaigns.close_unfinished(row.id, text, self._make_clock().utc())
                 continue
             why_not = too_often(self._store.interruptions.standing(row.id))
             try:
                 if why_not is None:
                     self.resume(row.id, ResumeRequest(by="the service"))
-                    break
+                    taken_up = row.id
+                    continue
             except BenchBusy:  # somebody was quicker, or the lease went just now
                 return
             except (LabctlError, InstrumentError) as error:

@@ -11,7 +11,7 @@ from typing import Any
 from instruments.bench import BenchFile
 from instruments.clock import Clock
 from labctl.actor import ITSELF, acting
-from labctl.errors import Conflict
+from labctl.errors import Conflict, StoreError
 from labctl.services import scheduling
 from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer, EventAnswer, ScheduledAnswer
@@ -91,6 +91,7 @@ class House:
         self.scheduler = None if runner is None else Scheduler(store, clock, runner, runner.bench.name)
         self._opened_at = clock.utc()
         self._stops = self._closed = False
+        self.left = ""  #: once it is closed: how the bench was left
 
     @property
     def bench(self) -> BenchFile | None:
@@ -127,7 +128,15 @@ class House:
             self.scheduler.close()
         if self._runner is not None:
             self._runner.close()
+            self.left = self._how_left(self._runner.bench.name)
         self.store.close()
+
+    def _how_left(self, bench: str) -> str:
+        try:
+            unconfirmed = self.store.benches.unconfirmed(bench)
+        except StoreError as error:
+            return f"whether bench {bench} is safe cannot be read ({error}); look at it"
+        return f"bench {bench} is NOT confirmed safe: {unconfirmed}" if unconfirmed else f"bench {bench} is safe"
 
     def acts(self) -> ServiceActs:
         """Return who acts on the database."""

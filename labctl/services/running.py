@@ -15,7 +15,7 @@ from instruments.gyro import Gyro
 from instruments.hand import NoHand
 from instruments.open import Bench, open_bench
 from labctl.config import default_database
-from labctl.errors import BadInput, Conflict
+from labctl.errors import BadInput, Conflict, Stopped
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.acts import Request
 from labctl.services.answers import CampaignAnswer
@@ -162,7 +162,10 @@ def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
 def run(
     store: Store, prepared: Prepared, control: Control | None = None, observe: Callable[[Progress], None] | None = None
 ) -> CampaignAnswer:
-    """Run a prepared campaign to its end; the bench is closed, in its safe state, when this returns."""
+    """Run a prepared campaign to its end; the bench is closed, in its safe state, when this returns.
+
+    Raises Stopped after a Ctrl-C.
+    """
     journal = store.campaigns.journal(prepared.id)
     engine = Engine(
         prepared.plan,
@@ -176,12 +179,25 @@ def run(
     )
     try:
         engine.run(prepared.start_at, prepared.restart)
+    except KeyboardInterrupt as interrupt:
+        raise Stopped(_how_left(store, prepared, engine)) from interrupt
     finally:
         with uninterrupted(), closing(prepared.bench):
             if engine.complaints:
                 bench = store.campaigns.get(prepared.id).bench_name
                 store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
+
+
+def _how_left(store: Store, prepared: Prepared, engine: Engine) -> str:
+    bench = store.campaigns.get(prepared.id).bench_name
+    how = (
+        f"bench {bench} is NOT confirmed safe: {'; '.join(engine.complaints)}; look at it, then "
+        f"`labctl bench clear {bench} --by NAME`"
+        if engine.complaints
+        else f"bench {bench} is safe"
+    )
+    return f"campaign {prepared.id} was stopped; {how}; `labctl campaign resume {prepared.id}` goes on with it"
 
 
 def answers_noted(store: Store, prepared: Prepared) -> Callable[[str], None]:

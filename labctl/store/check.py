@@ -6,14 +6,17 @@ import struct
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import sqlalchemy as sa
+from numpy.typing import NDArray
 
 from labctl.calibration import read_calibration
 from labctl.errors import BadCalibrationFile, StoreError
 from labctl.store import blocks, migrations, tables
 from labctl.store.audit import Head, first_broken
+from labctl.store.check_means import KeptMeans
 from labctl.store.database import Database, is_url
 from labctl.store.recordings import WHOLE_TABLE
 from labctl.store.seal import missing
@@ -148,23 +151,28 @@ class _Look:
         ordered = query.order_by(b.recording_id, b.number, b.seq).execution_options(yield_per=AT_ONCE)
         valid: dict[tuple[int, int], int | None] = {}
         expected: dict[tuple[int, int], int] = {}
+        means: KeptMeans | None = None
         for recording, number, seq, n, codec, crc32, data in connection.execute(ordered):
             place = (recording, number)
             if seq != expected.get(place, 0):
                 self.find("readings", f"recording {recording} data set {number}: blocks before block {seq} are missing")
                 valid[place] = None
             expected[place] = seq + 1
-            found = self._unpacked(
-                f"recording {recording} data set {number} block {seq}", blocks.Block(n, codec, crc32, data)
-            )
-            before = valid.get(place, 0)
+            where = f"recording {recording} data set {number}"
+            columns = self._unpacked(f"{where} block {seq}", blocks.Block(n, codec, crc32, data))
+            before, found = valid.get(place, 0), None if columns is None else _count(columns, n)
             valid[place] = None if found is None or before is None else before + found
+            if columns is not None and seq == 0:  # of a data set that is not closed, in several blocks, nothing is kept
+                if means is None or means.recording != recording:
+                    means = KeptMeans(connection, recording)
+                for text in means.complaints(number, columns):
+                    self.find("readings", f"{where}: {text}")
             self.blocks += 1
             if self.blocks % AT_ONCE == 0:
                 self._progress("readings", self.blocks, total)
         return valid
 
-    def _unpacked(self, place: str, block: blocks.Block) -> int | None:
+    def _unpacked(self, place: str, block: blocks.Block) -> dict[str, NDArray[Any]] | None:
         try:
             columns = blocks.unpack(block)
         except StoreError as error:
@@ -182,7 +190,7 @@ class _Look:
         if any(len(values) != block.n for values in columns.values()):
             self.find("readings", f"{place}: its columns are not the {block.n} readings that it counts")
             return None
-        return int(np.count_nonzero(columns["valid"])) if "valid" in columns else block.n
+        return columns
 
     def _at_calibrations(self, connection: sa.Connection) -> bool:
         c = tables.calibrations.c
@@ -203,3 +211,7 @@ class _Look:
         if broken := first_broken(connection, self._anchor):
             self.find("audit", f"row {broken.row}: {broken.what}")
         return True
+
+
+def _count(columns: dict[str, NDArray[Any]], n: int) -> int:
+    return int(np.count_nonzero(columns["valid"])) if "valid" in columns else n

@@ -96,7 +96,7 @@ def test_a_flipped_bit_in_a_block_is_found(location: str) -> None:
     assert "checksum does not fit" in finding.text
     said = labctl(location, "check", status=1)
     assert "readings: recording 1 data set 1 block 0" in said.stdout
-    assert said.stdout.strip().endswith("1 findings")
+    assert said.stdout.strip().endswith("1 finding")
 
 
 def test_a_block_that_was_cut_short_under_a_new_checksum_is_found(location: str) -> None:
@@ -126,6 +126,16 @@ def test_a_block_that_was_cut_short_under_a_new_checksum_is_found(location: str)
         ("DROP TABLE sample_blocks", "readings", "cannot be read"),
         ("UPDATE data_sets SET n = 'many' WHERE number = 2", "readings", "data set 2 counts many"),
         ("UPDATE sample_blocks SET data = 'text' WHERE id = 1", "readings", "data set 1 block 0"),
+        (
+            "UPDATE data_set_means SET mean = mean + 1e-5 WHERE channel = 'gyro_z' AND number = 2",
+            "readings",
+            "data set 2: gyro_z is kept as",
+        ),
+        (
+            "UPDATE data_set_means SET n = 1 WHERE channel = 'gyro_z'",
+            "readings",
+            "the mean of gyro_z counts 1 readings",
+        ),
         ("UPDATE audit SET detail = '{' WHERE id = 2", "audit", "row 2: its content"),
         ("UPDATE audit SET at = 'noon' WHERE id = 2", "audit", "row 2: its content"),
     ],

@@ -14,7 +14,7 @@ import sqlalchemy as sa
 from instruments.bench import BenchFile
 from instruments.clock import VirtualClock
 from instruments.errors import NoReply
-from labctl.errors import BenchBusy, Conflict, DiskFull, StoreError
+from labctl.errors import BenchBusy, Conflict, DiskFull, Stopped, StoreError
 from labctl.services import bench_runner, resuming
 from labctl.services.acts import CampaignRequest
 from labctl.services.bench_runner import BenchRunner
@@ -90,6 +90,16 @@ def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, m
     assert states == ["running"]
     assert store.campaigns.get(1).reason == "taken up 5 times"
     assert store.benches.unconfirmed(BENCH.name) == "table to rest: it still moves"
+
+
+def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say_so(store: Store) -> None:
+    older, newer = left_running(store), left_running(store)
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    runner.take_up_left()
+    rest(runner)
+    assert store.campaigns.get(newer).state == "done"
+    row = store.campaigns.get(older)
+    assert (row.state, f"campaign {newer} goes on here" in row.reason) == ("failed", True)
 
 
 @pytest.mark.usefixtures("real")
@@ -189,7 +199,7 @@ def test_interrupts_inside_a_write_leave_a_database_that_can_be_written(store: S
             interrupt()
 
     sa.event.listen(engine, "do_execute", at_insert)
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(Stopped, match="bench single-axis-sim is safe"):
         run(store, prepared)
     row = store.campaigns.get(prepared.id)
     assert (row.state, row.reason) == ("aborted", "interrupted (Ctrl-C or a signal)")
