@@ -10,7 +10,7 @@ from instruments.table import Spin
 from procedures.errors import BadData, GuardTripped, StepFailed
 from procedures.journal import DataSetHeader, DataSetState
 from procedures.logbook import warning
-from procedures.situation import Tally, gyro_temperature_c
+from procedures.situation import Tally
 from procedures.stage import UNIT_FAULTS, Stage, heed
 from procedures.steps import Acquire
 
@@ -115,7 +115,7 @@ def _wait_for_gate(stage: Stage, from_s: float) -> None:
     if stage.clock.now_s() >= from_s:
         return
     for name, gyro in stage.bench.gyros.items():
-        stage.watch.heard(name, gyro_temperature_c(gyro, gyro.glance()))
+        stage.watch.heard(name, gyro, gyro.glance())
 
 
 def _header(stage: Stage, step: Acquire, spin: Spin, gate: tuple[float, float]) -> DataSetHeader:
@@ -154,7 +154,7 @@ def _read_round(
     for name, gyro in stage.bench.gyros.items():
         readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
         if len(readings):
-            stage.watch.heard(name, gyro_temperature_c(gyro, readings))
+            stage.watch.heard(name, gyro, readings)
         kept = cut(readings, gate, stage.log.start_s)
         if len(kept) or kept.lost or kept.damaged:
             tallies[name].add(kept)

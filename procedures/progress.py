@@ -11,6 +11,7 @@ from typing import Any
 
 from instruments.clock import Clock
 from procedures.journal import CampaignState
+from procedures.live import Live
 from procedures.operator import Prompt
 from procedures.plan import Plan
 from procedures.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerOn, Rest, Soak, Step
@@ -36,6 +37,7 @@ class Progress:
     dropped: Mapping[str, str] = field(default_factory=dict)  #: units that take no further part, and why
     last_event: str = ""
     last_error: str = ""
+    live: Live = field(default_factory=Live, compare=False, repr=False)  #: newer than the rest of the picture
 
 
 Observer = Callable[[Progress], None]
@@ -49,7 +51,8 @@ class Board:
         self._clock = clock
         self._observer = observer
         self._lock = threading.RLock()  # a signal during the safe state is told here too, whatever its thread is doing
-        self._progress = Progress(steps=len(plan.steps))
+        self.live = Live()
+        self._progress = Progress(steps=len(plan.steps), live=self.live)
         self._expected_s = [step.expected_s for step in plan.steps]
         self._left_after_s = self._remaining(self._expected_s)
         self._total_s = max(math.fsum(self._expected_s), 1e-9)

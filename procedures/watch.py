@@ -8,6 +8,7 @@ from typing import Literal
 
 from instruments.chamber import ChamberState
 from instruments.errors import InstrumentError, LinkError
+from instruments.gyro import Gyro, Readings
 from instruments.table import Spin
 from procedures.bench import Bench
 from procedures.guard import Guards, Trip
@@ -59,6 +60,7 @@ class Watch:
         """Take in that the units were switched on (session number) or off (0)."""
         self.run = run
         self._gyro_c = {}
+        self._log.board.live.forget()
         for name in self._bench.gyros:
             self._links.pop(name, None)
             self._heard_s.pop(name, None)
@@ -67,6 +69,7 @@ class Watch:
 
     def forget(self, gyro: str) -> None:
         """Take in that a unit takes no further part."""
+        self._log.board.live.forget(gyro)
         self._gyro_c.pop(gyro, None)
         self._heard_s.pop(gyro, None)
         self._tripped = {each for each in self._tripped if each[1] != gyro}
@@ -109,11 +112,12 @@ class Watch:
             self._tripped = {each for each in self._tripped if each[0] not in WHILE_READING}  # disarmed, not released
             self._log.board.update(rate_dps=0.0)
 
-    def heard(self, gyro: str, temperature_c: float | None) -> None:
+    def heard(self, name: str, gyro: Gyro, readings: Readings) -> None:
         """Take in that a unit sent readings."""
-        self._heard_s[gyro] = self._log.t_s()
-        if temperature_c is not None:
-            self._gyro_c[gyro] = temperature_c
+        self._heard_s[name] = self._log.t_s()
+        self._log.board.live.heard(name, gyro, readings, self._log.start_s)
+        if (temperature_c := gyro_temperature_c(gyro, readings)) is not None:
+            self._gyro_c[name] = temperature_c
 
     def due(self, within_s: float = 0.0) -> bool:
         """Return whether the chamber is to be looked at again within `within_s`."""
@@ -185,7 +189,7 @@ class Watch:
             except LinkError as error:
                 self._note_silence(name, error)
                 continue
-            self.heard(name, gyro_temperature_c(gyro, readings))
+            self.heard(name, gyro, readings)
             self.link(name, "well")
 
     def _note_silence(self, device: str, error: InstrumentError) -> None:

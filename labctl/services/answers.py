@@ -188,6 +188,18 @@ class PromptAnswer(Answer):
     position: str | None = None
 
 
+class OutputAnswer(Answer):
+    """What one channel of a unit put out in the last moment, in the channel's unit."""
+
+    gyro: str = Field(description="The unit's name on the bench.")
+    channel: str
+    unit: str
+    mean: float
+    std: float = Field(description="Of single readings.")
+    n: int
+    t_s: float = Field(description="Time of the last reading since the campaign began.")
+
+
 class CampaignAnswer(Answer):
     """Where a campaign is."""
 
@@ -202,8 +214,10 @@ class CampaignAnswer(Answer):
     progress: float = Field(ge=0, le=1)
     expected_end: datetime | None = None
     chamber_c: float | None = None
+    setpoint_c: float | None = None
     gyro_c: float | None = None
     rate_dps: float | None = None
+    outputs: list[OutputAnswer] = Field(default_factory=list, description="Of a campaign that runs here, now.")
     last_error: str | None = None
     wish: Literal["pause", "abort"] | None = Field(default=None, description="Asked for, and not yet taken up.")
     prompt: PromptAnswer | None = Field(default=None, description="The question that waits for a person.")

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from datetime import timedelta
 from typing import Literal
 
-from labctl.services.answers import CampaignAnswer, EventAnswer, PromptAnswer
+from labctl.services.answers import CampaignAnswer, EventAnswer, OutputAnswer, PromptAnswer
 from labctl.store import CampaignRow, EventRow, Store
 from procedures.control import Wish
 from procedures.progress import Progress
@@ -29,8 +29,10 @@ def answer_of(row: CampaignRow, progress: Progress, wish: Wish | None = None) ->
         progress=progress.fraction,
         expected_end=progress.expected_end,
         chamber_c=progress.chamber_c,
+        setpoint_c=progress.setpoint_c,
         gyro_c=next(iter(progress.gyro_c.values()), None),
         rate_dps=progress.rate_dps,
+        outputs=[] if state in ENDED else [OutputAnswer(**asdict(output)) for output in progress.live.outputs()],
         last_error=progress.last_error or None,
         wish=None if wish is None or state in ENDED else _open_wish(wish, state),
         prompt=None if prompt is None else PromptAnswer(**asdict(prompt)),
@@ -71,6 +73,7 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
         progress=1.0 if row.state == "done" else min(done_s / max(row.expected_s, 1e-9), 1.0),
         expected_end=None if over or not events else events[-1].at + timedelta(seconds=left_s),
         chamber_c=there.get("chamber_c"),
+        setpoint_c=there.get("chamber_setpoint_c"),
         gyro_c=there.get("temperature_c"),
         rate_dps=None if current is None else current.body.get("rate_dps", 0.0),
         last_error=faults[-1].message if faults else None,

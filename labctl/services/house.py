@@ -24,6 +24,8 @@ from procedures.shield import told_first
 
 #: An open event stream says that it is alive after this long without an event.
 HEARTBEAT_S = 10.0
+#: What changes all the time, as a unit's output does, is looked at this often.
+LIVE_S = 1.0
 NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`"
 
 
@@ -37,8 +39,11 @@ class ServiceActs(LocalActs):
     def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
         """End a campaign now, in the safe state."""
         if self._runner is not None and self._runner.runs(campaign):
-            self._note_campaign("abort", campaign, reason)
-            return self._runner.abort(campaign, reason)
+            try:
+                self._note_campaign("abort", campaign, reason)
+            finally:  # a disk that is full is no reason to go on
+                answer = self._runner.abort(campaign, reason)
+            return answer
         return super().abort_campaign(campaign, reason)
 
     def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
@@ -196,13 +201,21 @@ class House:
                     yield now
                 if state in ENDED or (self._stops and not self._runs(campaign)):
                     return
-                try:
-                    await asyncio.wait_for(bell.wait(), HEARTBEAT_S)
-                except TimeoutError:
-                    yield None
+                async for live in self._meanwhile(campaign, bell):
+                    if live is None or live != shown:
+                        shown = live or shown
+                        yield live
         finally:
             if stop is not None:
                 stop()
+
+    async def _meanwhile(self, campaign: int, bell: asyncio.Event) -> AsyncIterator[CampaignAnswer | None]:
+        """Yield where a campaign stands until the bell rings, or until it is time to show that the stream lives."""
+        for _ in range(round(HEARTBEAT_S / LIVE_S)):
+            if await _rings(bell):
+                return
+            yield await asyncio.to_thread(self.status, campaign)
+        yield None
 
     def pulse(self) -> dict[str, Any]:
         """Return what anybody may know: that the service lives, and which."""
@@ -229,3 +242,12 @@ class House:
             "labctl_campaigns_failed": float(states.count("failed")),
             "labctl_campaign_running": float(self._runner is not None and self._runner.busy),
         }
+
+
+async def _rings(bell: asyncio.Event) -> bool:
+    """Wait a moment for the bell; returns whether it rang."""
+    try:
+        await asyncio.wait_for(bell.wait(), LIVE_S)
+    except TimeoutError:
+        return False
+    return True

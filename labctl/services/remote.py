@@ -89,8 +89,8 @@ class RemoteActs:
         return FitAnswer.model_validate(self._post(path, json=request.model_dump(exclude={"version"})))
 
     def _newest(self, serial: str) -> int:
-        rows = self._client.get(f"/api/units/{quote(serial, safe='')}/calibrations").json()
-        return int(rows[0]["version"]) if isinstance(rows, list) and rows else 1
+        rows = self._ask("GET", f"/api/units/{quote(serial, safe='')}/calibrations")
+        return int(rows[0]["version"]) if rows else 1
 
     def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:
         """Ask for a certification."""
@@ -143,13 +143,7 @@ class RemoteActs:
 
     def campaign(self, campaign: int) -> CampaignAnswer:
         """Return a campaign as the service sees it now."""
-        try:
-            response = self._client.get(f"/api/campaigns/{campaign}")
-        except httpx.HTTPError as error:
-            raise StoreError(f"the service at {self._client.base_url} does not answer ({error})") from error
-        if response.is_error:
-            raise ServiceRefused(response.json().get("detail", response.text))
-        return CampaignAnswer.model_validate(response.json())
+        return CampaignAnswer.model_validate(self._ask("GET", f"/api/campaigns/{campaign}"))
 
     def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
         """Ask for the end of a campaign."""

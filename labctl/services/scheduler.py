@@ -17,7 +17,7 @@ from labctl.errors import BenchBusy, LabctlError
 from labctl.services import moments
 from labctl.services.acts import CampaignRequest
 from labctl.services.answers import CampaignAnswer
-from labctl.store import StartRow, Store
+from labctl.store import StartEventRow, StartRow, Store
 from procedures.errors import ProcedureError
 
 POLL_S = 1.0
@@ -51,6 +51,7 @@ class Scheduler:
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
         self.trouble = ""  #: why the schedule could not be looked at
+        self._owes = False  #: what became of a start could not be written down
 
     def start(self) -> None:
         """Settle what an earlier process left, then look at the schedule from now on, in a thread."""
@@ -96,6 +97,9 @@ class Scheduler:
         Raises StoreError.
         """
         with self._guard:
+            if self._owes:
+                self.settle()
+                self._owes = False
             self._runner.take_up_cut_short()
             now = self._clock.utc()
             for row in self._store.starts.due(self._bench, now):
@@ -123,6 +127,12 @@ class Scheduler:
         claim = starts.take(row, due, self._next(row, now), now, "claimed", "is being started")
         if claim is None:
             return
+        self._owes = True
+        self._start(claim, row, due, now)
+        self._owes = False
+
+    def _start(self, claim: StartEventRow, row: StartRow, due: datetime, now: datetime) -> None:
+        starts = self._store.starts
         try:
             campaign = self._runner.start(CampaignRequest(recipe=row.recipe, clip=row.clip)).id
         except BenchBusy:  # somebody was quicker: it waits its turn

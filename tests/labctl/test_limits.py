@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
@@ -58,6 +59,11 @@ def test_a_body_is_bounded_declared_or_not(client: TestClient, path: str) -> Non
     assert is_too_large(client.post(path, content=b" " * (BODY + 1), headers=as_json))
     assert is_too_large(client.post(path, content=in_pieces(BODY + 500), headers=as_json))
     assert client.post(path, content=in_pieces(BODY - 500), headers=as_json).status_code == 422
+
+
+def test_nobody_comes_in_by_a_websocket(client: TestClient) -> None:
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect("/api/campaigns"):
+        pass
 
 
 def test_a_recording_is_bounded_in_size_and_in_files(client: TestClient) -> None:

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.errors import BadInput, BenchBusy, Conflict
+from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull
 from labctl.services.acts import CampaignRequest
 from labctl.services.answers import CampaignAnswer
 from labctl.services.bench_runner import BenchRunner
@@ -180,6 +180,21 @@ def test_a_mistake_in_the_program_costs_one_start_only(lab: Lab) -> None:
     lab.enter(at="now")
     lab.scheduler.tick()
     assert len(lab.begun) == 1
+
+
+def test_what_could_not_be_written_down_is_settled_once_it_can(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    start = lab.enter(at="now")
+
+    def full(*_: object) -> None:
+        raise DiskFull("the disk is full")
+
+    with monkeypatch.context() as there:
+        there.setattr(lab.store.starts, "conclude", full)
+        with pytest.raises(DiskFull):
+            lab.scheduler.tick()
+    assert lab.outcomes(start) == ["claimed"]
+    lab.scheduler.tick()
+    assert lab.outcomes(start) == ["refused"]
 
 
 def test_somebody_was_quicker(lab: Lab) -> None:

@@ -48,6 +48,8 @@ def test_mounted_paused_and_stopped_by_hand(service: Service, visit: Callable[..
     expect(page.get_by_role("img", name="The unit with its z axis pointing up")).to_be_visible()
     answered(page, "Done")
     expect(page.get_by_role("alert", name="A question for you")).to_contain_text("Switch the units on")
+    answered(page, "Done")
+    expect(page.get_by_role("region", name="Gyro output now")).to_contain_text("deg/s")
 
     page.get_by_role("button", name="Safe stop").click()
     stop = page.get_by_role("dialog")

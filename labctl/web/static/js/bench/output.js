@@ -1,4 +1,4 @@
-// What the gyro has just said: the readings of the newest finished data set of the campaign.
+// The readings of the newest finished data set of the campaign.
 
 import { get } from "../core/api.js";
 import { fill, h } from "../core/dom.js";
@@ -49,7 +49,7 @@ export function output(timeline, signal) {
       busy = false;
     }
   }
-  return Object.assign(headed("Gyro output", about, place), { tell });
+  return Object.assign(headed("Last data set", about, place), { tell });
 }
 
 /** The unit of an output: the trace names it, also of a few seconds. */

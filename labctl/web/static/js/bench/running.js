@@ -11,6 +11,7 @@ import { link, pauseButton, resumeButton, stopButton } from "./acts.js";
 import { eventList } from "./events.js";
 import { ENDED, follow } from "./feed.js";
 import { gauges } from "./gauges.js";
+import { live } from "./live.js";
 import { historyOf, left, passed, take } from "./history.js";
 import { promptCard } from "./mounting.js";
 import { output } from "./output.js";
@@ -26,17 +27,18 @@ export function running(status, plan, bench, { signal, over }) {
   const strip = stripOf(status, plan, bench);
   const [silent, question, trouble] = [h("div", { "aria-live": "assertive" }), h("div", {}), h("div", { class: "stack", "aria-live": "polite" })];
   const dials = gauges(timeline);
-  const [lines, sound, events] = [rolling(history), output(timeline, signal), eventList(EVENTS)];
+  const [lines, heard, sound, events] = [rolling(history), live(status.id), output(timeline, signal), eventList(EVENTS)];
   let [now, asked, planned] = [status, null, 0];
   const picture = planPicture(`Campaign ${status.id} plan`, () => ({ timeline: plan.timeline, now_s: passed(now, plan.expected_s), live: true }), { tall: "22rem", pick: (dataset) => Object.values(now.recordings)[0] && go(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
-  const setpoint = (step) => timeline.temperature_c[Math.max((step ?? 1) - 1, 0)];
+  const setpoint = () => now.setpoint_c ?? timeline.temperature_c[Math.max((now.step ?? 1) - 1, 0)];
 
   function show(next) {
     now = next;
     strip.show(now);
-    dials.set(now, setpoint(now.step));
-    take(history, now, passed(now, plan.expected_s), setpoint(now.step));
+    dials.set(now, setpoint());
+    take(history, now, passed(now, plan.expected_s), setpoint());
     lines.tell();
+    heard.tell(now);
     sound.tell(now);
     if (now.prompt?.id !== asked) {
       asked = now.prompt?.id;
@@ -66,8 +68,9 @@ export function running(status, plan, bench, { signal, over }) {
     },
   }, signal);
   return [strip, silent, question, trouble, dials,
-    h("div", { class: "columns", style: "--least: 26rem" }, card("Rate and temperatures", lines), sound),
+    h("div", { class: "columns", style: "--least: 26rem" }, card("Rate and temperatures", lines), heard),
     headed("Plan", link(`Campaign ${status.id}`, `/campaigns/${status.id}`, "tiny"), picture),
+    sound,
     headed("Last events", link("All of them", `/campaigns/${status.id}?level=info#events`, "tiny"), events)];
 }
 

@@ -1,0 +1,57 @@
+// What the units put out just now: a figure for each axis, and its course since this tab began to listen.
+
+import { fill, h } from "../core/dom.js";
+import { axisColour, figure } from "../core/figure.js";
+import { number } from "../core/format.js";
+import { facts, headed } from "../core/parts.js";
+
+const KEPT = 3000;
+const DASHES = ["solid", "dash", "dot", "dashdot"];
+const held = new Map();
+
+/** The courses of a campaign, one for each unit and axis; they outlive the page. */
+function coursesOf(campaign) {
+  if (!held.has(campaign)) held.set(campaign, new Map());
+  return held.get(campaign);
+}
+
+const axisOf = (output) => output.channel.slice("gyro_".length);
+const named = (output, several) => (several ? `${output.gyro}, axis ${axisOf(output)}` : `axis ${axisOf(output)}`);
+
+/** A card that follows the event stream: `tell(status)`. Quiet while the units are off. */
+export function live(campaign) {
+  const courses = coursesOf(campaign);
+  const figures = h("div", { "aria-live": "off" }, h("p", { class: "soft" }, "The units are off, or have not been heard yet."));
+  const place = h("div", {});
+  const units = () => [...new Set([...courses.values()].map((course) => course.gyro))];
+  const picture = figure("Gyro output now", "Means of what each unit sent last, since this tab began to listen.", () => {
+    const drawn = [...courses.values()];
+    const several = units().length > 1;
+    return {
+      data: drawn.map((course) => ({ type: "scatter", mode: "lines", name: named(course, several), x: course.t_s, y: course.mean, line: { width: 1.4, color: axisColour(axisOf(course)), dash: DASHES[units().indexOf(course.gyro) % DASHES.length] }, hovertemplate: `%{y:.6~g} ${course.unit}<extra>${named(course, several)}</extra>` })),
+      layout: { margin: { l: 62, r: 12, t: 30, b: 42 }, hovermode: "x unified", showlegend: drawn.length > 1, xaxis: { title: { text: "time of the campaign, s" } }, yaxis: { title: { text: drawn[0]?.unit ?? "" } } },
+    };
+  }, { tall: "15rem", csv: () => [["unit", "channel", "t_s", "mean", "in"], ...[...courses.values()].flatMap((course) => course.t_s.map((t, k) => [course.gyro, course.channel, t, course.mean[k], course.unit]))] });
+
+  function tell(status) {
+    const outputs = status.outputs ?? [];
+    for (const output of outputs) take(courses, output);
+    if (!outputs.length) return;
+    const several = new Set(outputs.map((output) => output.gyro)).size > 1;
+    fill(figures, facts(outputs.map((output) => [named(output, several), number(output.mean, 5), output.unit, `± ${number(output.std, 2)} over ${output.n}`])));
+    if (!picture.isConnected) fill(place, picture);
+    picture.redraw();
+  }
+  return Object.assign(headed("Gyro output now", null, figures, place), { tell });
+}
+
+function take(courses, output) {
+  const key = `${output.gyro} ${output.channel}`;
+  if (!courses.has(key)) courses.set(key, { ...output, t_s: [], mean: [] });
+  const course = courses.get(key);
+  if (course.t_s.length && output.t_s <= course.t_s.at(-1)) return;
+  for (const name of ["t_s", "mean"]) {
+    course[name].push(output[name]);
+    if (course[name].length > KEPT) course[name].splice(0, course[name].length - KEPT);
+  }
+}
