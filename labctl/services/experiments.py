@@ -15,7 +15,7 @@ from labctl.fitting.criticism import Criticism
 from labctl.fitting.criticism.evidence import reproduced_of, solve_option
 from labctl.fitting.criticism.verdict import LEAD
 from labctl.fitting.effects import Term
-from labctl.services.planning import bench_for, limits_of, load_bench
+from labctl.services.planning import bench_for, limits_of, load_bench, recipe_document
 from labctl.services.schedules import Schedule, walk
 from labctl.store import Store
 from procedures.errors import ProcedureError
@@ -55,8 +55,7 @@ def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict
             continue
         delta = min(deltas[rival] for rival in told)
         hours = plan.expected_s / 3600
-        document = changed.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-        document |= {"format": "labctl-recipe/1", "name": f"{recipe.name}-next"}
+        document = recipe_document(changed) | {"name": f"{recipe.name}-next"}
         ranked.append(
             {
                 "separates": [signal.leader.effect, *told],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -43,6 +44,12 @@ def own_text(source: str) -> str:
     if "\n" in source or source in shipped_recipes():
         return source
     return Path(source).read_text(encoding="utf-8")
+
+
+def recipe_document(recipe: Recipe) -> dict[str, Any]:
+    """Return a recipe as a recipe file says it: what it leaves as usual is left out."""
+    document = recipe.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    return {"format": "labctl-recipe/1", "name": recipe.name, **document}
 
 
 def load_bench(source: str) -> BenchFile:

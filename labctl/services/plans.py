@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
-from pydantic import Field
+import tomli_w
+from pydantic import Field, ValidationError
 
 from instruments.bench import BenchFile
 from labctl.errors import BadInput
 from labctl.services.acts import PlanRequest
 from labctl.services.answers import Answer, PlanAnswer
-from labctl.services.planning import bench_for, limits_of, load_bench, load_recipe, plan_answer
+from labctl.services.planning import bench_for, limits_of, load_bench, load_recipe, plan_answer, recipe_document
 from labctl.services.schedules import visibility
 from labctl.store import StepRow, Store
 from procedures.errors import PlanRefused
 from procedures.plan import make_plan
-from procedures.recipe import shipped_recipes
+from procedures.recipe import Recipe, shipped_recipes
 
 #: What a plan could find is worked out by walking through it second by second; a longer one is refused.
 LONGEST_LOOK_S = 14 * 86_400.0
@@ -71,6 +72,7 @@ class CampaignPlanAnswer(Answer):
 
     campaign: int
     recipe: str
+    text: str = Field(description="The recipe as it was run, TOML; empty: by an older labctl.")
     bench: str
     state: str
     schedule_hash: str
@@ -138,11 +140,19 @@ def campaign_plan(store: Store, campaign: int) -> CampaignPlanAnswer:
         forecast_s=_forecast(steps),
     )
     return CampaignPlanAnswer(
-        campaign=campaign, recipe=row.recipe_name, bench=row.bench_name, state=row.state,
+        campaign=campaign, recipe=row.recipe_name, text=_text(row.recipe), bench=row.bench_name, state=row.state,
         schedule_hash=row.schedule_hash, steps=len(steps),
         datasets=sum(number is not None for number in columns["dataset"]), expected_s=row.expected_s,
         timeline=timeline,
     )  # fmt: skip
+
+
+def _text(recipe: Mapping[str, Any]) -> str:
+    """Return a recipe as text; nothing where it was written by a labctl whose recipes had other keys."""
+    try:
+        return tomli_w.dumps(recipe_document(Recipe.model_validate(dict(recipe))))
+    except ValidationError:
+        return ""
 
 
 def _state(word: str) -> StepState:

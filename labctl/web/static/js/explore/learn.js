@@ -88,7 +88,7 @@ function experiments(criticism) {
   return h("div", { class: "stack" }, h("h3", {}, "The experiment that would tell"), criticism.experiments.slice(0, 3).map((each) =>
     h("div", { class: "notice" }, h("p", {}, each.do, each.hours ? ` (${number(each.hours, 2)} h)` : ""),
       h("p", { class: "soft small" }, `Separates ${each.separates.map(words).join(", ")} with a probability of ${percent(each.power)}.`),
-      each.toml ? h("a", { class: "button tiny", href: "/campaigns/new", onclick: () => sessionStorage.setItem("labctl.recipe", each.toml) }, "Plan it") : null)));
+      each.toml ? h("a", { class: "button tiny", href: `/campaigns/new?toml=${encodeURIComponent(each.toml)}` }, "Plan it") : null)));
 }
 
 function unseen(criticism) {

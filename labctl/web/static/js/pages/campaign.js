@@ -48,7 +48,7 @@ export async function page({ params, query, signal }) {
     link: ({ stale, since, why }) => fill(silent, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `${why}. Trying again.`) : null),
   }, signal);
 
-  const acts = runs(now) ? [link("To the bench", "/bench"), here ? stopButton(now.id) : null] : [here && canResume(now) ? resumeButton(now.id, { whole: true }) : null, link("Plan the same again", `/campaigns/new?recipe=${encodeURIComponent(now.recipe)}`)];
+  const acts = runs(now) ? [link("To the bench", "/bench"), here ? stopButton(now.id) : null] : [here && canResume(now) ? resumeButton(now.id, { whole: true }) : null, link("Plan the same again", `/campaigns/new?${plan.text ? `toml=${encodeURIComponent(plan.text)}` : `recipe=${encodeURIComponent(now.recipe)}`}`)];
   return h("div", { class: "page" },
     head(`Campaign ${now.id}`, h("span", {}, h("strong", {}, now.recipe), ` on bench ${now.bench}`), ...acts.filter(Boolean)),
     silent, said, about,
