@@ -11,7 +11,7 @@ from instruments.bench import BenchFile
 from labctl.fitting.criticism.candidates import Option, untestable_channels
 from labctl.fitting.criticism.compress import Compressed, compress
 from labctl.fitting.criticism.criticise import LEAST_VISIBLE
-from labctl.fitting.criticism.evidence import Design, Schur, schur, visible_share
+from labctl.fitting.criticism.evidence import Design, Schur, schur, slices_of, visible_share
 from labctl.fitting.criticism.noise_grid import USUAL_DPS, Noise
 from labctl.fitting.criticism.weigh import design_of
 from labctl.fitting.effects import CATALOGUE
@@ -58,8 +58,7 @@ def walk(plan: Plan, bench: BenchFile, model: ErrorModel | None = None) -> Sched
         nothing: NDArray[np.float64] = np.zeros(data.present.shape)
         designs[axis] = design
         left[axis] = schur(design, nothing, white, scale, [drift])[0]
-        ends = np.cumsum([option.rows.shape[2] for option in design.options])
-        slices[axis] = [slice(int(e - o.rows.shape[2]), int(e)) for e, o in zip(ends, design.options, strict=True)]
+        slices[axis] = slices_of(design.options)
     return Schedule(data, designs, left, slices)
 
 

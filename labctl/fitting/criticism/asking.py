@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.compress import Compressed
 from labctl.fitting.criticism.evidence import solve_option
 from labctl.fitting.criticism.refine import refined, sharpened
 from labctl.fitting.criticism.verdict import (
@@ -23,7 +22,7 @@ from labctl.fitting.criticism.verdict import (
     judge,
     overlap,
 )
-from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh
+from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh_beside
 from labctl.fitting.effects import Effect, Term
 from labctl.fitting.model import ErrorModel
 
@@ -51,9 +50,7 @@ class Cause:
     log_bf: float
 
 
-def ask(
-    data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]
-) -> tuple[Verdict, Weighed, Weighed]:
+def ask(first: Weighed, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Weighed, Weighed]:
     """Ask, add what is named, and ask again, until nothing more is.
 
     Returns the verdict, the first weighing with its leaders' shapes refined, and the last.
@@ -61,11 +58,11 @@ def ask(
     depends = channels_behind(first)
     begun, step = _judged(first, catalogue)
     if step.form == "unexplained":
-        causes = _pair(data, model, begun, catalogue)
+        causes = _pair(first, begun, catalogue)
         form, last = _form(causes) if causes else step.form, begun
         depends = depends or step.depends_on
     else:
-        causes, last = _one_by_one(data, model, begun, step, catalogue)
+        causes, last = _one_by_one(first, begun, step, catalogue)
         form = _form(causes) if len(causes) > 1 else step.form
     terms = {cause.term.effect: cause.term for cause in causes}
     kept = depends if causes or form == "unexplained" else ()
@@ -77,14 +74,14 @@ def _form(causes: Sequence[Cause]) -> Form:
 
 
 def _one_by_one(
-    data: Compressed, model: ErrorModel, weighed: Weighed, step: Step, catalogue: Mapping[str, Effect]
+    first: Weighed, weighed: Weighed, step: Step, catalogue: Mapping[str, Effect]
 ) -> tuple[list[Cause], Weighed]:
     """Return one cause after the other, each sought beside those before, and what is left beside all."""
     causes: list[Cause] = []
     while (cause := _cause(weighed, step)) is not None and len(causes) < STEPS:
         causes.append(cause)
         before = (weighed, step)
-        weighed, step = _judged(weigh(data, _with(model, causes), catalogue), catalogue, first=False)
+        weighed, step = _judged(weigh_beside(first, _with(first.model, causes), catalogue), catalogue, first=False)
         known = {name for cause in causes for name in cause.group}
         if known & set(step.group) or _is_shape_error(*before, weighed, step):
             break
@@ -103,21 +100,17 @@ def _with(model: ErrorModel, causes: Sequence[Cause]) -> ErrorModel:
     return model.with_terms((*model.terms, *(replace(cause.term, steady=True) for cause in causes)))
 
 
-def _beside(
-    data: Compressed, model: ErrorModel, causes: Sequence[Cause], catalogue: Mapping[str, Effect]
-) -> Cause | None:
+def _beside(first: Weighed, causes: Sequence[Cause], catalogue: Mapping[str, Effect]) -> Cause | None:
     """Return what is found missing beside other causes; None where nothing is that has a name."""
-    return _cause(*_judged(weigh(data, _with(model, causes), catalogue), catalogue, first=False))
+    return _cause(*_judged(weigh_beside(first, _with(first.model, causes), catalogue), catalogue, first=False))
 
 
-def _settled(
-    data: Compressed, model: ErrorModel, causes: Sequence[Cause], catalogue: Mapping[str, Effect]
-) -> list[Cause]:
+def _settled(first: Weighed, causes: Sequence[Cause], catalogue: Mapping[str, Effect]) -> list[Cause]:
     """Return causes each sought again beside the others: the first was found when nothing of them was known."""
     found = list(causes)
     for k in range(len(found)):
         others = found[:k] + found[k + 1 :]
-        again = _beside(data, model, others, catalogue)
+        again = _beside(first, others, catalogue)
         if again is not None and not set(again.group) & {name for other in others for name in other.group}:
             found[k] = again
     return found
@@ -177,23 +170,23 @@ def _has_rival(weighed: Weighed) -> bool:
     return len(effects) == 2 and effects[1].log_bf > max(NOTICED, effects[0].log_bf - FAR)
 
 
-def _pair(data: Compressed, model: ErrorModel, first: Weighed, catalogue: Mapping[str, Effect]) -> list[Cause]:
+def _pair(first: Weighed, begun: Weighed, catalogue: Mapping[str, Effect]) -> list[Cause]:
     """Return two effects that explain together what looked like something else, and leave nothing; or none.
 
     The first of a pair need not be the strongest alone: two laws of the rate mix into one that a third resembles.
     """
-    smooth = first.leader(smooth=True)
+    smooth = begun.leader(smooth=True)
     pairs = []
-    for leader in [c for c in first.candidates if not c.smooth and c.log_bf >= ENOUGH][:LEADERS]:
+    for leader in [c for c in begun.candidates if not c.smooth and c.log_bf >= ENOUGH][:LEADERS]:
         if leader.term is None:
             continue
-        one = Cause((leader.id,), refined(first, leader), leader.log_bf)
-        other = _beside(data, model, [one], catalogue)
+        one = Cause((leader.id,), refined(begun, leader), leader.log_bf)
+        other = _beside(first, [one], catalogue)
         if other is not None and leader.id not in other.group:
             pairs.append([one, other])
     best = max(pairs, key=lambda pair: pair[0].log_bf + pair[1].log_bf, default=None)
     if best is None or smooth is None or best[0].log_bf + best[1].log_bf < smooth.log_bf + LEAD:
         return []
-    best = _settled(data, model, best, catalogue)
-    _, step = _judged(weigh(data, _with(model, best), catalogue), catalogue, first=False)
+    best = _settled(first, best, catalogue)
+    _, step = _judged(weigh_beside(first, _with(first.model, best), catalogue), catalogue, first=False)
     return best if step.form == "adequate" else []

@@ -108,7 +108,7 @@ def criticise(
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, base, None, None)
     weighed = weigh(data, forward, catalogue)
-    verdict, begun, last = ask(data, forward, weighed, catalogue)
+    verdict, begun, last = ask(weighed, catalogue)
     if not full:
         return Criticism(verdict, data, None, None, weighed)
     assert base is not None

@@ -6,8 +6,9 @@ costs a small eigenproblem. Evidence has a unit-information g-prior (g = number 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +83,32 @@ def others_of(design: Design, rows: NDArray[np.float64], scale: NDArray[np.float
     return Others(base.T @ base + np.diag(design.precision), base.T @ own, own.T @ own)
 
 
+@dataclass(frozen=True)
+class _Left:
+    """Rows whitened at one noise, with what the base takes of them; the last column is the data."""
+
+    whitened: NDArray[np.float64]  #: (m, k) means
+    crossed: NDArray[np.float64]  #: (kb, k), to be taken off as crossed' crossed
+    own: NDArray[np.float64]  #: (k, k) inner products of the other coordinates
+    log_det: float
+
+    def between(self, columns: slice | NDArray[np.int64], others: slice | int) -> NDArray[np.float64]:
+        """Return the inner products of some columns with others, base eliminated."""
+        means = self.whitened[:, columns].T @ self.whitened[:, others]
+        return np.asarray(means + self.own[columns, others] - self.crossed[:, columns].T @ self.crossed[:, others])
+
+    def within(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the inner products inside each option (o, w) of columns, as (o, w, w), base eliminated."""
+        means, taken = (rows[:, index].transpose(1, 2, 0) for rows in (self.whitened, self.crossed))
+        own = self.own[index[:, :, None], index[:, None, :]]
+        return np.asarray(means @ means.transpose(0, 2, 1) + own - taken @ taken.transpose(0, 2, 1))
+
+    @property
+    def whole(self) -> Array:
+        """The squared norms before, (k,)."""
+        return np.asarray(np.einsum("mk,mk->k", self.whitened, self.whitened) + np.diag(self.own))
+
+
 class Base:
     """The means of one axis' base whitened by one noise, ready to be taken out of anything else."""
 
@@ -96,23 +123,40 @@ class Base:
             found[which] = solve_triangular(factor, means[which], lower=True, check_finite=False)
         return found
 
-    def taken_out_of(self, means: NDArray[np.float64], others: Others) -> Schur:
-        """Return what is left of means (m, k), the last of which are the data, beside the base."""
+    def _left(self, means: NDArray[np.float64], others: Others) -> _Left:
         whitened = self._whitened(means)
-        gram, crossed = whitened.T @ whitened + others.own, self._means.T @ whitened + others.crossed
+        crossed = self._means.T @ whitened + others.crossed
         of_base = self._means.T @ self._means + others.of_base
-        size = np.sqrt(np.maximum(np.diag(of_base), 1e-300))
-        kb, log_det = len(size), self._log_det
-        left = gram
-        if kb:
-            scaled = of_base / np.outer(size, size) + 1e-10 * np.eye(kb)
+        log_det = self._log_det
+        if len(of_base):
+            size = np.sqrt(np.maximum(np.diag(of_base), 1e-300))
+            scaled = of_base / np.outer(size, size) + 1e-10 * np.eye(len(size))
             factor = cholesky(scaled, lower=True, check_finite=False)
             crossed = solve_triangular(factor, crossed / size[:, None], lower=True, check_finite=False)
-            left = gram - crossed.T @ crossed
             log_det += 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum())
-        chi2 = float(left[-1, -1])
-        log_p = -0.5 * (log_det + chi2) + self.noise.log_prior
-        return Schur(self.noise, log_p, left[:-1, :-1], np.diag(gram)[:-1], left[:-1, -1], chi2)
+        return _Left(whitened, crossed, others.own, log_det)
+
+    def taken_out_of(self, means: NDArray[np.float64], others: Others) -> Schur:
+        """Return what is left of means (m, k), the last of which are the data, beside the base."""
+        left = self._left(means, others)
+        gram = left.between(slice(None), slice(None))
+        chi2 = float(gram[-1, -1])
+        return Schur(self.noise, self._log_p(left, chi2), gram[:-1, :-1], left.whole[:-1], gram[:-1, -1], chi2)
+
+    def gains(
+        self, means: NDArray[np.float64], others: Others, slices: list[slice]
+    ) -> tuple[float, Array, NDArray[np.int64]]:
+        """Return the log likelihood, what each option takes off the chi2, and how many directions it has.
+
+        The same as from `taken_out_of`, without the inner products between options, which are most of the work.
+        """
+        left = self._left(means, others)
+        with_data = left.between(slice(None), -1)
+        found = _gains(slices, left.within, left.whole, with_data)
+        return self._log_p(left, float(with_data[-1])), *found
+
+    def _log_p(self, left: _Left, chi2: float) -> float:
+        return -0.5 * (left.log_det + chi2) + self.noise.log_prior
 
 
 def schur(
@@ -124,42 +168,52 @@ def schur(
     return [Base(design, white_var, noise).taken_out_of(everything[0], others) for noise in noises]
 
 
-def evidence(design: Design, found: list[Schur], rows: int) -> AxisEvidence:
-    """Weigh every option by every noise."""
-    slices, at = [], 0
-    for option in design.options:
-        k = option.rows.shape[2]
-        slices.append(slice(at, at + k))
-        at += k
-    g = float(len(design.t_s))
-    log_p = np.array([s.log_p for s in found])
-    gains, dimensions = zip(*(gains_of(s, slices) for s in found), strict=True)
-    gain, k = np.array(gains), np.array(dimensions)
+def evidence(
+    design: Design, y: NDArray[np.float64], white_var: Array, scale: NDArray[np.float64], noises: list[Noise], rows: int
+) -> AxisEvidence:
+    """Weigh every option by every noise; `y` (R, m), `white_var` (m,) of the means, `scale` (R, m) of the others."""
+    slices = slices_of(design.options)
+    everything = np.concatenate([*(o.rows for o in design.options), y[:, :, None]], axis=2)
+    others = others_of(design, everything, scale)
+    bases = (Base(design, white_var, noise) for noise in noises)
+    log_ps, gains, dimensions = zip(*(base.gains(everything[0], others, slices) for base in bases), strict=True)
+    log_p, gain, k, g = np.array(log_ps), np.array(gains), np.array(dimensions), float(len(design.t_s))
     log_bf = 0.5 * gain * g / (1 + g) - 0.5 * k * np.log1p(g)
     total = logsumexp(log_p[:, None] + log_bf, axis=0) - logsumexp(log_p)
     best = int(np.argmax(log_p))
-    weights = np.exp(log_p - logsumexp(log_p))
     return AxisEvidence(
-        np.where(k[best] > 0, total, -np.inf), found[best], gain[best], k[best], slices, weights,
-        [s.noise for s in found], rows, design.base.shape[2],
+        np.where(k[best] > 0, total, -np.inf),
+        Base(design, white_var, noises[best]).taken_out_of(everything[0], others),
+        gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows, design.base.shape[2],
     )  # fmt: skip
 
 
+def slices_of(options: list[Option]) -> list[slice]:
+    """Return where the columns of each option are, side by side."""
+    ends = np.cumsum([0, *(option.rows.shape[2] for option in options)])
+    return [slice(int(begin), int(end)) for begin, end in pairwise(ends)]
+
+
 def gains_of(left: Schur, slices: list[slice]) -> tuple[Array, NDArray[np.int64]]:
-    """Return the chi2 that each option takes off and how many directions it has, all of one width together."""
+    """Return the chi2 that each option takes off and how many directions it has."""
+    return _gains(slices, lambda index: left.gram[index[:, :, None], index[:, None, :]], left.whole, left.with_data)
+
+
+def _gains(
+    slices: list[slice], within: Callable[[NDArray[np.int64]], NDArray[np.float64]], whole: Array, with_data: Array
+) -> tuple[Array, NDArray[np.int64]]:
+    """Solve all options of one width together; `within` gives the inner products inside each of them."""
     gain, dimensions = np.zeros(len(slices)), np.zeros(len(slices), dtype=np.int64)
-    size = np.sqrt(np.maximum(left.whole, 1e-300))
-    gram, data = left.gram / np.outer(size, size), left.with_data / size
+    size = np.sqrt(np.maximum(whole, 1e-300))
     order = sorted(range(len(slices)), key=lambda i: slices[i].stop - slices[i].start)
-    for width, members in groupby(order, key=lambda i: slices[i].stop - slices[i].start):
+    for _, members in groupby(order, key=lambda i: slices[i].stop - slices[i].start):
         which = list(members)
         index = np.array([np.arange(slices[i].start, slices[i].stop) for i in which])
-        values, vectors = np.linalg.eigh(gram[index[:, :, None], index[:, None, :]])
-        inner = np.einsum("oij,oi->oj", vectors, data[index])
+        values, vectors = np.linalg.eigh(within(index) / (size[index][:, :, None] * size[index][:, None, :]))
+        inner = np.einsum("oij,oi->oj", vectors, (with_data / size)[index])
         kept = values > LEAST_LEFT
         gain[which] = np.where(kept, inner**2 / np.where(kept, values, 1.0), 0.0).sum(axis=1)
         dimensions[which] = kept.sum(axis=1)
-        del width
     return gain, dimensions
 
 

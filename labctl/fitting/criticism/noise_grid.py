@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,11 +60,19 @@ def noise_grid(
 
 
 def correlation(t_s: Array, tau_s: float) -> NDArray[np.float64]:
-    """Return the correlation (m, m) of drift between times (m,)."""
+    """Return the correlation (m, m) of drift between times (m,); not to be written to."""
+    return _correlation(np.ascontiguousarray(t_s, dtype=np.float64).tobytes(), tau_s)
+
+
+@lru_cache(maxsize=32)
+def _correlation(times: bytes, tau_s: float) -> NDArray[np.float64]:
+    """The same at the same times: axes and sizes of drift share it."""
+    t_s = np.frombuffer(times, dtype=np.float64)
     lag = np.abs(t_s[:, None] - t_s[None, :])
-    if tau_s > 0:
-        return np.asarray(np.exp(-lag / tau_s))
-    return np.asarray(np.mean([np.exp(-lag / tau) for tau in MIXTURE_S], axis=0))
+    taus = (tau_s,) if tau_s > 0 else MIXTURE_S
+    found = np.mean([np.exp(-lag / tau) for tau in taus], axis=0)
+    found.setflags(write=False)
+    return np.asarray(found)
 
 
 def factors(

@@ -65,6 +65,15 @@ def design_of(data: Compressed, model: ErrorModel, axis: str, catalogue: Mapping
     return Design(base, precision, options, data.present, t_s, np.rint(run).astype(np.int64))
 
 
+def weigh_beside(weighed: Weighed, model: ErrorModel, catalogue: Mapping[str, Effect] = CATALOGUE) -> Weighed:
+    """Weigh everything again beside a model with other terms: the same candidates, another base."""
+    designs = {}
+    for axis, design in weighed.designs.items():
+        base, _, precision = base_rows(weighed.data, model, axis)
+        designs[axis] = replace(design, base=base, precision=precision)
+    return weigh(weighed.data, model, catalogue, designs)
+
+
 def level_of(base: NDArray[np.float64], data: Compressed) -> NDArray[np.float64] | None:
     """Return the coordinates of a constant, (R, m), where the base takes it up whatever it is; None where not."""
     constant = data.rows_of(np.ones((len(data.nodes), 1)))[:, :, 0]
@@ -120,9 +129,7 @@ def _weigh_axis(data: Compressed, design: Design, axis: str) -> tuple[AxisEviden
     for look in range(2):
         scale = _scales(design, y, white, explained)
         white_now = white + _growing(data, design, y, white, explained)
-        left = schur(design, y, white_now, scale, noises)
-        rows = int(design.present.sum())
-        weighed = evidence(design, left, rows)
+        weighed = evidence(design, y, white_now, scale, noises, int(design.present.sum()))
         leader = int(np.argmax(weighed.log_bf)) if len(weighed.log_bf) else -1
         if look == 1 or leader < 0 or weighed.log_bf[leader] < SECOND_LOOK:
             break
