@@ -6,6 +6,7 @@ unit length have about 1e1 to 1e2 (papers' trap O5), and no normal equations are
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,25 +64,32 @@ def solve(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift 
             f"{m} data sets at these rates and temperatures determine {min(m, rank_of(design))} of {k} coefficients"
         )
     if drift is not None:
-        return _collect([_at(design, y, scatter, drift)], design, y, scatter)
-    ordinary = _at(design, y, scatter, Drift(0.0, 1.0))
+        return _collect(_at(design, y, scatter, [drift]), design, y, scatter)
+    (ordinary,) = _at(design, y, scatter, [Drift(0.0, 1.0)])
     unexplained = _unexplained(design, y, scatter, ordinary)
-    points = [_at(design, y, scatter, point) for point in noise.grid(scatter, unexplained)]
+    points = _at(design, y, scatter, noise.grid(scatter, unexplained))
     growing = _per_rate(design, y, scatter, max(points, key=lambda p: p.log_evidence))
     if growing > 0:
-        more = [_at(design, y, scatter, point) for point in noise.grid(scatter, unexplained, growing)]
+        more = _at(design, y, scatter, noise.grid(scatter, unexplained, growing))
         if max(p.log_evidence for p in more) > max(p.log_evidence for p in points) + 3.0:
             points = more
     return _collect(points, design, y, scatter)
 
 
-def _at(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift) -> _Point:
-    """Return the weighted fit and its restricted log likelihood at one drift."""
-    m, k = design.shape
+def _at(design: NDArray[np.float64], y: Array, scatter: Scatter, drifts: Sequence[Drift]) -> list[_Point]:
+    """Return the weighted fit and its restricted log likelihood at each drift."""
+    white = scatter.white_var if scatter.white_var is not None else np.ones(len(y))
+    whitened, log_dets = noise.whitened(scatter, drifts, white, np.column_stack([design, y]))
     known = scatter.white_var is not None
-    white = scatter.white_var if scatter.white_var is not None else np.ones(m)
-    blocks = noise.whitener(scatter, drift, white)
-    whitened = noise.whiten(blocks, np.column_stack([design, y]))
+    return [
+        _point(drift, rows, float(log_det), noise.log_prior(scatter, drift), known=known)
+        for drift, rows, log_det in zip(drifts, whitened, log_dets, strict=True)
+    ]
+
+
+def _point(drift: Drift, whitened: NDArray[np.float64], log_det: float, log_prior: float, *, known: bool) -> _Point:
+    """Return the fit of whitened columns (m, k + 1), the last of which are the data."""
+    m, k = whitened.shape[0], whitened.shape[1] - 1
     norms = np.linalg.norm(whitened[:, :k], axis=0)
     q, r = qr(whitened[:, :k] / norms, mode="economic", check_finite=False)
     projected = q.T @ whitened[:, k]
@@ -89,12 +97,11 @@ def _at(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift) -
     inverse = solve_triangular(r, np.eye(k), check_finite=False) / norms[:, None]
     chi2 = float(whitened[:, k] @ whitened[:, k] - projected @ projected)
     freedom = max(m - k, 1)
-    log_dets = noise.log_determinant(blocks) + 2 * float(np.log(np.abs(np.diag(r)) * norms).sum())
+    log_dets = log_det + 2 * float(np.log(np.abs(np.diag(r)) * norms).sum())
     # what no noise explains is the model's fault, and makes its coefficients that much less certain
     scale = max(chi2 / freedom, 1.0) if known else max(chi2, 1e-300) / freedom
     fit_term = chi2 if known else freedom * np.log(max(chi2, 1e-300))
-    log_evidence = -0.5 * (log_dets + fit_term) + noise.log_prior(scatter, drift)
-    return _Point(drift, values, inverse @ inverse.T * scale, log_evidence, scale)
+    return _Point(drift, values, inverse @ inverse.T * scale, -0.5 * (log_dets + fit_term) + log_prior, scale)
 
 
 def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, fit: _Point) -> float:

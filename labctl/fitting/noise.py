@@ -6,11 +6,12 @@ one estimate: a grid of drifts is weighed by the restricted likelihood of the da
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import solve_triangular
 
 from labctl.fitting.channels import Array
 
@@ -55,18 +56,35 @@ class Drift:
     per_rate: float = 0.0  #: standard deviation per deg/s of table rate
 
 
-def whitener(scatter: Scatter, drift: Drift, white_var: Array) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
-    """Return, for each run, its rows and the lower Cholesky factor of their covariance."""
-    blocks = []
-    variance = white_var + (drift.per_rate * scatter.rate_dps) ** 2
-    for run in np.unique(scatter.run):
-        rows = np.flatnonzero(scatter.run == run)
-        covariance = np.diag(variance[rows])
-        if drift.drift_dps > 0:
-            lag = np.abs(scatter.t_s[rows, None] - scatter.t_s[None, rows])
-            covariance = covariance + drift.drift_dps**2 * np.exp(-lag / drift.tau_s)
-        blocks.append((rows, cholesky(covariance, lower=True, check_finite=False)))
-    return blocks
+def whitened(
+    scatter: Scatter, drifts: Sequence[Drift], white_var: Array, values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], Array]:
+    """Return values (m, k) with each drift's correlation taken out, (drifts, m, k), and the log determinants of the
+    covariances, (drifts,).
+
+    Row by row in time, as a Kalman filter goes: of an Ornstein-Uhlenbeck process only the last value matters, so it is
+    the same as by the Cholesky factors, in a number of operations that grows with m and not with its cube.
+    """
+    size_var = np.array([drift.drift_dps**2 for drift in drifts])
+    tau_s = np.array([drift.tau_s for drift in drifts])
+    white = white_var + (np.array([[drift.per_rate] for drift in drifts]) * scatter.rate_dps) ** 2
+    found = np.empty((len(drifts), *values.shape))
+    log_det = np.zeros(len(drifts))
+    expected, variance = np.zeros((len(drifts), values.shape[1])), size_var
+    order = np.lexsort((scatter.t_s, scatter.run))
+    for before, row in zip((None, *order[:-1]), order, strict=True):
+        if before is None or scatter.run[before] != scatter.run[row]:
+            expected, variance = np.zeros_like(expected), size_var
+        else:
+            kept = np.exp(-(scatter.t_s[row] - scatter.t_s[before]) / tau_s)
+            expected, variance = kept[:, None] * expected, size_var + kept**2 * (variance - size_var)
+        total = variance + white[:, row]
+        surprise = values[row] - expected
+        found[:, row] = surprise / np.sqrt(total)[:, None]
+        log_det += np.log(total)
+        expected = expected + (variance / total)[:, None] * surprise
+        variance = variance * white[:, row] / total
+    return found, log_det
 
 
 def whiten(blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: Array) -> Array:
@@ -75,11 +93,6 @@ def whiten(blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: 
     for rows, factor in blocks:
         out[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
     return out
-
-
-def log_determinant(blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]]) -> float:
-    """Return the log determinant of the covariance whose factors these are."""
-    return float(2 * sum(np.log(np.diag(factor)).sum() for _, factor in blocks))
 
 
 def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:
