@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 import numpy as np
 
-from labctl.errors import BadRecording, NotFound
+from labctl.errors import BadRecording, NotEnoughData, NotFound
 from labctl.recording import RecordingInfo, read_recording, write_recording
 from labctl.services.answers import Imported
-from labctl.store import Store
+from labctl.store import RecordingRow, Store
 
 if TYPE_CHECKING:
     from labctl.services.acts import Acts
@@ -73,17 +73,26 @@ def export_recording(
 
 
 def newest_recording(store: Store, serial: str, recording: int | None) -> int:
-    """Return the recording asked for, checked to be the unit's, or the unit's newest. Raises NotFound."""
+    """Return the recording asked for, checked to be the unit's, or the newest in which something was measured.
+
+    Raises NotFound, NotEnoughData where no data set is complete yet.
+    """
     store.units.get(serial)
-    if recording is not None:
-        row = store.recordings.get(recording)
-        if row.serial != serial:
-            raise NotFound(f"recording {recording} is of unit {row.serial!r}, not of {serial!r}")
-        return recording
-    rows = store.recordings.of_unit(serial)
+    rows = store.recordings.of_unit(serial) if recording is None else [store.recordings.get(recording)]
     if not rows:
         raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign makes one")
-    return rows[0].id
+    row = next((row for row in rows if _measured(row)), rows[0])
+    if row.serial != serial:
+        raise NotFound(f"recording {recording} is of unit {row.serial!r}, not of {serial!r}")
+    if not _measured(row):
+        raise NotEnoughData(
+            f"recording {row.id} of unit {serial!r} holds no complete data set yet; wait for its first, or name another"
+        )
+    return row.id
+
+
+def _measured(row: RecordingRow) -> bool:
+    return row.kind != "samples" or row.datasets > 0
 
 
 def describe_recording(store: Store, recording: int) -> dict[str, Any]:

@@ -14,12 +14,13 @@ import sqlalchemy as sa
 from instruments.bench import BenchFile
 from instruments.clock import VirtualClock
 from instruments.errors import NoReply
-from labctl.errors import BenchBusy, Conflict, DiskFull, Stopped, StoreError
+from labctl.errors import BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
 from labctl.services import bench_runner, resuming
 from labctl.services.acts import CampaignRequest
 from labctl.services.bench_runner import BenchRunner
 from labctl.services.opening import LocalActs
 from labctl.services.planning import load_bench
+from labctl.services.recordings import newest_recording
 from labctl.services.running import prepare, run
 from labctl.store import Store, open_store
 from labctl.store.database import Database
@@ -90,6 +91,18 @@ def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, m
     assert states == ["running"]
     assert store.campaigns.get(1).reason == "taken up 5 times"
     assert store.benches.unconfirmed(BENCH.name) == "table to rest: it still moves"
+
+
+def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: Store) -> None:
+    left_running(store)
+    with pytest.raises(NotEnoughData, match="no complete data set yet"):
+        newest_recording(store, "FOG-0001", None)
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    run(store, prepared)
+    left_running(store)
+    assert newest_recording(store, "FOG-0001", None) == 2
+    with pytest.raises(NotEnoughData, match="recording 3"):
+        newest_recording(store, "FOG-0001", 3)
 
 
 def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say_so(store: Store) -> None:

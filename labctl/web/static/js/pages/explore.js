@@ -2,6 +2,7 @@
 
 import { get, post } from "../core/api.js";
 import { fill, h } from "../core/dom.js";
+import { count } from "../core/format.js";
 import { busy, button, card, choice, empty, head, notice, tabs, trouble } from "../core/parts.js";
 import { go, query } from "../core/router.js";
 import { add, inOrder } from "../explore/add.js";
@@ -16,22 +17,29 @@ import { watch } from "../explore/watch.js";
 const MODELS = [["bias_scale", "bias and scale factor"], ["ojeda2000", "Ojeda 2000: polynomial in rate and temperature"], ["yang2018", "Yang 2018: matrices over temperature"], ["single_temperature", "one temperature"]];
 
 export async function page({ query: asked, signal }) {
-  const units = await get("/api/units", { signal });
+  const [units, recordings] = await Promise.all(["/api/units", "/api/recordings"].map((path) => get(path, { signal })));
   if (!units.length) {
     return h("div", { class: "page" }, head("Explore"), empty(h("p", {}, "There is nothing to explore yet."), h("p", {}, h("a", { class: "button first", href: "/start" }, "Begin"))));
   }
   const unit = units.find((each) => each.serial === asked.unit) ?? units.find((each) => each.calibrations.length) ?? units[0];
-  const recording = Number(asked.recording) || Math.max(...unit.recordings);
+  const own = recordings.filter((each) => each.serial === unit.serial);
+  const recording = Number(asked.recording) || usual(own);
   const versions = [...unit.calibrations].sort((a, b) => a - b);
   const version = versions.includes(Number(asked.version)) ? Number(asked.version) : versions.at(-1);
-  const element = h("div", { class: "page explore" }, head("Explore", "Hold the model against the measurements.", ...choices(units, unit, versions, version, recording)));
+  const element = h("div", { class: "page explore" }, head("Explore", "Hold the model against the measurements.", ...choices(units, unit, own, versions, version, recording)));
   if (!unit.recordings.length) element.append(notice("", "This unit has no recording."));
   else if (version === undefined) element.append(unfitted(unit, recording));
   else element.append(held({ unit, version, versions, recording, asked, signal }));
   return element;
 }
 
-function choices(units, unit, versions, version, recording) {
+/** The newest recording that is no mere beginning: a campaign that runs now has a few data sets only. */
+function usual(own) {
+  const most = Math.max(...own.map((each) => each.datasets));
+  return Math.max(...own.filter((each) => 2 * each.datasets >= most).map((each) => each.id));
+}
+
+function choices(units, unit, own, versions, version, recording) {
   const to = (changed) => {
     const next = { unit: unit.serial, version, recording, axis: query().axis, view: query().view, ...changed };
     if (changed.unit) Object.assign(next, { version: null, recording: null, axis: null });
@@ -40,7 +48,7 @@ function choices(units, unit, versions, version, recording) {
   return [
     choice("Unit", units.map((each) => [each.serial, each.serial]), unit.serial, (value) => to({ unit: value })),
     versions.length ? choice("Version", versions.map((each) => [each, `${each}${each === unit.certified_version ? " (in force)" : ""}`]), version, (value) => to({ version: value })) : null,
-    choice("Recording", unit.recordings.map((each) => [each, `${each}`]), recording, (value) => to({ recording: value })),
+    choice("Recording", own.map((each) => [each.id, `${each.id}: ${count(each.datasets)} data sets`]), recording, (value) => to({ recording: value })),
   ].filter(Boolean);
 }
 
