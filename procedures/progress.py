@@ -28,6 +28,7 @@ class Progress:
     step_text: str = ""
     fraction: float = 0.0  #: of the expected time, 0 to 1
     expected_end: datetime | None = None  #: aware UTC
+    t_s: float | None = None  #: campaign time of this picture
     chamber_c: float | None = None
     setpoint_c: float | None = None
     gyro_c: Mapping[str, float] = field(default_factory=dict)
@@ -87,7 +88,7 @@ class Board:
         """Change the picture; with a campaign time the forecast is made anew too."""
         if t_s is not None:
             left_s = max(self._expected_s[self._index] - (t_s - self.step_began_s), 0.0)
-            changes |= self._forecast(self._left_after_s[self._index] + left_s)
+            changes |= {**self._forecast(self._left_after_s[self._index] + left_s), "t_s": t_s}
         self._tell(changes)
 
     def _forecast(self, left_s: float) -> dict[str, Any]:

@@ -213,6 +213,7 @@ class CampaignAnswer(Answer):
     step_text: str = ""
     progress: float = Field(ge=0, le=1)
     expected_end: datetime | None = None
+    t_s: float | None = Field(default=None, description="Campaign time: seconds since it began, on its own clock.")
     chamber_c: float | None = None
     setpoint_c: float | None = None
     gyro_c: float | None = None

@@ -9,8 +9,9 @@ export function historyOf(campaign) {
   return held.get(campaign);
 }
 
-/** Take a progress message in. `t_s` is the campaign's own time: a simulated bench may run faster than the wall's clock. */
-export function take(history, status, t_s, setpoint_c) {
+/** Take a progress message in. Its time is the campaign's own: a simulated bench may run faster than the wall's clock. */
+export function take(history, status, setpoint_c) {
+  const { t_s } = status;
   if (!Number.isFinite(t_s) || (history.t_s.length && t_s <= history.t_s.at(-1))) return;
   const row = { t_s, chamber_c: status.chamber_c, gyro_c: status.gyro_c, rate_dps: status.rate_dps, setpoint_c };
   for (const [name, values] of Object.entries(history)) {
@@ -19,14 +20,5 @@ export function take(history, status, t_s, setpoint_c) {
   }
 }
 
-/**
- * Seconds of the campaign that have passed. The service forecasts the end as its own now plus what is left, and progress is
- * what is left of what was expected: together they give its now, whatever clock the bench runs on.
- */
-export function passed(status, expected_s) {
-  if (!status.expected_end || !status.started_at) return NaN;
-  const now = Date.parse(status.expected_end) / 1000 - left(status, expected_s);
-  return now - Date.parse(status.started_at) / 1000;
-}
-
+/** Seconds that are left: progress is the share of what was expected that has passed. */
 export const left = (status, expected_s) => expected_s * (1 - status.progress);

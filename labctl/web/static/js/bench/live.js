@@ -38,7 +38,7 @@ export function live(campaign) {
     for (const output of outputs) take(courses, output);
     if (!outputs.length) return;
     const several = new Set(outputs.map((output) => output.gyro)).size > 1;
-    fill(figures, facts(outputs.map((output) => [named(output, several), number(output.mean, 5), output.unit, `± ${number(output.std, 2)} over ${output.n}`])));
+    fill(figures, facts(outputs.map((output) => [named(output, several), number(output.mean, 5), output.unit, output.n > 1 ? `± ${number(output.std, 2)} over ${output.n} readings` : "one reading"])));
     if (!picture.isConnected) fill(place, picture);
     picture.redraw();
   }

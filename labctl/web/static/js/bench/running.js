@@ -12,7 +12,7 @@ import { eventList } from "./events.js";
 import { ENDED, follow } from "./feed.js";
 import { gauges } from "./gauges.js";
 import { live } from "./live.js";
-import { historyOf, left, passed, take } from "./history.js";
+import { historyOf, left, take } from "./history.js";
 import { promptCard } from "./mounting.js";
 import { output } from "./output.js";
 import { rolling } from "./rolling.js";
@@ -29,14 +29,14 @@ export function running(status, plan, bench, { signal, over }) {
   const dials = gauges(timeline);
   const [lines, heard, sound, events] = [rolling(history), live(status.id), output(timeline, signal), eventList(EVENTS)];
   let [now, asked, planned] = [status, null, 0];
-  const picture = planPicture(`Campaign ${status.id} plan`, () => ({ timeline: plan.timeline, now_s: passed(now, plan.expected_s), live: true }), { tall: "22rem", pick: (dataset) => Object.values(now.recordings)[0] && go(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
+  const picture = planPicture(`Campaign ${status.id} plan`, () => ({ timeline: plan.timeline, now_s: now.t_s, live: true }), { tall: "22rem", pick: (dataset) => Object.values(now.recordings)[0] && go(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
   const setpoint = () => now.setpoint_c ?? timeline.temperature_c[Math.max((now.step ?? 1) - 1, 0)];
 
   function show(next) {
     now = next;
     strip.show(now);
     dials.set(now, setpoint());
-    take(history, now, passed(now, plan.expected_s), setpoint());
+    take(history, now, setpoint());
     lines.tell();
     heard.tell(now);
     sound.tell(now);

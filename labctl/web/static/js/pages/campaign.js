@@ -9,7 +9,7 @@ import { go, remember, show as showAgain } from "../core/router.js";
 import { link, resumeButton, stopButton } from "../bench/acts.js";
 import { eventList } from "../bench/events.js";
 import { ENDED, follow } from "../bench/feed.js";
-import { left, passed } from "../bench/history.js";
+import { left } from "../bench/history.js";
 import { planPicture } from "../campaigns/picture.js";
 import { canResume, runs, stateChip } from "../campaigns/states.js";
 
@@ -25,7 +25,7 @@ export async function page({ params, query, signal }) {
   const level = LEVELS.some(([each]) => each === query.level) ? query.level : "info";
   const events = eventList(MOST, level);
   const [about, said, silent] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
-  const picture = planPicture(`Campaign ${now.id} plan`, () => ({ timeline: plan.timeline, now_s: runs(now) ? passed(now, plan.expected_s) : null, live: true }), { pick: (dataset) => Object.values(now.recordings)[0] && go(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
+  const picture = planPicture(`Campaign ${now.id} plan`, () => ({ timeline: plan.timeline, now_s: runs(now) ? now.t_s : null, live: true }), { pick: (dataset) => Object.values(now.recordings)[0] && go(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
   let asked = Date.now();
 
   function show(next) {
