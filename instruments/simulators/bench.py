@@ -12,6 +12,7 @@ from instruments.simulators.arrick import SimulatedC4
 from instruments.simulators.device import SimulatedDevice
 from instruments.simulators.faults import Faults, FaultyWire
 from instruments.simulators.kvh import SimulatedDsp3000, SimulatedRd2100
+from instruments.simulators.sim_serial import room_bytes
 from instruments.simulators.stim import SimulatedStim300
 from instruments.simulators.watlow_f4 import SimulatedF4
 from instruments.simulators.watlow_f4t import SimulatedF4T
@@ -36,6 +37,7 @@ class SimulatedBench:
 
     def __init__(self, bench: BenchFile, clock: Clock) -> None:
         self.world = World(bench)
+        self.world.room_bytes = room_bytes(clock)
         self.clock = clock
         self._bench = bench
         self._faults: dict[str, Faults] = {}

@@ -15,6 +15,11 @@ BUFFER_BYTES = 4096
 LOOK_S = 0.05
 
 
+def room_bytes(clock: Clock) -> int:
+    """Return how much a port keeps unread: a host is held up in the wall's time, however fast the clock runs."""
+    return round(BUFFER_BYTES * max(1.0, 1.0 / clock.wall_s(1.0)))
+
+
 class SimSerial(serial.SerialBase):  # type: ignore[misc]  # pyserial has no types
     """A serial port to a simulated instrument."""
 
@@ -22,6 +27,7 @@ class SimSerial(serial.SerialBase):  # type: ignore[misc]  # pyserial has no typ
         self._device = device
         self._clock = clock
         self._unread = bytearray()
+        self._room = room_bytes(clock)
         self.is_open = False
         super().__init__(**settings)
         self.open()
@@ -44,8 +50,8 @@ class SimSerial(serial.SerialBase):  # type: ignore[misc]  # pyserial has no typ
         if not self.is_open:
             raise serial.PortNotOpenError
         self._unread += self._device.transmit(self._clock.now_s())
-        if len(self._unread) > BUFFER_BYTES:
-            del self._unread[:-BUFFER_BYTES]
+        if len(self._unread) > self._room:
+            del self._unread[: -self._room]
 
     @property
     def in_waiting(self) -> int:

@@ -8,7 +8,6 @@ import numpy as np
 
 from instruments.bench import BenchFile
 from instruments.simulators.faults import Faults
-from instruments.simulators.sim_serial import BUFFER_BYTES
 from instruments.simulators.world import World
 from instruments.stim import COUNTS_PER_S, RATE_PER_LSB, SATURATION_DPS, TEMPERATURE_PER_LSB, Options
 from instruments.stim_frames import LAYOUTS, Bytes
@@ -30,7 +29,7 @@ class SimulatedStim300:
         self._rate_hz = self._unit.sample_rate_hz
         self._step = round(COUNTS_PER_S / self._rate_hz)
         self._sent = 0  #: index of the newest frame sent
-        self._most = BUFFER_BYTES // self._layout.stride + 1
+        self._most = world.room_bytes // self._layout.stride + 1
 
     def receive(self, data: bytes, t_s: float) -> None:
         """Normal mode answers no command that the driver uses."""

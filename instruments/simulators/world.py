@@ -15,6 +15,7 @@ from instruments.bench import BenchFile, GyroSettings, SimulationSettings
 from instruments.simulators.hidden import HiddenEffect, State, hidden_effects
 from instruments.simulators.motion import TableMotion
 from instruments.simulators.room import humidity_pct, supply_wander_v
+from instruments.simulators.sim_serial import BUFFER_BYTES
 from instruments.simulators.thermal import Body, Heat
 from instruments.simulators.units import UnitTruth, make_unit
 
@@ -36,6 +37,8 @@ class GyroSample:
 
 class World:
     """Everything the simulated instruments have in common."""
+
+    room_bytes = BUFFER_BYTES  #: what a port keeps unread; what an instrument sent beyond it is lost
 
     def __init__(self, bench: BenchFile) -> None:
         settings = bench.simulation or SimulationSettings()

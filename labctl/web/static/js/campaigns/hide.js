@@ -1,9 +1,8 @@
 // On a simulated bench: an effect that the simulated unit has and its data sheet does not mention.
 
 import { fill, h } from "../core/dom.js";
-import { number, words } from "../core/format.js";
+import { number, sizeWords, unitWords, words } from "../core/format.js";
 import { choice, field } from "../core/parts.js";
-import { sizeWords, unitWords } from "../effects/words.js";
 import { remember } from "../core/router.js";
 
 const USUAL_TIMES = 10;

@@ -1,7 +1,5 @@
 // Words around the catalogue: what an origin means, what a view shows, how a size is told.
 
-import { number, setting } from "../core/format.js";
-
 export const ORIGINS = {
   sensor: ["Sensor", "What the sensing element and its electronics do."],
   package: ["Package", "How the sensing axes lie in the unit's case."],
@@ -20,14 +18,3 @@ export const CHANNELS = {
 };
 
 export const TECHNOLOGIES = { fog: "Fibre-optic (FOG)", mems: "MEMS", piezo: "Piezoelectric vibrating" };
-
-const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵" };
-/** A unit as a person reads it: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none. */
-export const unitWords = (unit) => (unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => [...power].map((sign) => RAISED[sign] ?? sign).join("")));
-
-/** A size with its unit; a plain number is a share of the rate, or of the full effect: 14 ppm, 2.7 %. */
-export function sizeWords(value, unit, digits = 2) {
-  if (!Number.isFinite(value)) return "–";
-  if (unit !== "1") return `${value === 0 ? "0" : number(value, digits)} ${unitWords(unit)}`;
-  return Math.abs(value) >= 0.01 ? `${setting(100 * value, digits)} %` : `${setting(1e6 * value, digits)} ppm`;
-}

@@ -1,8 +1,9 @@
 // Learn: the verdict in words, and what may be missing, with its evidence.
 
 import { fill, h } from "../core/dom.js";
-import { number, percent, words } from "../core/format.js";
-import { button, chip, facts, headed, notice, table } from "../core/parts.js";
+import { measured, number, percent, words } from "../core/format.js";
+import { button, chip, facts, headed, notice } from "../core/parts.js";
+import { axesOf } from "./rows.js";
 
 const FORMS = {
   adequate: ["Nothing is missing", "good"],
@@ -45,16 +46,16 @@ export function learn(state, { onadd, explain }) {
     return fill(drawnNow, `Diamonds in the pictures above: what ${words(suspect.effect)} would explain of the residual.`);
   }, { kind: "tiny" });
   const speaking = criticism.suspects.filter((s) => s.log_bayes_factor > 0);
-  const list = h("div");
-  const fillList = () => fill(list, table([
-    { title: "Suspect", cell: (s) => h("div", {}, h("a", { href: `/effects/${s.effect}` }, words(s.effect)), " ", named.has(s.effect) ? chip("named", "warn") : null, h("div", { class: "soft small" }, s.explanation)) },
-    { title: "Evidence", cell: (s) => evidence(s.log_bayes_factor) },
-    { title: "Takes off", number: true, cell: (s) => percent(s.share_removed) },
-    { title: "RMS then, deg/s", number: true, cell: (s) => number(s.rms_after_dps) },
-    { title: "Unseen then, deg/s", number: true, cell: (s) => number(s.heldout_rms_after_dps) },
-    { title: "Coefficient", cell: (s) => coefficient(s, state.axis) },
-    { title: "", cell: (s) => h("div", { class: "row tight" }, draw(s), button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "first" : ""}` })) },
-  ], speaking, { label: "Suspects", first: "15rem" }));
+  const list = h("ol", { class: "suspects", "aria-label": "Suspects" });
+  const fillList = () => fill(list, speaking.map((s) => h("li", { class: "suspect" },
+    h("div", { class: "stack", style: "gap: .3rem" },
+      h("div", { class: "row tight" }, h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, words(s.effect)), named.has(s.effect) ? chip("named", "warn") : null),
+      h("div", { class: "soft small" }, s.explanation),
+      h("div", { class: "row tight" }, button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "first" : ""}` }), draw(s))),
+    told("Evidence", evidence(s.log_bayes_factor)),
+    told("Takes off", h("span", { class: "number" }, percent(s.share_removed)), h("span", { class: "soft small" }, "of the excess")),
+    told("Error with it, deg/s", h("span", { class: "number" }, number(s.rms_after_dps)), h("span", { class: "soft small" }, `${number(s.heldout_rms_after_dps)} at unseen temperatures`)),
+    told(`Coefficient, k = 2${axesOf(criticism).length > 1 ? `, axis ${state.axis}` : ""}`, coefficient(s, state.axis)))));
   fillList();
   state.onchange((what) => {
     fillList();
@@ -65,6 +66,8 @@ export function learn(state, { onadd, explain }) {
     aliases(criticism), experiments(criticism), unseen(criticism));
 }
 
+const told = (title, ...children) => h("div", { class: "told-of" }, h("span", { class: "soft small" }, title), ...children);
+
 function evidence(nats) {
   const share = Math.max(0, Math.min(nats / SURE, 1));
   return h("div", { class: "evidence" }, h("span", { class: "number" }, `${nats < 1000 ? nats.toFixed(1) : Math.round(nats)} nats`),
@@ -74,7 +77,7 @@ function evidence(nats) {
 function coefficient(suspect, axis) {
   const own = suspect.coefficients[axis] ?? Object.values(suspect.coefficients)[0] ?? {};
   return Object.entries(own).slice(0, 2).map(([name, { value, u, unit }]) =>
-    h("div", { class: "small nowrap" }, `${words(name)} ${number(value)} ± ${number(2 * u, 1)}${unit === "1" ? "" : ` ${unit}`}`));
+    h("div", { class: "small" }, `${words(name)} ${measured(value, 2 * u, unit)}`));
 }
 
 function aliases(criticism) {

@@ -47,11 +47,10 @@ function versions(unit, rows, base, explore) {
   return headed("Calibrations", null, table([
     { title: "Version", cell: (row) => h("span", { class: "row" }, h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`), row.certified ? chip("in force", "good") : null) },
     { title: "Model", cell: (row) => h("span", {}, row.model, row.parent ? h("span", { class: "soft small" }, ` from ${row.parent}`) : null) },
-    { title: "Made", cell: (row) => h("span", { class: "nowrap" }, instant(row.created_at)) },
+    { title: "Made", cell: (row) => h("div", { class: "nowrap" }, instant(row.created_at), h("div", { class: "soft small" }, h("code", { title: `hash ${row.hash}` }, row.hash.slice(0, 10)))) },
     { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
     { title: "Unseen, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
-    { title: "Hash", cell: (row) => h("code", { title: row.hash }, row.hash.slice(0, 10)) },
-    { title: "", cell: (row) => h("div", { class: "row tight" }, act(row), FORMATS.map(([format, title, suffix]) => button(title, () => download(`${base}/calibration?version=${row.version}&format=${format}`, `${unit.serial}-v${row.version}.${suffix}`), { kind: "tiny quiet" }))) },
+    { title: "", cell: (row) => h("div", { class: "row", style: "gap: .2rem" }, act(row), FORMATS.map(([format, title, suffix]) => button(title, () => download(`${base}/calibration?version=${row.version}&format=${format}`, `${unit.serial}-v${row.version}.${suffix}`), { kind: "tiny quiet" }))) },
   ], rows, { label: "Calibrations", selected: (row) => row.certified }));
 }
 
