@@ -21,7 +21,7 @@ const named = (output, several) => (several ? `${output.gyro}, axis ${axisOf(out
 /** A card that follows the event stream: `tell(status)`. Quiet while the units are off. */
 export function live(campaign) {
   const courses = coursesOf(campaign);
-  const figures = h("div", { "aria-live": "off" }, h("p", { class: "soft" }, "The units are off, or have not been heard yet."));
+  const figures = h("div", { class: "now", "aria-live": "off" }, h("p", { class: "soft" }, "The units are off, or have not been heard yet."));
   const place = h("div", {});
   const units = () => [...new Set([...courses.values()].map((course) => course.gyro))];
   const picture = figure("Gyro output now", "Means of what each unit sent last, since this tab began to listen.", () => {
