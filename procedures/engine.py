@@ -12,7 +12,7 @@ from procedures.crew import Crew
 from procedures.errors import Aborted, GuardTripped, Interrupted, ProcedureError, StepFailed, Unanswered
 from procedures.guard import Guards
 from procedures.handlers import HANDLERS, Figures
-from procedures.journal import CampaignState, Event, Journal
+from procedures.journal import NOT_SAFE, CampaignState, Event, Journal
 from procedures.limits import BenchLimits
 from procedures.logbook import Logbook, warning
 from procedures.mend import mend, mendable
@@ -277,7 +277,7 @@ class Engine:
         complaints = () if self._safe else make_safe(self._whole, self._stage.clock)
         self.complaints = complaints
         if complaints:
-            text = "NOT confirmed safe: " + "; ".join(complaints)
+            text = NOT_SAFE + "; ".join(complaints)
             reason = f"{reason}. {text}"
             state = CampaignState.FAILED if state is CampaignState.DONE else state
             self._log.event(Event("safe_state", text, level="error"))

@@ -76,6 +76,10 @@ class EnvironmentSample:
     gyro_c: dict[str, float]  #: gyro name -> its own thermometer (the mean where it has one per axis)
 
 
+#: How an event of kind `safe_state` begins that says what could not be confirmed.
+NOT_SAFE = "NOT confirmed safe: "
+
+
 @dataclass(frozen=True)
 class Event:
     """Something worth telling a person: a guard trip, a retry, a state change, with value, limit and reason."""

@@ -183,9 +183,10 @@ def run(
         raise Stopped(_how_left(store, prepared, engine)) from interrupt
     finally:
         with uninterrupted(), closing(prepared.bench):
-            if engine.complaints:
+            if engine.complaints:  # said in its event already, unless that could not be written
                 bench = store.campaigns.get(prepared.id).bench_name
-                store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
+                if not store.benches.unconfirmed(bench):
+                    store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
 
 

@@ -41,9 +41,8 @@ class Benches:
 
     def mark(self, name: str, unconfirmed: str, at: datetime) -> None:
         """Write down what could not be confirmed; it stays until `clear`."""
-        b = tables.benches
         with self._database.writing() as connection:
-            connection.execute(sa.update(b).where(b.c.name == name).values(unconfirmed=unconfirmed, unconfirmed_at=at))
+            mark(connection, name, unconfirmed, at)
 
     def clear(self, name: str, by: str, reason: str, at: datetime) -> BenchRow:
         """Take in that a person has looked. Raises NotFound, and Conflict when there is nothing to clear."""
@@ -58,3 +57,9 @@ class Benches:
             detail = {"reason": reason, "was": found.unconfirmed}
             audit.append(connection, at, "bench clear", f"bench {name}", detail, who=by)
         return next(row for row in self.all() if row.name == name)
+
+
+def mark(connection: sa.Connection, name: str, unconfirmed: str, at: datetime) -> None:
+    """Write down, with whatever else the transaction does, what could not be confirmed of a bench."""
+    b = tables.benches
+    connection.execute(sa.update(b).where(b.c.name == name).values(unconfirmed=unconfirmed, unconfirmed_at=at))

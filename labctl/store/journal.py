@@ -16,12 +16,12 @@ import sqlalchemy as sa
 from numpy.typing import NDArray
 
 from instruments.gyro import Readings
-from labctl.store import blocks, tables
+from labctl.store import benches, blocks, tables
 from labctl.store.audit import append
 from labctl.store.database import Database
 from labctl.store.means import means_rows
 from labctl.store.recordings import block_row, blocks_of, scaled
-from procedures.journal import CampaignState, DataSetHeader, DataSetState, EnvironmentSample, Event
+from procedures.journal import NOT_SAFE, CampaignState, DataSetHeader, DataSetState, EnvironmentSample, Event
 from procedures.shield import afterwards
 from procedures.steps import StepResult
 
@@ -216,9 +216,13 @@ class StoreJournal:
                 connection.execute(_ADD_ENVIRONMENT, rows)
 
     def event(self, event: Event, t_s: float, at: datetime) -> None:
-        """Record something worth telling a person."""
+        """Record something worth telling a person; what is not safe stays on the bench's status from then on."""
         with self._writing() as connection:
             self._add_event(connection, event, t_s, at)
+            if event.kind == "safe_state" and event.level == "error":
+                c = tables.campaigns.c
+                bench = connection.scalar(sa.select(c.bench_name).where(c.id == self._campaign)) or ""
+                benches.mark(connection, bench, event.message.removeprefix(NOT_SAFE), at)
 
     def _add_event(self, connection: sa.Connection, event: Event, t_s: float, at: datetime) -> None:
         connection.execute(

@@ -25,7 +25,7 @@ from labctl.services.running import prepare, run
 from labctl.store import Store, open_store
 from labctl.store.database import Database
 from procedures.control import Control
-from procedures.journal import CampaignState
+from procedures.journal import NOT_SAFE, CampaignState, Event
 from procedures.shield import afterwards
 
 BENCH = load_bench("single-axis-sim")
@@ -91,6 +91,15 @@ def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, m
     assert states == ["running"]
     assert store.campaigns.get(1).reason == "taken up 5 times"
     assert store.benches.unconfirmed(BENCH.name) == "table to rest: it still moves"
+
+
+def test_what_is_not_safe_is_on_the_bench_before_the_campaign_ends(store: Store) -> None:
+    """Whoever is killed between the two leaves a bench that says so."""
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    prepared.bench.close()
+    event = Event("safe_state", f"{NOT_SAFE}table to rest: no answer", level="error")
+    store.campaigns.journal(prepared.id).event(event, 0.0, AT)
+    assert store.benches.unconfirmed(BENCH.name) == "table to rest: no answer"
 
 
 def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: Store) -> None:
@@ -177,6 +186,7 @@ def test_a_bench_is_closed_even_if_what_is_wrong_with_it_cannot_be_written(
         raise StoreError("the disk is full")
 
     monkeypatch.setattr(store.benches, "mark", full)
+    monkeypatch.setattr("labctl.store.journal.benches.mark", full)
     control = Control()
     control.abort("enough")
     with pytest.raises(StoreError):
