@@ -90,6 +90,6 @@ function pickedSets(state) {
       { title: "Up", cell: (k) => rows.position[k] },
       { title: "Residual, deg/s", number: true, cell: (k) => number(rows.residual[k]) },
       { title: "Over floor", number: true, cell: (k) => number(rows.score[k], 2) },
-    ], chosen.slice(0, LISTED), { label: "Picked data sets" }),
+    ], chosen.slice(0, LISTED), { dense: true, label: "Picked data sets" }),
   ];
 }

@@ -33,7 +33,7 @@ export async function page({ query, signal }) {
     headed(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list));
 }
 
-const KINDS = { samples: "every reading", points: "one mean per data set", coefficients: "a published table" };
+const KINDS = { samples: "every reading", points: "means", coefficients: "a published table" };
 
 function listed(rows) {
   return table([

@@ -64,5 +64,5 @@ function listed(state, rows) {
     ...gyros.map((name) => ({ title: `${nameOf(name).replace("gyro output", "Output")}, ${unitOf(name, output)}`, number: true, cell: (k) => [of(name, k, 5), sets.channels[name].std[k] === null ? null : h("span", { class: "soft small" }, ` ± ${number(sets.channels[name].std[k], 2)}`)] })),
     { title: "Readings", number: true, cell: (k) => count(sets.n[k]) },
     timed ? { title: "Begins after", number: true, cell: (k) => duration(sets.t_from_s[k] ?? NaN) } : null,
-  ].filter(Boolean), rows, { label: "Data sets", selected: (k) => sets.number[k] === state.dataset, onrow: (k) => state.pick(sets.number[k]) });
+  ].filter(Boolean), rows, { dense: true, label: "Data sets", selected: (k) => sets.number[k] === state.dataset, onrow: (k) => state.pick(sets.number[k]) });
 }

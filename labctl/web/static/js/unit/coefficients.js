@@ -50,5 +50,5 @@ function list(first, second) {
     second ? { title: `Version ${second.version}`, number: true, cell: (row) => (row.beside ? number(row.beside.value, 5) : "–") } : null,
     second ? { title: "Differs by", number: true, cell: (row) => (row.beside ? `${number(Math.abs(row.value - row.beside.value) / Math.hypot(row.u, row.beside.u), 2)} u` : "–") } : null,
     { title: "Unit", cell: (row) => (row.unit === "1" ? "–" : row.unit) },
-  ].filter(Boolean), rows, { label: "Coefficients" });
+  ].filter(Boolean), rows, { dense: true, label: "Coefficients" });
 }
