@@ -210,7 +210,8 @@ def extras(cells: Cells) -> str:
         ("false alarm, 1 % outliers and 3 % of data sets missing", "spoiled", alarm),
         ("false alarm, drift three times its size", "drifting", alarm),
         ("the same: drift said to be larger than specified", "drifting", says_large_drift),
-        ("two effects, z = 20: both named", "two", both_named),
+        ("two effects, z = 20: both named, alone or in a group", "two", both_named),
+        ("the same: each by one name", "two", both_alone),
         ("the same: another one named", "two", another_named),
     )
     rows = [[what, *(share(map(count, cells.of(kind, protocol=place))) for place in places)]
@@ -226,8 +227,13 @@ def says_large_drift(answer: Answer) -> bool:
 
 
 def both_named(answer: Answer) -> bool:
-    """Whether both hidden effects are named, each by itself or by an exact like."""
+    """Whether both hidden effects are named: each, its exact like, or a group that it cannot be told from."""
     return all(names(effect) & set(answer["named"]) for effect in answer["hidden"])
+
+
+def both_alone(answer: Answer) -> bool:
+    """Whether both hidden effects are named, and neither with others that it could not be told from."""
+    return both_named(answer) and answer["verdict"] == "missing"
 
 
 def another_named(answer: Answer) -> bool:

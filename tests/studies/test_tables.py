@@ -70,6 +70,8 @@ def test_a_second_name_beside_the_truth_is_one_too_many_but_its_like_is_not() ->
 def test_two_hidden_effects_want_both_names_and_no_other() -> None:
     two = answer("two", hidden={"bias_drift": 1.0, "misalignment": 1.0}, named=["non_orthogonality", "bias_drift"])
     assert tables.both_named(two)
+    assert tables.both_alone({**two, "verdict": "missing"})
+    assert not tables.both_alone({**two, "verdict": "ambiguous"})
     assert not tables.another_named(two)
     assert tables.another_named({**two, "named": ["bias_drift", "warm_up"]})
     assert not tables.both_named({**two, "named": ["bias_drift", "warm_up"]})
