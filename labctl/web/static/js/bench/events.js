@@ -18,7 +18,7 @@ export function eventList(most, level = "info") {
     waiting = null;
     const shown = all.filter((event) => LEVELS.indexOf(event.level) >= LEVELS.indexOf(least));
     const from = shown.slice(-most).reverse();
-    fill(element, from.length ? from.map(line) : h("li", { class: "empty" }, "Nothing of this kind has happened."), shown.length > most ? h("li", { class: "soft small" }, `and ${shown.length - most} before`) : null);
+    fill(element, from.length ? from.map(line) : h("li", { class: "empty" }, all.length ? "Nothing of this kind has happened." : "No event has been heard yet."), shown.length > most ? h("li", { class: "soft small" }, `and ${shown.length - most} before`) : null);
   }
   element.add = (event) => {
     all.push(event);

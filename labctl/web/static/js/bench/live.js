@@ -2,10 +2,12 @@
 
 import { fill, h } from "../core/dom.js";
 import { axisColour, figure } from "../core/figure.js";
-import { number } from "../core/format.js";
+import { mean, number } from "../core/format.js";
 import { facts, headed } from "../core/parts.js";
 
 const KEPT = 3000;
+/** Fewer points than this are marked: of one alone a line shows nothing. */
+const FEW = 30;
 const DASHES = ["solid", "dash", "dot", "dashdot"];
 const held = new Map();
 
@@ -28,7 +30,7 @@ export function live(campaign) {
     const drawn = [...courses.values()];
     const several = units().length > 1;
     return {
-      data: drawn.map((course) => ({ type: "scatter", mode: "lines", name: named(course, several), x: course.t_s, y: course.mean, line: { width: 1.4, color: axisColour(axisOf(course)), dash: DASHES[units().indexOf(course.gyro) % DASHES.length] }, hovertemplate: `%{y:.6~g} ${course.unit}<extra>${named(course, several)}</extra>` })),
+      data: drawn.map((course) => ({ type: "scatter", mode: course.t_s.length < FEW ? "lines+markers" : "lines", name: named(course, several), x: course.t_s, y: course.mean, marker: { size: 5 }, line: { width: 1.4, color: axisColour(axisOf(course)), dash: DASHES[units().indexOf(course.gyro) % DASHES.length] }, hovertemplate: `%{y:.6~g} ${course.unit}<extra>${named(course, several)}</extra>` })),
       layout: { margin: { l: 62, r: 12, t: 30, b: 42 }, hovermode: "x unified", showlegend: drawn.length > 1, xaxis: { title: { text: "time of the campaign, s" } }, yaxis: { title: { text: drawn[0]?.unit ?? "" } } },
     };
   }, { tall: "15rem", csv: () => [["unit", "channel", "t_s", "mean", "in"], ...[...courses.values()].flatMap((course) => course.t_s.map((t, k) => [course.gyro, course.channel, t, course.mean[k], course.unit]))] });
@@ -38,7 +40,7 @@ export function live(campaign) {
     for (const output of outputs) take(courses, output);
     if (!outputs.length) return;
     const several = new Set(outputs.map((output) => output.gyro)).size > 1;
-    fill(figures, facts(outputs.map((output) => [named(output, several), number(output.mean, 5), output.unit, output.n > 1 ? `± ${number(output.std, 2)} over ${output.n} readings` : "one reading"])));
+    fill(figures, facts(outputs.map((output) => [named(output, several), mean(output.mean, output.n > 1 ? output.std : null), output.unit, output.n > 1 ? `± ${number(output.std, 2)} over ${output.n} readings` : "one reading"])));
     if (!picture.isConnected) fill(place, picture);
     picture.redraw();
   }

@@ -48,9 +48,11 @@ export function begin(bench, order) {
   };
   const show = () => fill(place, FORMS[chosen]());
   show();
-  return card("Begin", bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."),
+  const element = card("Begin", bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."),
     h("div", {}, tabs("When", when, chosen, (value) => {
       chosen = value;
       show();
     })), place);
+  element.id = "begin";
+  return element;
 }

@@ -55,8 +55,8 @@ export function figure(name, caption, draw, { tall = "20rem", csv } = {}) {
   const plot = h("div", { class: "plot", role: "group", "aria-label": `${name}. ${caption ?? ""}` });
   const tool = (text, act, label) => h("button", { type: "button", class: "button quiet tiny", "aria-label": `Save ${name} as ${label}`, onclick: act }, text);
   const element = h("figure", { class: "figure", style: `--tall: ${tall}` },
-    h("div", { class: "toolbar" }, tool("PNG", () => picture("png"), "PNG"), tool("SVG", () => picture("svg"), "SVG"), tool("CSV", () => save(new Blob([text(rows())], { type: "text/csv" }), `${file(name)}.csv`), "CSV")),
-    plot, caption ? h("figcaption", {}, caption) : null);
+    plot, caption ? h("figcaption", {}, caption) : null,
+    h("div", { class: "toolbar" }, tool("PNG", () => picture("png"), "PNG"), tool("SVG", () => picture("svg"), "SVG"), tool("CSV", () => save(new Blob([text(rows())], { type: "text/csv" }), `${file(name)}.csv`), "CSV")));
 
   async function picture(format) {
     const Plotly = await plotly();

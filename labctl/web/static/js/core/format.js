@@ -23,6 +23,12 @@ export const withUnit = (value, unit, digits) => (Number.isFinite(value) ? `${nu
 export const count = (value) => (Number.isFinite(value) ? value.toLocaleString("en-GB") : "–");
 export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)} %` : "–");
 
+/** A mean to one place beyond its spread, so that a column of means lines up; to five digits where there is no spread. */
+export function mean(value, spread) {
+  if (!Number.isFinite(value) || !(spread > 0)) return number(value, 5);
+  return value.toFixed(Math.min(Math.max(2 - Math.floor(Math.log10(spread)), 0), 8));
+}
+
 /** Seconds as 45 h 10 min, 3 min 20 s, 12 s. */
 export function duration(seconds) {
   if (!Number.isFinite(seconds)) return "–";

@@ -27,6 +27,8 @@ export function facts(rows) {
 }
 
 export const chip = (text, kind = "") => h("span", { class: `chip ${kind}` }, text);
+/** A model's name, which may break after each part: yang2018+ scale_factor_asymmetry. */
+export const modelName = (name) => (name ?? "").split(/(?<=\+)/).flatMap((part, k) => (k ? [h("wbr"), part] : [part]));
 export const notice = (kind, ...children) => h("div", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : "status" }, ...children);
 export const empty = (...children) => h("div", { class: "empty stack" }, ...children);
 export const busy = (text) => h("p", { class: "busy soft", role: "status" }, text);

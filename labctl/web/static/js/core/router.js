@@ -64,6 +64,13 @@ export async function show() {
   }
 }
 
+/** Bring a part of the page into view, and go on from there with the keyboard where it can be held. */
+function look(hash) {
+  const part = document.getElementById(hash.slice(1));
+  part?.scrollIntoView();
+  part?.focus({ preventScroll: true });
+}
+
 /** Take over links within these pages. */
 export function start() {
   document.addEventListener("click", (event) => {
@@ -72,7 +79,8 @@ export function start() {
     const url = new URL(link.href);
     if (url.origin !== location.origin || url.pathname.startsWith("/api") || url.pathname.startsWith("/static") || !match(url.pathname)) return;
     event.preventDefault();
-    go(url.pathname + url.search + url.hash);
+    if (url.hash && url.pathname === location.pathname && url.search === location.search) return look(url.hash);
+    go(url.pathname + url.search + url.hash).then(() => url.hash && look(url.hash));
     window.scrollTo(0, 0);
   });
   window.addEventListener("popstate", show);

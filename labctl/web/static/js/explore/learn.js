@@ -77,8 +77,11 @@ function evidence(nats) {
 function coefficient(suspect, axis) {
   const own = suspect.coefficients[axis] ?? Object.values(suspect.coefficients)[0] ?? {};
   return Object.entries(own).slice(0, 2).map(([name, { value, u, unit }]) =>
-    h("div", { class: "small" }, `${words(name)} ${measured(value, 2 * u, unit)}`));
+    h("div", { class: "small" }, h("span", { class: "soft" }, words(name)), " ", whole(measured(value, 2 * u, unit))));
 }
+
+/** A value that is not parted from its uncertainty and its power; only its unit may go to the next line. */
+const whole = (text) => text.replaceAll(/ ([±×]) /g, "\u00a0$1\u00a0");
 
 function aliases(criticism) {
   const group = criticism.suspects.find((s) => s.alias_group.length > 1 && criticism.named.includes(s.effect))?.alias_group;

@@ -4,7 +4,7 @@ import { get } from "../core/api.js";
 import { h } from "../core/dom.js";
 import { colour, figure } from "../core/figure.js";
 import { number, words } from "../core/format.js";
-import { headed, later, table } from "../core/parts.js";
+import { headed, later, modelName, table } from "../core/parts.js";
 import { map, rowsFor, scaleOf } from "./map.js";
 import { rowsOf } from "./rows.js";
 
@@ -23,9 +23,9 @@ export function ladderFigure(ladder) {
       line("heldout_rms_dps", "at unseen temperatures", { color: colour("warn"), width: 2.5 }, "square"),
     ],
     layout: {
-      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, exponentformat: "none" }, xaxis: { type: "category" },
+      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: "D2", tickformat: "~g" }, xaxis: { type: "category" },
       shapes: ladder.noise_floor_dps ? [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: ladder.noise_floor_dps, y1: ladder.noise_floor_dps, line: { color: colour("good"), dash: "dash" } }] : [],
-      annotations: ladder.noise_floor_dps ? [{ xref: "paper", x: 1, y: Math.log10(ladder.noise_floor_dps), text: "noise floor", showarrow: false, xanchor: "right", yanchor: "bottom", font: { color: colour("good"), size: 12 } }] : [],
+      annotations: ladder.noise_floor_dps ? [{ xref: "paper", x: 0.01, y: Math.log10(ladder.noise_floor_dps), text: "noise floor", showarrow: false, xanchor: "left", yanchor: "bottom", font: { color: colour("good"), size: 12 } }] : [],
     },
   });
   return figure("Error ladder", "Each version's RMS error on its own data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.", draw, { tall: "19rem" });
@@ -59,7 +59,7 @@ export function watch(state, signal) {
 function steps(ladder, state) {
   return table([
     { title: "Version", cell: (step) => (step.version === state.version ? h("strong", {}, `${step.version}`) : h("a", { href: `/explore?unit=${encodeURIComponent(state.serial)}&version=${step.version}` }, `${step.version}`)) },
-    { title: "Model", cell: (step) => h("span", {}, step.model, h("span", { class: "soft small" }, step.parent ? ` from version ${step.parent}` : "")) },
+    { title: "Model", cell: (step) => h("span", {}, modelName(step.model), h("span", { class: "soft small" }, step.parent ? ` from version ${step.parent}` : "")) },
     { title: "Effects", cell: (step) => step.effects.map(words).join(", ") },
     { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
     { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },

@@ -32,7 +32,7 @@ export async function page({ query, signal }) {
     fill(found, busy("Working out what it could find; for a long plan that takes some seconds."));
     try {
       const answer = await post("/api/plans", { recipe: source(), clip }, { signal: given });
-      fill(planned, shown(answer));
+      fill(planned, shown(answer, bench));
     } catch (error) {
       if (error.name === "AbortError") return;
       fill(planned, refused(error));
@@ -54,7 +54,8 @@ export async function page({ query, signal }) {
   } }), h("span", {}, "Leave out what the bench or the unit cannot do"));
   plan();
   return h("div", { class: "page" },
-    head("Plan a campaign", bench ? h("span", { class: "row" }, "On bench ", h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null) : "For the simulated bench that fits the recipe best."),
+    head("Plan a campaign", bench ? h("span", { class: "row" }, "On bench ", h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null) : "For the simulated bench that fits the recipe best.",
+      h("a", { class: "button first", href: "#begin" }, "To the start")),
     query.recipe && named.name !== query.recipe && !query.toml ? notice("warn", `No recipe ${query.recipe} comes with labctl; ${named.name} is shown. Its text can be pasted under "Your own".`) : null,
     h("div", { class: "planning" },
       h("div", { class: "stack" }, recipes(all, choice, (next) => {
@@ -74,14 +75,14 @@ function quickest(all) {
   return able.sort((a, b) => a.expected_s - b.expected_s)[0] ?? all[0];
 }
 
-function shown(answer) {
+function shown(answer, bench) {
   const ends = new Date(Date.now() + 1000 * answer.expected_s);
   return card("What it would do",
     facts([
       ["Data sets", count(answer.datasets), "", `in ${count(answer.steps)} steps`],
       ["Expected time", duration(answer.expected_s), "", "on the bench's own clock"],
       ["Begun now it ends", ends.toLocaleString("en-GB", { weekday: "short", hour: "2-digit", minute: "2-digit" }), "", ends.toLocaleDateString("en-GB", { day: "numeric", month: "short" })],
-      ["Bench", answer.bench],
+      answer.bench === bench?.name ? null : ["Bench", answer.bench],
     ]),
     planPicture(`Plan of ${answer.recipe}`, () => ({ timeline: answer.timeline })),
     answer.clipped.length ? notice("warn", h("strong", {}, `${answer.clipped.length} points are left out`), h("details", {}, h("summary", {}, "Which, and why"), h("ul", {}, answer.clipped.map((each) => h("li", { class: "small" }, each))))) : null);

@@ -32,17 +32,15 @@ export async function page({ signal }) {
   return h("div", { class: "page" }, head("Campaigns", "One run of a recipe on a bench.", link("Plan a campaign", "/campaigns/new", "first")), place);
 }
 
-const took = (row) => (row.started_at && row.ended_at ? duration((Date.parse(row.ended_at) - Date.parse(row.started_at)) / 1000) : "–");
+const took = (row) => (row.started_at && row.ended_at ? `took ${duration((Date.parse(row.ended_at) - Date.parse(row.started_at)) / 1000)}` : null);
 
 function listed(rows) {
   return table([
-    { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "soft small beside" }, row.recipe)] },
-    { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.reason ? h("span", { class: "soft small beside two-lines", title: row.reason }, row.reason) : null] },
+    { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "soft small beside" }, `${row.recipe} on ${row.bench}`)] },
+    { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.state !== "running" && row.reason ? h("span", { class: "soft small beside two-lines", title: row.reason }, row.reason) : null] },
     { title: "Progress", cell: (row) => h("div", { class: "progress-cell" }, h("div", { class: "meter", role: "img", "aria-label": percent(row.progress) }, h("i", { style: `width: ${100 * row.progress}%` })), h("span", { class: "small" }, percent(row.progress))) },
-    { title: "Bench", cell: (row) => h("span", { class: "nowrap" }, row.bench) },
-    { title: "Begun", cell: (row) => h("span", { class: "nowrap" }, instant(row.started_at)) },
-    { title: "Took", number: true, cell: (row) => (runs(row) ? h("span", { class: "soft" }, `ends ${instant(row.expected_end)}`) : took(row)) },
-    { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("span", { class: "nowrap beside" }, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), ", ", h("a", { href: `/recordings/${recording}` }, `recording ${recording}`))) },
+    { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, instant(row.started_at)), h("span", { class: "soft small beside nowrap" }, runs(row) ? `ends ${instant(row.expected_end)}` : took(row))] },
+    { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("span", { class: "beside" }, h("a", { href: `/units/${encodeURIComponent(serial)}`, class: "nowrap" }, serial), ", ", h("a", { href: `/recordings/${recording}`, class: "nowrap" }, `recording ${recording}`))) },
   ], rows, { label: "Every campaign", first: "8rem" });
 }
 

@@ -45,13 +45,13 @@ function overview(units, campaigns, benches) {
   const running = campaigns.find((campaign) => ["running", "paused", "suspended", "starting"].includes(campaign.state));
   return h("div", { class: "page" },
     head("labctl", "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall."),
-    h("div", { class: "columns" },
+    h("div", { class: "columns", style: "--least: 17rem" },
       card("Bench", benches.length
         ? h("p", {}, running ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.` : `${benches[0].name} is free.`)
         : h("p", {}, "This service drives no bench."),
       h("div", { class: "row" }, h("a", { class: "button first", href: "/bench" }, "To the bench"), h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"))),
       card("Units", h("ul", { class: "plain" }, units.slice(0, 6).map((unit) => h("li", { class: "row spread" },
         h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
-        h("a", { href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "explore"))))),
+        h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"))))),
       card("Data", h("div", { class: "row" }, h("a", { class: "button", href: "/recordings" }, "Import a recording"), button("Simulate a hidden effect", simulated), button("Open the real gyro", example)))));
 }

@@ -3,7 +3,7 @@
 import { download, get, post } from "../core/api.js";
 import { h } from "../core/dom.js";
 import { day, instant, number } from "../core/format.js";
-import { button, card, chip, dialog, empty, facts, head, headed, later, notice, table } from "../core/parts.js";
+import { button, card, chip, dialog, empty, facts, head, headed, later, modelName, notice, table } from "../core/parts.js";
 import { query, remember, show } from "../core/router.js";
 import { ladderFigure } from "../explore/watch.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
@@ -16,7 +16,7 @@ export async function page({ params, signal }) {
   const force = history.find((act) => act.version === unit.certified_version && act.act === "certify");
   const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
   return h("div", { class: "page" },
-    head(unit.serial, [unit.model, unit.technology].filter(Boolean).join(" · "), h("a", { class: "button first", href: explore }, "Explore")),
+    head(unit.serial, [unit.model, unit.technology?.toUpperCase()].filter(Boolean).join(" · "), h("a", { class: "button first", href: explore }, "Explore")),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force, base)),
     rows.length ? [versions(unit, rows, base, explore), ladder(base, signal), shapes(base, rows, signal)] : empty(h("p", {}, "No calibration yet."), h("p", {}, h("a", { class: "button first", href: explore }, "Fit a model"))),
     h("div", { class: "columns" },
@@ -31,7 +31,7 @@ function inForce(unit, rows, force, base) {
   const row = rows.find((each) => each.version === unit.certified_version);
   const left = force?.due ? Math.ceil((new Date(force.due) - Date.now()) / 86_400_000) : null;
   return h("div", { class: "stack" }, facts([
-    ["In force", `version ${unit.certified_version}`, null, row?.model],
+    ["In force", `version ${unit.certified_version}`, null, row ? modelName(row.model) : null],
     ["Certified by", force?.by ?? "–", null, force ? instant(force.at) : null],
     ["Due", force?.due ? day(force.due) : "no date", null, left === null ? null : left < 0 ? `${-left} days ago` : `in ${left} days`],
     ["RMS error", number(row?.rms_dps), "deg/s"],
@@ -45,12 +45,12 @@ function versions(unit, rows, base, explore) {
     ? button("Revoke", () => certify(base, row.version, "revoke"), { kind: "tiny" })
     : button("Certify", () => certify(base, row.version, "certify"), { kind: "tiny" });
   return headed("Calibrations", null, table([
-    { title: "Version", cell: (row) => h("span", { class: "row" }, h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`), row.certified ? chip("in force", "good") : null) },
-    { title: "Model", cell: (row) => h("span", {}, row.model, row.parent ? h("span", { class: "soft small" }, ` from ${row.parent}`) : null) },
+    { title: "Version", cell: (row) => h("span", { class: "row tight" }, h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`), row.certified ? chip("in force", "good") : null) },
+    { title: "Model", cell: (row) => h("span", {}, modelName(row.model), row.parent ? h("span", { class: "soft small" }, ` from ${row.parent}`) : null) },
     { title: "Made", cell: (row) => h("div", { class: "nowrap" }, instant(row.created_at), h("div", { class: "soft small" }, h("code", { title: `hash ${row.hash}` }, row.hash.slice(0, 10)))) },
     { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
     { title: "Unseen, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
-    { title: "", cell: (row) => h("div", { class: "row", style: "gap: .2rem" }, act(row), FORMATS.map(([format, title, suffix]) => button(title, () => download(`${base}/calibration?version=${row.version}&format=${format}`, `${unit.serial}-v${row.version}.${suffix}`), { kind: "tiny quiet" }))) },
+    { title: "", cell: (row) => h("div", { class: "row tight", style: "gap: .2rem" }, act(row), FORMATS.map(([format, title, suffix]) => button(title, () => download(`${base}/calibration?version=${row.version}&format=${format}`, `${unit.serial}-v${row.version}.${suffix}`), { kind: "tiny quiet" }))) },
   ], rows, { label: "Calibrations", selected: (row) => row.certified }));
 }
 

@@ -12,10 +12,10 @@ export async function page({ signal }) {
     units.length ? h("section", { class: "card" }, table([
       { title: "Serial number", cell: (unit) => h("a", { href: to(unit.serial) }, unit.serial) },
       { title: "Model", cell: (unit) => unit.model },
-      { title: "Technology", cell: (unit) => unit.technology ?? "–" },
+      { title: "Technology", cell: (unit) => unit.technology?.toUpperCase() ?? "–" },
       { title: "Recordings", number: true, cell: (unit) => unit.recordings.length },
       { title: "Versions", number: true, cell: (unit) => unit.calibrations.length },
       { title: "In force", cell: (unit) => (unit.certified_version ? chip(`version ${unit.certified_version}`, "good") : chip("none", "warn")) },
-      { title: "", cell: (unit) => h("a", { href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "explore") },
+      { title: "", cell: (unit) => h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore") },
     ], units, { label: "Units" })) : empty(h("p", {}, "No unit has been measured or imported yet."), h("p", {}, h("a", { class: "button first", href: "/start" }, "Begin"))));
 }

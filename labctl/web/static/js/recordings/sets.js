@@ -1,7 +1,7 @@
 // The data sets of a recording: a table to leaf through, from which one is picked.
 
 import { fill, h } from "../core/dom.js";
-import { count, duration, number, setting } from "../core/format.js";
+import { count, duration, mean, number, setting } from "../core/format.js";
 import { chip, choice, headed, table } from "../core/parts.js";
 import { remember } from "../core/router.js";
 import { nameOf, unitOf } from "./channels.js";
@@ -61,7 +61,7 @@ function listed(state, rows) {
     { title: "Table rate, deg/s", number: true, cell: (k) => setting(sets.table_rate_dps[k], 6) },
     warm ? { title: "Set point, deg C", number: true, cell: (k) => setting(sets.chamber_setpoint_c[k] ?? NaN) } : null,
     { title: "Gyro, deg C", number: true, cell: (k) => of("temperature_c", k, 4) },
-    ...gyros.map((name) => ({ title: `${nameOf(name).replace("gyro output", "Output")}, ${unitOf(name, output)}`, number: true, cell: (k) => [of(name, k, 5), sets.channels[name].std[k] === null ? null : h("span", { class: "soft small" }, ` ± ${number(sets.channels[name].std[k], 2)}`)] })),
+    ...gyros.map((name) => ({ title: `${nameOf(name).replace("gyro output", "Output")}, ${unitOf(name, output)}`, number: true, cell: (k) => [mean(sets.channels[name].mean[k], sets.channels[name].std[k]), sets.channels[name].std[k] === null ? null : h("span", { class: "soft small beside" }, ` ± ${number(sets.channels[name].std[k], 2)}`)] })),
     { title: "Readings", number: true, cell: (k) => count(sets.n[k]) },
     timed ? { title: "Begins after", number: true, cell: (k) => duration(sets.t_from_s[k] ?? NaN) } : null,
   ].filter(Boolean), rows, { dense: true, label: "Data sets", selected: (k) => sets.number[k] === state.dataset, onrow: (k) => state.pick(sets.number[k]) });
