@@ -3,7 +3,7 @@
 import { h } from "../core/dom.js";
 import { duration, instant, percent } from "../core/format.js";
 import { card, facts, notice } from "../core/parts.js";
-import { canResume, stateChip } from "../campaigns/states.js";
+import { canResume, KINDS, stateChip } from "../campaigns/states.js";
 import { due } from "../campaigns/when.js";
 import { link, resumeButton } from "./acts.js";
 
@@ -17,7 +17,7 @@ export function withoutBench() {
 
 /** `next` is the schedule's next entry, `last` the newest campaign; either may be missing. */
 export function idle(bench, last, next) {
-  return h("div", { class: "columns" },
+  return h("div", { class: "columns", style: "--least: 17rem" },
     card("Nothing runs",
       h("p", {}, bench.unconfirmed ? "No campaign starts before the bench was looked at." : `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`),
       h("div", { class: "row" }, link("Plan a campaign", "/campaigns/new", "first"), link("All campaigns", "/campaigns"))),
@@ -27,7 +27,7 @@ export function idle(bench, last, next) {
     last ? card(`Last: campaign ${last.id}`,
       h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),
       facts([["Ended", last.ended_at ? instant(last.ended_at) : "not", "", last.started_at && last.ended_at ? `took ${duration((Date.parse(last.ended_at) - Date.parse(last.started_at)) / 1000)}` : null], ["Progress", percent(last.progress)]]),
-      last.reason ? notice(last.state === "done" ? "good" : "warn", last.reason) : null,
+      last.reason ? notice(KINDS[last.state] ?? "warn", last.reason) : null,
       h("div", { class: "row" }, Object.entries(last.recordings).map(([serial, recording]) => link(`Explore ${serial}`, `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`)),
         canResume(last) && last.bench === bench.name ? resumeButton(last.id, { whole: true }) : null)) : null);
 }

@@ -2,7 +2,7 @@
 
 import { chip } from "../core/parts.js";
 
-const KINDS = { done: "good", running: "accent", planned: "", paused: "warn", waiting: "warn", interrupted: "warn", aborted: "bad", failed: "bad" };
+export const KINDS = { done: "good", running: "accent", planned: "", paused: "warn", waiting: "warn", interrupted: "warn", aborted: "bad", failed: "bad" };
 const WORDS = { waiting: "waits for a person", planned: "about to begin" };
 
 /** `abandoned`: no process runs it any more, and it has no end. */

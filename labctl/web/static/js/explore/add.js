@@ -60,7 +60,6 @@ export function add(state, path, effects) {
   const element = headed("Add it", null,
     h("div", { class: "columns", style: "--least: 14rem" }, pick, drop, field("A formula of your own", formula, "name: expression over channels")),
     chosen, h("div", { class: "row" }, button("Preview", preview, { kind: "first" })), result);
-  element.id = "add";
   return { element, put: async (effect) => { change.add.add(effect); show(); element.scrollIntoView({ behavior: "smooth", block: "start" }); await preview(); } };
 }
 

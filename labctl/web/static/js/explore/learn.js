@@ -33,7 +33,7 @@ export function verdict(state) {
     ]));
 }
 
-const chance = (p) => (p === null || p === undefined ? null : p < 1e-6 ? "chance below 0.000 001" : `chance ${number(p, 2)}`);
+const chance = (p) => (p === null || p === undefined ? null : p < 1e-6 ? "chance below 10⁻⁶" : `chance ${number(p, 2)}`);
 
 export function learn(state, { onadd, explain }) {
   const { criticism } = state;

@@ -6,6 +6,8 @@ import { levels, rowsOf } from "./rows.js";
 
 const LIMITS = [3, 10];
 const DIMMED_BELOW = 2;
+/** On a phone panels stand below each other, each as high as this, px. */
+const PANEL = 210;
 
 /** The largest residual over floor of several criticisms, within what a scale should end at. */
 export function scaleOf(...all) {
@@ -67,11 +69,13 @@ export function map(name, caption, give, { pickable = true, tall = "22rem" } = {
     const positions = [...new Set(rows.position)];
     const several = positions.length > 1;
     const layout = { margin: { l: 52, r: 8, t: several ? 28 : 10, b: 46 }, dragmode: pickable ? "select" : false };
-    if (several) layout.grid = window.innerWidth < 760 ? { rows: positions.length, columns: 1, pattern: "independent", ygap: 0.35 } : { rows: 1, columns: positions.length, pattern: "independent", xgap: 0.14 };
+    const below = several && window.innerWidth < 760;
+    if (below) layout.height = positions.length * PANEL;
+    if (several) layout.grid = below ? { rows: positions.length, columns: 1, pattern: "independent", ygap: 0.4 } : { rows: 1, columns: positions.length, pattern: "independent", xgap: 0.14 };
     const data = positions.flatMap((position, k) => {
       const id = k ? String(k + 1) : "";
       const { data: traces, x, y } = panel(rows, position, id, limit, pick);
-      layout[`xaxis${id}`] = x;
+      layout[`xaxis${id}`] = below && k < positions.length - 1 ? { ...x, title: undefined } : x; // one title says it for all
       layout[`yaxis${id}`] = y;
       return traces;
     });

@@ -51,9 +51,7 @@ export function watch(state, signal) {
     return h("div", { class: "columns" }, both.map((each, k) => h("div", {}, h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`), each)));
   }
 
-  const element = headed("Watch the error fall", null, place);
-  element.id = "watch";
-  return element;
+  return headed("Watch the error fall", null, place);
 }
 
 function steps(ladder, state) {

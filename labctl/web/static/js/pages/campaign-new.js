@@ -55,7 +55,7 @@ export async function page({ query, signal }) {
   plan();
   return h("div", { class: "page" },
     head("Plan a campaign", bench ? h("span", { class: "row" }, "On bench ", h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null) : "For the simulated bench that fits the recipe best.",
-      h("a", { class: "button first", href: "#begin" }, "To the start")),
+      h("a", { class: "button first", href: "#begin" }, "Begin …")),
     query.recipe && named.name !== query.recipe && !query.toml ? notice("warn", `No recipe ${query.recipe} comes with labctl; ${named.name} is shown. Its text can be pasted under "Your own".`) : null,
     h("div", { class: "planning" },
       h("div", { class: "stack" }, recipes(all, choice, (next) => {

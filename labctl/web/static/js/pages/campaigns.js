@@ -40,7 +40,7 @@ function listed(rows) {
     { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.state !== "running" && row.reason ? h("span", { class: "soft small beside two-lines", title: row.reason }, row.reason) : null] },
     { title: "Progress", cell: (row) => h("div", { class: "progress-cell" }, h("div", { class: "meter", role: "img", "aria-label": percent(row.progress) }, h("i", { style: `width: ${100 * row.progress}%` })), h("span", { class: "small" }, percent(row.progress))) },
     { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, instant(row.started_at)), h("span", { class: "soft small beside nowrap" }, runs(row) ? `ends ${instant(row.expected_end)}` : took(row))] },
-    { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("span", { class: "beside" }, h("a", { href: `/units/${encodeURIComponent(serial)}`, class: "nowrap" }, serial), ", ", h("a", { href: `/recordings/${recording}`, class: "nowrap" }, `recording ${recording}`))) },
+    { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("div", {}, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), h("span", { class: "small beside" }, h("a", { href: `/recordings/${recording}` }, `Recording ${recording}`)))) },
   ], rows, { label: "Every campaign", first: "8rem" });
 }
 

@@ -16,6 +16,9 @@ import { watch } from "../explore/watch.js";
 
 const MODELS = [["bias_scale", "bias and scale factor"], ["ojeda2000", "Ojeda 2000: polynomial in rate and temperature"], ["yang2018", "Yang 2018: matrices over temperature"], ["single_temperature", "one temperature"]];
 
+/** The parts of the page in their order: id in an address, name. */
+const PARTS = [["compare", "Compare"], ["fails", "Fails"], ["learn", "Learn"], ["add", "Add"], ["watch", "Watch"]];
+
 export async function page({ query: asked, signal }) {
   const [units, recordings] = await Promise.all(["/api/units", "/api/recordings"].map((path) => get(path, { signal })));
   if (!units.length) {
@@ -31,6 +34,13 @@ export async function page({ query: asked, signal }) {
   else if (version === undefined) element.append(unfitted(unit, recording));
   else element.append(held({ unit, version, versions, recording, asked, signal }));
   return element;
+}
+
+/** Stays in view: the axis that every picture shows, and the way to each part of a long page. */
+function guide(state, axes) {
+  return h("div", { class: "guide" },
+    axes.length > 1 ? tabs("Axis of the gyro", axes.map((axis) => [axis, `axis ${axis}`]), state.axis, (axis) => state.look(axis)) : null,
+    h("nav", { class: "row tight", "aria-label": "On this page" }, PARTS.map(([id, name]) => h("a", { class: "button quiet tiny", href: `#${id}` }, name))));
 }
 
 /** The newest recording that is no mere beginning: a campaign that runs now has a few data sets only. */
@@ -78,9 +88,9 @@ function held({ unit, version, versions, recording, asked, signal }) {
       const after = inOrder(state, found.residuals, "residual_dps");
       return rowsFor(state).residual.map((before, k) => (after[k] === null ? null : before - after[k]));
     };
-    fill(place, verdict(state),
-      axes.length > 1 ? tabs("Axis of the gyro", axes.map((axis) => [axis, `axis ${axis}`]), state.axis, (axis) => state.look(axis)) : null,
-      compare(state, path, signal), fails(state), learn(state, { onadd: adding.put, explain }), adding.element, watch(state, signal));
+    const parts = [compare(state, path, signal), fails(state), learn(state, { onadd: adding.put, explain }), adding.element, watch(state, signal)];
+    parts.forEach((part, k) => { part.id = PARTS[k][0]; });
+    fill(place, verdict(state), guide(state, axes), parts);
     if (location.hash) document.getElementById(location.hash.slice(1))?.scrollIntoView();
     return place;
   }).catch((error) => error.name !== "AbortError" && fill(place, trouble(error, () => go(location.pathname + location.search))));

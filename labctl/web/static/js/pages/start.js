@@ -4,6 +4,7 @@ import { get, post } from "../core/api.js";
 import { h } from "../core/dom.js";
 import { button, card, head } from "../core/parts.js";
 import { go } from "../core/router.js";
+import { runs } from "../campaigns/states.js";
 
 export async function page({ signal }) {
   const [units, campaigns, benches] = await Promise.all(["/api/units", "/api/campaigns", "/api/benches"].map((path) => get(path, { signal })));
@@ -42,7 +43,7 @@ async function explored(serial, recording, model) {
 }
 
 function overview(units, campaigns, benches) {
-  const running = campaigns.find((campaign) => ["running", "paused", "suspended", "starting"].includes(campaign.state));
+  const running = campaigns.find(runs);
   return h("div", { class: "page" },
     head("labctl", "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall."),
     h("div", { class: "columns", style: "--least: 17rem" },

@@ -2,7 +2,7 @@
 
 import { h } from "../core/dom.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { number, words } from "../core/format.js";
+import { number, unitWords, words } from "../core/format.js";
 import { facts, table } from "../core/parts.js";
 
 const ERRORS = [["rms_dps", "RMS"], ["heldout_rms_dps", "at unseen temperatures"], ["noise_floor_dps", "noise floor"]];
@@ -26,17 +26,28 @@ export function coefficients(first, second) {
 
 const tableOf = (axis) => axis.coefficients?.temperature_c ? axis.coefficients : axis;
 
+/** By what values are multiplied, and the unit they are then in: plain numbers are shares, ppm below 1 %. */
+function scaleOf(values, unit) {
+  if (unit !== "1") return [1, unitWords(unit)];
+  return Math.max(...values.map(Math.abs)) < 0.01 ? [1e6, "ppm"] : [100, "%"];
+}
+
 /** A picture for each coefficient: its value over temperature with expanded uncertainty, an axis of the gyro a colour. */
 function overTemperature(first, second) {
   const names = new Set(Object.values(first.axes).flatMap((axis) => Object.keys(tableOf(axis)).filter((name) => tableOf(axis)[name]?.value)));
   return h("div", { class: "columns", style: "--least: 24rem" }, [...names].map((name) => {
     const unit = Object.values(first.axes).map((axis) => tableOf(axis)[name]?.unit).find(Boolean);
+    const rows = [first, second].filter(Boolean).flatMap((version) => Object.entries(version.axes).filter(([, axis]) => tableOf(axis)[name]?.value).flatMap(([axis, values]) => {
+      const { temperature_c, [name]: { value, u } } = tableOf(values);
+      return value.map((each, k) => [version.version, axis, temperature_c[k], each, u?.[k], unit]);
+    }));
+    const [factor, shown] = scaleOf(rows.map((row) => row[3]), unit);
     const lines = (version, faint) => Object.entries(version?.axes ?? {}).filter(([, axis]) => tableOf(axis)[name]?.value).map(([axis, values]) => {
       const { temperature_c: x, [name]: { value, u } } = tableOf(values);
-      return { type: "scatter", mode: "lines+markers", name: `axis ${axis}${second ? `, v${version.version}` : ""}`, x, y: value, error_y: faint || !u ? undefined : { type: "data", array: u.map((each) => K * each), thickness: 1, width: 2 }, line: { color: axisColour(axis), dash: faint ? "dot" : "solid", width: faint ? 1.2 : 2 }, marker: { size: faint ? 4 : 6 }, opacity: faint ? 0.7 : 1 };
+      return { type: "scatter", mode: "lines+markers", name: `axis ${axis}${second ? `, v${version.version}` : ""}`, x, y: value.map((each) => (each === null ? null : factor * each)), error_y: faint || !u ? undefined : { type: "data", array: u.map((each) => K * factor * each), thickness: 1, width: 2 }, line: { color: axisColour(axis), dash: faint ? "dot" : "solid", width: faint ? 1.2 : 2 }, marker: { size: faint ? 4 : 6 }, opacity: faint ? 0.7 : 1 };
     });
-    const draw = () => ({ data: [...lines(first, false), ...lines(second, true)], layout: { xaxis: { title: { text: "temperature, deg C" } }, yaxis: { title: { text: unit && unit !== "1" ? `${words(name)}, ${unit}` : words(name), font: { color: colour("soft") } } } } });
-    return h("div", {}, h("h3", {}, words(name)), figure(`Coefficient ${words(name)}`, "Bars: expanded uncertainty, k = 2.", draw, { tall: "17rem" }));
+    const draw = () => ({ data: [...lines(first, false), ...lines(second, true)], layout: { xaxis: { title: { text: "temperature, deg C" } }, yaxis: { title: { text: shown ? `${words(name)}, ${shown}` : words(name), font: { color: colour("soft") } } } } });
+    return h("div", {}, h("h3", {}, words(name)), figure(`Coefficient ${words(name)}`, "Bars: expanded uncertainty, k = 2.", draw, { tall: "17rem", csv: () => [["version", "axis", "temperature_c", name, "u", "unit"], ...rows] }));
   }));
 }
 
