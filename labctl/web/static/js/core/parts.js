@@ -23,7 +23,7 @@ export function head(title, line, ...acts) {
 export function facts(rows) {
   return h("dl", { class: "facts" }, rows.filter(Boolean).map(([name, value, unit, beside]) =>
     h("div", { class: "fact" }, h("dt", {}, name),
-      h("dd", {}, value, unit ? h("span", { class: "unit" }, unit) : null, beside ? h("span", { class: "beside" }, beside) : null))));
+      h("dd", {}, value, unit ? [" ", h("span", { class: "unit" }, unit)] : null, beside ? h("span", { class: "beside" }, beside) : null))));
 }
 
 export const chip = (text, kind = "") => h("span", { class: `chip ${kind}` }, text);
