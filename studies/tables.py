@@ -62,6 +62,16 @@ def single(answer: Answer) -> bool:
     return bool(answer["named"]) and (answer["nodes"] == 1 or set(answer["named"]) <= names(answer["named"][0]))
 
 
+def right_first(answer: Answer) -> bool:
+    """Whether what is hidden, or its exact like, is what was named first, as the other tools' claims are counted."""
+    return bool(answer["named"]) and answer["named"][0] in names(truth(answer))
+
+
+def wrong_first(answer: Answer) -> bool:
+    """Whether something else was named first, be it in a group that says that it cannot be told."""
+    return bool(answer["named"]) and not right_first(answer)
+
+
 def right_alone(answer: Answer) -> bool:
     """Whether what is hidden was named, and nothing else but its exact likes."""
     return right_or_group(answer) and single(answer)
@@ -148,8 +158,12 @@ def comparison(cells: Cells) -> str:
     null = cells.of("nothing")
     rows = [
         [f"**labctl**, {what}", share(map(alarm, null)), *cells.each_z("effect", right),
-         *cells.each_z("effect", wrong_claim)]
-        for what, right in (("name or group", right_or_group), ("name alone", right_alone))
+         *cells.each_z("effect", wrong)]
+        for what, right, wrong in (
+            ("name or group", right_or_group, wrong_claim),
+            ("what it names first", right_first, wrong_first),
+            ("name alone", right_alone, wrong_single),
+        )
     ]  # fmt: skip
     for said in map(Said, cells.tools):
         asked = Cells([a for a in cells.answers if "peers" in a])

@@ -61,6 +61,14 @@ def test_silence_is_neither_right_nor_wrong() -> None:
     assert not tables.wrong_claim(silent)
 
 
+def test_what_is_named_first_counts_as_the_other_tools_claims_do() -> None:
+    group = answer(verdict="ambiguous", truth="bias_drift", named=["warm_up", "bias_drift"], nodes=2)
+    assert tables.right_or_group(group)
+    assert tables.wrong_first(group)
+    like = answer(verdict="ambiguous", truth="misalignment", named=["non_orthogonality", "misalignment"])
+    assert tables.right_first(like)
+
+
 def test_a_second_name_beside_the_truth_is_one_too_many_but_its_like_is_not() -> None:
     assert tables.one_too_many(answer(named=["bias_drift", "warm_up"], nodes=2))
     like = answer(verdict="ambiguous", truth="misalignment", named=["misalignment", "non_orthogonality"])

@@ -18,13 +18,17 @@ const icon = (path) => s("svg", { viewBox: "0 0 24 24", fill: "none", stroke: "c
 
 export function shell() {
   const links = PLACES.map(([path, name, drawing]) => h("a", { href: path }, icon(drawing), name));
-  const theme = h("button", { type: "button", class: "button quiet tiny wide", onclick: swap });
-  const keys = h("button", { type: "button", class: "button quiet tiny wide", onclick: () => askKey() });
-  const name = () => {
-    fill(theme, document.documentElement.dataset.theme === "dark" ? "Light colours" : "Dark colours");
-    fill(keys, key() ? "Forget the key" : "Use a key");
+  const [themes, keys] = [[], []];
+  /** The buttons of the theme and the key: in the rail, and on a phone below the page. */
+  const controls = () => {
+    themes.push(h("button", { type: "button", class: "button quiet tiny", onclick: swap }));
+    keys.push(h("button", { type: "button", class: "button quiet tiny", onclick: () => askKey() }));
+    return [themes.at(-1), keys.at(-1)];
   };
-  name();
+  const name = () => {
+    for (const each of themes) fill(each, document.documentElement.dataset.theme === "dark" ? "Light colours" : "Dark colours");
+    for (const each of keys) fill(each, key() ? "Forget the key" : "Use a key");
+  };
 
   function swap() {
     const dark = document.documentElement.dataset.theme !== "dark";
@@ -62,7 +66,9 @@ export function shell() {
     h("div", { class: "rail" },
       h("a", { class: "brand", href: "/" }, h("img", { src: "/static/mark.svg", alt: "" }), "labctl"),
       h("nav", { "aria-label": "Pages" }, links),
-      h("div", { class: "rail-foot" }, theme, keys)),
+      h("div", { class: "rail-foot" }, controls())),
     h("main", { id: "main", tabindex: "-1" }),
+    h("footer", { class: "foot" }, controls()),
     h("div", { class: "toasts", "aria-live": "polite" }));
+  name();
 }
