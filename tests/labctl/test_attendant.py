@@ -15,6 +15,7 @@ from labctl.actor import Actor, acting, actor
 from labctl.cli import attendant
 from labctl.cli.attendant import Attendant
 from labctl.config import os_user
+from labctl.errors import Stopped
 from labctl.services import resuming, running
 from labctl.services.acts import ResumeRequest
 from labctl.services.resuming import resume_here
@@ -109,7 +110,7 @@ def test_answers_and_resumes_at_a_terminal_are_in_the_audit_trail(
             raise KeyboardInterrupt
 
     with acting(Actor("ada", "command line")):
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(Stopped):
             run_here(location, StartRequest(recipe="short"), tired, attend)
         resume_here(location, 1, None, None, ResumeRequest(by="Ada"), None, attend)
     with open_store(location, write=False) as store:
