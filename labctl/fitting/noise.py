@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from labctl.fitting.channels import Array
 
@@ -85,14 +84,6 @@ def whitened(
         expected = expected + (variance / total)[:, None] * surprise
         variance = variance * white[:, row] / total
     return found, log_det
-
-
-def whiten(blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: Array) -> Array:
-    """Return values (m,) or (m, k) with the blocks' correlation taken out."""
-    out = np.empty_like(values)
-    for rows, factor in blocks:
-        out[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
-    return out
 
 
 def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:

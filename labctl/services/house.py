@@ -18,6 +18,7 @@ from labctl.services.answers import CampaignAnswer, EventAnswer, ScheduledAnswer
 from labctl.services.bench_runner import BenchRunner
 from labctl.services.campaigns import ENDED, event_answer, from_rows, looked_after
 from labctl.services.opening import LocalActs
+from labctl.services.running import how_left
 from labctl.services.scheduler import Scheduler
 from labctl.store import Store
 from procedures.shield import told_first
@@ -138,10 +139,9 @@ class House:
 
     def _how_left(self, bench: str) -> str:
         try:
-            unconfirmed = self.store.benches.unconfirmed(bench)
+            return how_left(bench, self.store.benches.unconfirmed(bench))
         except StoreError as error:
             return f"whether bench {bench} is safe cannot be read ({error}); look at it"
-        return f"bench {bench} is NOT confirmed safe: {unconfirmed}" if unconfirmed else f"bench {bench} is safe"
 
     def acts(self) -> ServiceActs:
         """Return who acts on the database."""

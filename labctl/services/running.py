@@ -180,7 +180,7 @@ def run(
     try:
         engine.run(prepared.start_at, prepared.restart)
     except KeyboardInterrupt as interrupt:
-        raise Stopped(_how_left(store, prepared, engine)) from interrupt
+        raise Stopped(_stopped(store, prepared, engine)) from interrupt
     finally:
         with uninterrupted(), closing(prepared.bench):
             if engine.complaints:  # said in its event already, unless that could not be written
@@ -190,15 +190,18 @@ def run(
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
 
 
-def _how_left(store: Store, prepared: Prepared, engine: Engine) -> str:
-    bench = store.campaigns.get(prepared.id).bench_name
-    how = (
-        f"bench {bench} is NOT confirmed safe: {'; '.join(engine.complaints)}; look at it, then "
-        f"`labctl bench clear {bench} --by NAME`"
-        if engine.complaints
-        else f"bench {bench} is safe"
+def how_left(bench: str, unconfirmed: str) -> str:
+    """Say how a bench was left, and what to do where it could not be confirmed safe."""
+    if not unconfirmed:
+        return f"bench {bench} is safe"
+    return (
+        f"bench {bench} is NOT confirmed safe: {unconfirmed}; look at it, then `labctl bench clear {bench} --by NAME`"
     )
-    return f"campaign {prepared.id} was stopped; {how}; `labctl campaign resume {prepared.id}` goes on with it"
+
+
+def _stopped(store: Store, prepared: Prepared, engine: Engine) -> str:
+    left = how_left(store.campaigns.get(prepared.id).bench_name, "; ".join(engine.complaints))
+    return f"campaign {prepared.id} was stopped; {left}; `labctl campaign resume {prepared.id}` goes on with it"
 
 
 def answers_noted(store: Store, prepared: Prepared) -> Callable[[str], None]:

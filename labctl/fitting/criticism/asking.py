@@ -24,7 +24,6 @@ from labctl.fitting.criticism.verdict import (
 )
 from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh_beside
 from labctl.fitting.effects import Effect, Term
-from labctl.fitting.model import ErrorModel
 
 #: How many effects may be found missing one after the other.
 STEPS = 4
@@ -81,7 +80,7 @@ def _one_by_one(
     while (cause := _cause(weighed, step)) is not None and len(causes) < STEPS:
         causes.append(cause)
         before = (weighed, step)
-        weighed, step = _judged(weigh_beside(first, _with(first.model, causes), catalogue), catalogue, first=False)
+        weighed, step = _asked_beside(first, causes, catalogue)
         known = {name for cause in causes for name in cause.group}
         if known & set(step.group) or _is_shape_error(*before, weighed, step):
             break
@@ -96,13 +95,15 @@ def _cause(weighed: Weighed, step: Step) -> Cause | None:
     return Cause(step.group, refined(weighed, leader), leader.log_bf)
 
 
-def _with(model: ErrorModel, causes: Sequence[Cause]) -> ErrorModel:
-    return model.with_terms((*model.terms, *(replace(cause.term, steady=True) for cause in causes)))
+def _asked_beside(first: Weighed, causes: Sequence[Cause], catalogue: Mapping[str, Effect]) -> tuple[Weighed, Step]:
+    """Return everything weighed and judged once more, beside causes that were found."""
+    terms = (*first.model.terms, *(replace(cause.term, steady=True) for cause in causes))
+    return _judged(weigh_beside(first, first.model.with_terms(terms), catalogue), catalogue, first=False)
 
 
 def _beside(first: Weighed, causes: Sequence[Cause], catalogue: Mapping[str, Effect]) -> Cause | None:
     """Return what is found missing beside other causes; None where nothing is that has a name."""
-    return _cause(*_judged(weigh_beside(first, _with(first.model, causes), catalogue), catalogue, first=False))
+    return _cause(*_asked_beside(first, causes, catalogue))
 
 
 def _settled(first: Weighed, causes: Sequence[Cause], catalogue: Mapping[str, Effect]) -> list[Cause]:
@@ -188,5 +189,5 @@ def _pair(first: Weighed, begun: Weighed, catalogue: Mapping[str, Effect]) -> li
     if best is None or smooth is None or best[0].log_bf + best[1].log_bf < smooth.log_bf + LEAD:
         return []
     best = _settled(first, best, catalogue)
-    _, step = _judged(weigh_beside(first, _with(first.model, best), catalogue), catalogue, first=False)
+    _, step = _asked_beside(first, best, catalogue)
     return best if step.form == "adequate" else []

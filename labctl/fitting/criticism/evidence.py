@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 
 from labctl.fitting.channels import Array
 from labctl.fitting.criticism.candidates import Option
-from labctl.fitting.criticism.noise_grid import Noise, factors
+from labctl.fitting.criticism.noise_grid import Noise, factors, whiten
 
 #: Directions of an option that the base leaves less of than this (squared share) are taken as the base's.
 LEAST_LEFT = 1e-4
@@ -115,16 +115,10 @@ class Base:
     def __init__(self, design: Design, white_var: Array, noise: Noise) -> None:
         self.noise = noise
         self._blocks, self._log_det = factors(noise, white_var, design.t_s, design.run)
-        self._means = self._whitened(design.base[0])
-
-    def _whitened(self, means: NDArray[np.float64]) -> NDArray[np.float64]:
-        found = np.empty_like(means)
-        for which, factor in self._blocks:
-            found[which] = solve_triangular(factor, means[which], lower=True, check_finite=False)
-        return found
+        self._means = whiten(self._blocks, design.base[0])
 
     def _left(self, means: NDArray[np.float64], others: Others) -> _Left:
-        whitened = self._whitened(means)
+        whitened = whiten(self._blocks, means)
         crossed = self._means.T @ whitened + others.crossed
         of_base = self._means.T @ self._means + others.of_base
         log_det = self._log_det

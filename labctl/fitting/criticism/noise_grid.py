@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky
+from scipy.linalg import cholesky, solve_triangular
 
 from labctl.fitting.channels import Array
 
@@ -88,3 +88,13 @@ def factors(
         blocks.append((rows, factor))
         log_determinant += 2.0 * float(np.log(np.diag(factor)).sum())
     return blocks, log_determinant
+
+
+def whiten(
+    blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return values (m,) or (m, k) with the correlation taken out whose factors these are."""
+    found = np.empty_like(values)
+    for rows, factor in blocks:
+        found[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
+    return found

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from labctl.fitting.channels import Array
 from labctl.fitting.criticism.compress import Compressed
-from labctl.fitting.criticism.noise_grid import correlation, factors
+from labctl.fitting.criticism.noise_grid import correlation, factors, whiten
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.criticism.weigh import Weighed
-from labctl.fitting.noise import whiten
 
 #: Of a 95 % band, in standard deviations.
 BAND = 1.96
