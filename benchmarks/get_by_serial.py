@@ -5,8 +5,6 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
-import subprocess
-import sys
 import tempfile
 import time
 from datetime import UTC, datetime
@@ -16,6 +14,7 @@ import numpy as np
 import sqlalchemy as sa
 
 from benchmarks.machine import describe
+from benchmarks.served import serve
 from labctl.store import open_store, tables
 
 UNITS = 100_000
@@ -91,16 +90,9 @@ def run() -> dict[str, float | str]:
     with tempfile.TemporaryDirectory() as folder:
         location = Path(folder) / "lab.sqlite"
         fill(location)
-        command = [sys.executable, "-m", "labctl", "serve", "--port", "0", "--json", "--database", str(location)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service:
-            assert service.stdout is not None
-            try:
-                url = next(line for line in service.stdout if '"url"' in line).split('"')[3]
-                port = int(url.rsplit(":", 1)[1])
-                asyncio.run(load(port))
-                times = asyncio.run(load(port))
-            finally:
-                service.terminate()
+        with serve(location) as service:
+            asyncio.run(load(service.port))
+            times = asyncio.run(load(service.port))
     p50, p99 = np.percentile(times, [50, 99])
     return {**describe("fastapi", "uvicorn", "sqlalchemy"), "requests_per_s": float(PER_S),
             "p50_ms": float(p50), "p99_ms": float(p99), "max_ms": float(times.max())}  # fmt: skip

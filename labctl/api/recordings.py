@@ -48,9 +48,13 @@ def all_recordings(house: HouseOf) -> list[RecordingAnswer]:
 
 
 @router.get("/{recording}", summary="One recording")
-def recording(recording: int, house: HouseOf) -> dict[str, Any]:
+def recording(
+    recording: int,
+    house: HouseOf,
+    points: Annotated[bool, Query(description="With the means of its data sets.")] = True,
+) -> dict[str, Any]:
     """What the recording is: unit, axes, channels, data sets."""
-    return services.describe_recording(house.store, recording)
+    return services.describe_recording(house.store, recording, points=points)
 
 
 @router.get("/{recording}/datasets", summary="Its data sets")

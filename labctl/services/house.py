@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import AsyncIterator
 from importlib.metadata import version
 from pathlib import Path
@@ -16,17 +15,14 @@ from labctl.services import scheduling
 from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.answers import CampaignAnswer, EventAnswer, ScheduledAnswer
 from labctl.services.bench_runner import BenchRunner
-from labctl.services.campaigns import ENDED, event_answer, from_rows, looked_after
+from labctl.services.campaigns import from_rows, looked_after
+from labctl.services.following import Followers
 from labctl.services.opening import LocalActs
 from labctl.services.running import how_left
 from labctl.services.scheduler import Scheduler
 from labctl.store import Store
 from procedures.shield import told_first
 
-#: An open event stream says that it is alive after this long without an event.
-HEARTBEAT_S = 10.0
-#: What changes all the time, as a unit's output does, is looked at this often.
-LIVE_S = 1.0
 NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`"
 
 
@@ -95,6 +91,7 @@ class House:
         self.clock = clock
         self._runner = runner
         self.scheduler = None if runner is None else Scheduler(store, clock, runner, runner.bench.name)
+        self._followers = Followers(store, self.status, None if runner is None else runner.listen)
         self._opened_at = clock.utc()
         self._stops = self._closed = False
         self.left = ""  #: once it is closed: how the bench was left
@@ -172,50 +169,9 @@ class House:
         """Return every campaign, newest first."""
         return [self.status(row.id) for row in self.store.campaigns.all()]
 
-    async def follow(self, campaign: int, after: int) -> AsyncIterator[EventAnswer | CampaignAnswer | None]:
-        """Yield a campaign's events after number `after`, where it stands whenever that has changed, and None to show
-        that the stream lives, until the campaign ends.
-
-        Whoever reads slowly gets the newest picture next, never a queue of old ones; the bench only rings a bell.
-        """
-        bell = asyncio.Event()
-        loop = asyncio.get_running_loop()
-        shown: CampaignAnswer | None = None
-
-        def ring() -> None:
-            if not bell.is_set():
-                loop.call_soon_threadsafe(bell.set)
-
-        stop = self._runner.listen(ring) if self._runner is not None else None
-        try:
-            while True:
-                bell.clear()
-                # from the database, not the live picture: the last event is written before the state there ends
-                state = (await asyncio.to_thread(self.store.campaigns.get, campaign)).state
-                for row in await asyncio.to_thread(self.store.campaigns.events, campaign, after):
-                    after = row.id
-                    yield event_answer(row)
-                now = await asyncio.to_thread(self.status, campaign)
-                if now != shown:
-                    shown = now
-                    yield now
-                if state in ENDED or (self._stops and not self._runs(campaign)):
-                    return
-                async for live in self._meanwhile(campaign, bell):
-                    if live is None or live != shown:
-                        shown = live or shown
-                        yield live
-        finally:
-            if stop is not None:
-                stop()
-
-    async def _meanwhile(self, campaign: int, bell: asyncio.Event) -> AsyncIterator[CampaignAnswer | None]:
-        """Yield where a campaign stands until the bell rings, or until it is time to show that the stream lives."""
-        for _ in range(round(HEARTBEAT_S / LIVE_S)):
-            if await _rings(bell):
-                return
-            yield await asyncio.to_thread(self.status, campaign)
-        yield None
+    def follow(self, campaign: int, after: int) -> AsyncIterator[EventAnswer | CampaignAnswer | None]:
+        """Tell where a campaign is, as `Followers.follow` does, until it ends or this service does."""
+        return self._followers.follow(campaign, after, over=lambda: self._stops and not self._runs(campaign))
 
     def pulse(self) -> dict[str, Any]:
         """Return what anybody may know: that the service lives, and which."""
@@ -242,12 +198,3 @@ class House:
             "labctl_campaigns_failed": float(states.count("failed")),
             "labctl_campaign_running": float(self._runner is not None and self._runner.busy),
         }
-
-
-async def _rings(bell: asyncio.Event) -> bool:
-    """Wait a moment for the bell; returns whether it rang."""
-    try:
-        await asyncio.wait_for(bell.wait(), LIVE_S)
-    except TimeoutError:
-        return False
-    return True

@@ -95,11 +95,10 @@ def _measured(row: RecordingRow) -> bool:
     return row.kind != "samples" or row.datasets > 0
 
 
-def describe_recording(store: Store, recording: int) -> dict[str, Any]:
-    """Return what a recording is, and its data sets with their means."""
+def describe_recording(store: Store, recording: int, *, points: bool = True) -> dict[str, Any]:
+    """Return what a recording is and, if asked for, the means of its data sets."""
     row = store.recordings.get(recording)
-    points = store.recordings.points(recording)
-    return {
+    about = {
         "id": row.id,
         "serial": row.serial,
         "campaign": row.campaign,
@@ -108,8 +107,11 @@ def describe_recording(store: Store, recording: int) -> dict[str, Any]:
         "created_at": row.created_at.isoformat(),
         "datasets": row.datasets,
         "readings": row.readings,
-        "points": {name: np.asarray(values).tolist() for name, values in points.columns.items()},
     }
+    if not points:
+        return about
+    columns = store.recordings.points(recording).columns
+    return {**about, "points": {name: np.asarray(values).tolist() for name, values in columns.items()}}
 
 
 def dataset_samples(store: Store, recording: int, dataset: int, limit: int) -> dict[str, Any]:

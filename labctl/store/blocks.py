@@ -144,4 +144,6 @@ def _restore(head: list[Any], residue: NDArray[Any] | None, n: int) -> NDArray[A
     assert residue is not None
     if kind == "f":
         return residue.copy()
-    return residue.astype(np.uint64).view(np.int64) + np.int64(head[3])
+    if residue.itemsize < np.dtype(np.int64).itemsize:
+        return np.add(residue, np.int64(head[3]), dtype=np.int64)
+    return residue.astype(np.uint64).view(np.int64) + np.int64(head[3])  # may go beyond 2**63 and come back

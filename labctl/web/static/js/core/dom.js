@@ -32,3 +32,12 @@ export function fill(element, ...children) {
 let numbers = 0;
 /** A name for a label and its field that nothing else on the page has. */
 export const fresh = (stem) => `${stem}-${++numbers}`;
+
+/** Do something once, when an element comes near the window. */
+export function near(element, act) {
+  new IntersectionObserver((entries, observer) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    observer.disconnect();
+    act();
+  }, { rootMargin: "300px" }).observe(element);
+}

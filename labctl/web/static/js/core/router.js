@@ -51,6 +51,7 @@ export async function show() {
     const element = await module.page({ params: found?.params ?? {}, query: query(), signal });
     if (signal.aborted) return;
     main.replaceChildren(element);
+    performance.mark("labctl:page"); // for the browser's own profiler, and benchmarks
     const heading = element.querySelector("h1");
     document.title = heading ? `${heading.textContent} · labctl` : "labctl";
     if (moved && (document.activeElement === document.body || main.contains(document.activeElement))) main.focus({ preventScroll: true });

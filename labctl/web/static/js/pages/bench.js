@@ -2,7 +2,6 @@
 
 import { get } from "../core/api.js";
 import { h } from "../core/dom.js";
-import { plotly } from "../core/figure.js";
 import { instant } from "../core/format.js";
 import { chip, head, notice } from "../core/parts.js";
 import { show } from "../core/router.js";
@@ -15,7 +14,6 @@ const LOOK_MS = 5000;
 const AFTER_END_MS = 1500;
 
 export async function page({ signal }) {
-  plotly(); // loads while the service answers
   const [benches, states, campaigns, schedule] = await Promise.all(["/api/benches", "/api/benches/status", "/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })));
   const bench = benches[0];
   if (!bench) return h("div", { class: "page" }, head("Bench"), withoutBench());

@@ -2,7 +2,6 @@
 
 import { get, post } from "../core/api.js";
 import { fill, h } from "../core/dom.js";
-import { plotly } from "../core/figure.js";
 import { count, duration } from "../core/format.js";
 import { busy, card, chip, facts, head, notice } from "../core/parts.js";
 import { remember } from "../core/router.js";
@@ -13,7 +12,6 @@ import { recipes } from "../campaigns/recipes.js";
 import { visibility } from "../campaigns/visibility.js";
 
 export async function page({ query, signal }) {
-  plotly(); // loads while the service answers
   const [all, benches, catalogue] = await Promise.all(["/api/recipes", "/api/benches", "/api/effects"].map((path) => get(path, { signal })));
   const bench = benches[0] ?? null;
   const named = all.find((each) => each.name === query.recipe) ?? quickest(all);

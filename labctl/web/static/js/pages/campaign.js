@@ -2,7 +2,6 @@
 
 import { get } from "../core/api.js";
 import { fill, h } from "../core/dom.js";
-import { plotly } from "../core/figure.js";
 import { count, duration, instant, percent } from "../core/format.js";
 import { card, chip, facts, head, headed, notice, tabs } from "../core/parts.js";
 import { go, remember, show as showAgain } from "../core/router.js";
@@ -18,7 +17,6 @@ const MOST = 200;
 const PLAN_AGAIN_MS = 2500;
 
 export async function page({ params, query, signal }) {
-  plotly(); // loads while the service answers
   const path = `/api/campaigns/${encodeURIComponent(params.id)}`;
   let [now, plan, benches] = await Promise.all([get(path, { signal }), get(`${path}/plan`, { signal }), get("/api/benches", { signal })]);
   const here = benches[0]?.name === now.bench;

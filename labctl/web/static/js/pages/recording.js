@@ -2,7 +2,6 @@
 
 import { download, get } from "../core/api.js";
 import { h } from "../core/dom.js";
-import { plotly } from "../core/figure.js";
 import { count, day, number, setting } from "../core/format.js";
 import { button, card, facts, head, notice } from "../core/parts.js";
 import { remember } from "../core/router.js";
@@ -16,9 +15,8 @@ import { trace } from "../recordings/trace.js";
 const AGREED = { samples: "every reading", points: "one mean per data set", coefficients: "a published table, no readings" };
 
 export async function page({ params, query, signal }) {
-  plotly(); // loads while the service answers
   const path = `/api/recordings/${encodeURIComponent(params.id)}`;
-  const [about, sets] = await Promise.all([get(path, { signal }), get(`${path}/datasets`, { signal })]);
+  const [about, sets] = await Promise.all([get(path, { query: { points: false }, signal }), get(`${path}/datasets`, { signal })]);
   const { info } = about;
   const number_ = (text) => (text && Number.isFinite(Number(text)) ? Number(text) : null);
   const state = { id: about.id, kind: about.kind, sets, output: info.output ?? {}, channel: query.channel ?? `gyro_${info.axes[0]}`, from: number_(query.from), until: number_(query.until), dataset: number_(query.dataset) };

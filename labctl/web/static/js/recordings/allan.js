@@ -1,7 +1,7 @@
 // Noise at rest: the Allan deviation of each axis, and N, B, K with what they mean and why one may be missing.
 
 import { get, Problem } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h, near } from "../core/dom.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
 import { headed, later, notice, table, tabs } from "../core/parts.js";
@@ -12,8 +12,9 @@ const FIGURES = [["N", "angle random walk"], ["B", "bias instability"], ["K", "r
 export function allan(state, signal) {
   const place = h("div", { class: "stack" });
   const which = h("div", {});
-  let own = false;
+  let [own, seen] = [false, false];
   const show = () => {
+    if (!seen) return; // the readings at rest are not read for a page that nobody scrolls down
     fill(which, state.dataset ? tabs("Of what", [["rest", "longest stretch at rest"], ["set", `data set ${state.dataset}`]], own ? "set" : "rest", (value) => {
       own = value === "set";
       show();
@@ -28,8 +29,12 @@ export function allan(state, signal) {
       }
     });
   };
-  show();
-  return Object.assign(headed("Noise at rest", which, place), { redraw: show });
+  const element = headed("Noise at rest", which, place);
+  near(element, () => {
+    seen = true;
+    show();
+  });
+  return Object.assign(element, { redraw: show });
 }
 
 function shown(found) {

@@ -1,0 +1,69 @@
+"""Debian's chromium as a person has it: while a page loads no debugger listens, which makes large scripts slower."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import httpx
+from playwright.sync_api import sync_playwright
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+ARGUMENTS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
+    "--remote-debugging-port=0", "--window-size=1280,860",
+)  # fmt: skip
+PATIENCE_S = 30.0
+
+
+@contextmanager
+def chromium() -> Iterator[str]:
+    """Start a browser with nothing kept; yields the address of its control."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        words = [shutil.which("chromium") or "chromium", *ARGUMENTS, f"--user-data-dir={folder}", "about:blank"]
+        with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
+            try:
+                told = Path(folder) / "DevToolsActivePort"
+                _until(lambda: told.exists() and bool(told.read_text().strip()))
+                yield f"http://127.0.0.1:{told.read_text().split()[0]}"
+            finally:
+                browser.terminate()
+
+
+def version(control: str) -> str:
+    """Return which browser it is."""
+    return str(httpx.get(f"{control}/json/version").json()["Browser"])
+
+
+@contextmanager
+def opened(control: str, url: str, settled_s: float = 4.0) -> Iterator[Page]:
+    """Open an address in a tab of its own and leave it alone for a time; only then look at it."""
+    httpx.put(f"{control}/json/new?{url}").raise_for_status()
+    time.sleep(settled_s)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.connect_over_cdp(control)
+        page = next(page for page in browser.contexts[0].pages if page.url.startswith(url))
+        yield page
+        page.close()
+
+
+def marked_s(page: Page, mark: str) -> float:
+    """Return when a page first marked something in its time line, s since it was asked for."""
+    times: list[float] = page.evaluate("mark => performance.getEntriesByName(mark).map(entry => entry.startTime)", mark)
+    return min(times) / 1e3
+
+
+def _until(holds: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not holds():
+        if time.monotonic() > end:
+            raise TimeoutError("chromium does not start")
+        time.sleep(0.05)

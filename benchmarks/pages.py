@@ -1,0 +1,111 @@
+"""The pages in a browser: first view of each, a map of 630 data sets after a pick, a trace of 4.7 million readings."""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import httpx
+
+from benchmarks.browser import chromium, marked_s, opened, version
+from benchmarks.machine import describe
+from benchmarks.served import serve
+from labctl.services.running import StartRequest, run_here
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+#: Limits that the project has set itself.
+LIMITS = {"first_view_s": 2.0, "redraw_after_pick_ms": 200.0, "trace_s": 1.0}
+RUNS = 5
+#: Pages, and what they mark when they are seen: the page itself or, where it is about one, its first picture.
+VIEWS = {
+    "bench": ("/bench", "labctl:page"),
+    "campaigns": ("/campaigns", "labctl:page"),
+    "campaign": ("/campaigns/1", "labctl:picture"),
+    "unit": ("/units/{serial}", "labctl:picture"),
+    "explore": ("/explore?unit={serial}", "labctl:picture"),
+    "recordings": ("/recordings", "labctl:page"),
+    "recording": ("/recordings/{recording}", "labctl:picture"),
+    "effects": ("/effects", "labctl:page"),
+}
+#: Note when the mouse was pressed last, and when the last picture after it was drawn.
+WATCH = """() => {
+  addEventListener("mousedown", () => { window.pressed = performance.now(); performance.clearMarks(); }, true);
+}"""
+SINCE_PRESSED = """() => {
+  const drawn = performance.getEntriesByName("labctl:picture").map((entry) => entry.startTime - window.pressed);
+  return { first: Math.min(...drawn), last: Math.max(...drawn), pictures: drawn.length };
+}"""
+SETTLED_MS = 1500
+
+
+def run() -> dict[str, float | str]:
+    """Measure over loopback: first views in a browser with nothing kept, the rest as one goes on from there."""
+    with tempfile.TemporaryDirectory() as folder:
+        location = Path(folder) / "lab.sqlite"
+        serial, recording = next(
+            iter(run_here(str(location), StartRequest(recipe="table1-x-table2")).recordings.items())
+        )
+        with serve(location) as service, chromium() as control:
+            calibrations = f"{service.url}/api/units/{serial}/calibrations"
+            httpx.post(calibrations, json={"model": "yang2018"}, timeout=120).raise_for_status()
+            httpx.get(f"{calibrations}/1/criticism", timeout=120).raise_for_status()  # it has been held before
+            figures = {
+                **_trace(control, f"{service.url}/recordings", recording),
+                **_pick(control, f"{service.url}/explore?unit={serial}"),
+                **_first_views(service.url, serial, recording),
+            }
+            browser = version(control)
+    return {**describe("plotly", "fastapi", "uvicorn", "sqlalchemy"), "browser": browser, **figures}
+
+
+def _first_views(home: str, serial: str, recording: int) -> dict[str, float]:
+    """Return the seconds from asking for each page until it is seen; medians, each time in a new browser."""
+    found = {}
+    for name, (path, mark) in VIEWS.items():
+        url = home + path.format(serial=serial, recording=recording)
+        times = []
+        for _ in range(RUNS):
+            with chromium() as control, opened(control, url) as page:
+                times.append(marked_s(page, mark))
+        found[f"first_view_{name}_s"] = statistics.median(times)
+    return found
+
+
+def _trace(control: str, url: str, recording: int) -> dict[str, float]:
+    """Open a recording from the list of all: the first time ever, and again."""
+    with opened(control, url) as page:
+        page.evaluate(WATCH)
+        times = []
+        for _ in range(1 + RUNS):
+            page.locator(f"main a[href='/recordings/{recording}']").first.click()
+            page.wait_for_timeout(SETTLED_MS)
+            times.append(page.evaluate(SINCE_PRESSED)["first"] / 1e3)
+            page.go_back()
+            page.wait_for_timeout(SETTLED_MS)
+    return {"trace_first_s": times[0], "trace_again_s": statistics.median(times[1:])}
+
+
+def _pick(control: str, url: str) -> dict[str, float]:
+    """Press cells of the map; returns how soon the first and all pictures that show the pick are drawn again, ms."""
+    with opened(control, url) as page:
+        plot = page.get_by_role("region", name="See where it fails").locator(".plot").first
+        plot.scroll_into_view_if_needed()
+        page.wait_for_timeout(SETTLED_MS)
+        page.evaluate(WATCH)
+        found = [_pressed(page, plot.bounding_box() or {}, k) for k in range(RUNS)]
+    return {
+        "redraw_after_pick_ms": statistics.median(each["first"] for each in found),
+        "all_redrawn_after_pick_ms": statistics.median(each["last"] for each in found),
+        "pictures_redrawn": float(found[-1]["pictures"]),
+    }
+
+
+def _pressed(page: Page, box: dict[str, float], k: int) -> dict[str, float]:
+    page.mouse.click(box["x"] + (0.1 + 0.04 * k) * box["width"], box["y"] + 0.4 * box["height"])
+    page.wait_for_timeout(SETTLED_MS)
+    times: dict[str, float] = page.evaluate(SINCE_PRESSED)
+    return times

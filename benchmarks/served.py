@@ -1,0 +1,43 @@
+"""A service as a person starts it, in a process of its own, for the benchmarks that ask it something."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+TICKS_PER_S = 100
+
+
+@dataclass(frozen=True)
+class Served:
+    """A running `labctl serve`."""
+
+    url: str
+    process: int
+
+    @property
+    def port(self) -> int:
+        """Where it listens, on loopback."""
+        return int(self.url.rsplit(":", 1)[1])
+
+    def processor_s(self) -> float:
+        """Return the processor time it has taken since its start, s."""
+        fields = Path(f"/proc/{self.process}/stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
+
+
+@contextmanager
+def serve(database: Path, *options: str) -> Iterator[Served]:
+    """Serve a database until the block ends."""
+    words = ["serve", "--port", "0", "--json", "--database", str(database), *options]
+    with subprocess.Popen([sys.executable, "-m", "labctl", *words], stdout=subprocess.PIPE, text=True) as service:
+        assert service.stdout is not None
+        try:
+            url = next(line for line in service.stdout if '"url"' in line).split('"')[3]
+            yield Served(url, service.pid)
+        finally:
+            service.terminate()

@@ -1,0 +1,103 @@
+"""Onlookers of one campaign: looked up once for all, never an old picture after the bell, each told everything."""
+
+from __future__ import annotations
+
+import asyncio
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from labctl.services.following import Followers, Glances
+
+
+def test_a_moment_is_looked_up_once_for_all_who_ask() -> None:
+    asked: list[str] = []
+
+    async def crowd() -> list[int]:
+        glances = Glances()
+        return await asyncio.gather(*(glances.at("it", lambda: asked.append("it") or 7) for _ in range(50)))
+
+    assert asyncio.run(crowd()) == [7] * 50
+    assert len(asked) <= 2  # two where the moment ends in between
+
+
+def test_after_the_bell_everybody_looks_anew() -> None:
+    state = ["running"]
+
+    async def two() -> tuple[str, str]:
+        glances = Glances()
+        before = await glances.at("it", lambda: state[0])
+        state[0] = "done"
+        glances.ring()
+        return before, await glances.at("it", lambda: state[0])
+
+    assert asyncio.run(two()) == ("running", "done")
+
+
+def test_one_who_leaves_takes_nothing_from_the_others() -> None:
+    async def leaving() -> int:
+        glances, may = Glances(), asyncio.Event()
+        loop = asyncio.get_running_loop()
+
+        def look() -> int:
+            asyncio.run_coroutine_threadsafe(may.wait(), loop).result()
+            return 7
+
+        first = asyncio.create_task(glances.at("it", look))
+        second = asyncio.create_task(glances.at("it", look))
+        await asyncio.sleep(0)
+        first.cancel()
+        may.set()
+        return await second
+
+    assert asyncio.run(leaving()) == 7
+
+
+def test_what_cannot_be_read_is_said_to_everybody() -> None:
+    def look() -> int:
+        raise OSError("no disk")
+
+    async def both() -> list[Any]:
+        glances = Glances()
+        return await asyncio.gather(glances.at("it", look), glances.at("it", look), return_exceptions=True)
+
+    assert [str(each) for each in asyncio.run(both())] == ["no disk", "no disk"]
+
+
+@pytest.mark.parametrize("onlookers", [1, 30])
+def test_the_store_is_read_as_often_for_many_as_for_one(onlookers: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("labctl.services.following.FRESH_S", 1e9)  # only the bell ends a moment here
+    monkeypatch.setattr("labctl.services.following.event_answer", lambda row: row)
+    rows = [SimpleNamespace(id=1)]
+    state, reads, bells = ["running"], [], []
+
+    def events(campaign: int, after: int) -> list[Any]:
+        reads.append(campaign)
+        return [row for row in rows if row.id > after]
+
+    campaigns = SimpleNamespace(get=lambda campaign: SimpleNamespace(state=state[0]), events=events)
+    store: Any = SimpleNamespace(campaigns=campaigns)
+
+    def listen(bell: Any) -> Any:
+        bells.append(bell)
+        return lambda: bells.remove(bell)
+
+    async def watched() -> list[list[int]]:
+        followers = Followers(store, lambda campaign: (campaign, state[0]), listen)  # type: ignore[arg-type,return-value]
+
+        async def one() -> list[int]:
+            return [told.id async for told in followers.follow(1, 0, lambda: False) if hasattr(told, "id")]
+
+        looking = [asyncio.create_task(one()) for _ in range(onlookers)]
+        while not reads:
+            await asyncio.sleep(0)
+        rows.append(SimpleNamespace(id=2))
+        state[0] = "done"
+        for bell in bells:
+            bell()
+        return await asyncio.gather(*looking)
+
+    assert asyncio.run(watched()) == [[1, 2]] * onlookers
+    assert len(reads) == 2
+    assert len(bells) == 1  # that of the followers as a whole: nobody who left is still rung for
