@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from labctl.services.following import Followers, Glances
+
+
+def in_a_loop(work: Coroutine[Any, Any, Any]) -> Any:
+    """Run in a thread of its own: a browser that drives other tests keeps a loop in this one."""
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(asyncio.run, work).result()
 
 
 def test_a_moment_is_looked_up_once_for_all_who_ask() -> None:
@@ -18,7 +26,7 @@ def test_a_moment_is_looked_up_once_for_all_who_ask() -> None:
         glances = Glances()
         return await asyncio.gather(*(glances.at("it", lambda: asked.append("it") or 7) for _ in range(50)))
 
-    assert asyncio.run(crowd()) == [7] * 50
+    assert in_a_loop(crowd()) == [7] * 50
     assert len(asked) <= 2  # two where the moment ends in between
 
 
@@ -32,7 +40,7 @@ def test_after_the_bell_everybody_looks_anew() -> None:
         glances.ring()
         return before, await glances.at("it", lambda: state[0])
 
-    assert asyncio.run(two()) == ("running", "done")
+    assert in_a_loop(two()) == ("running", "done")
 
 
 def test_one_who_leaves_takes_nothing_from_the_others() -> None:
@@ -51,7 +59,7 @@ def test_one_who_leaves_takes_nothing_from_the_others() -> None:
         may.set()
         return await second
 
-    assert asyncio.run(leaving()) == 7
+    assert in_a_loop(leaving()) == 7
 
 
 def test_what_cannot_be_read_is_said_to_everybody() -> None:
@@ -62,7 +70,7 @@ def test_what_cannot_be_read_is_said_to_everybody() -> None:
         glances = Glances()
         return await asyncio.gather(glances.at("it", look), glances.at("it", look), return_exceptions=True)
 
-    assert [str(each) for each in asyncio.run(both())] == ["no disk", "no disk"]
+    assert [str(each) for each in in_a_loop(both())] == ["no disk", "no disk"]
 
 
 @pytest.mark.parametrize("onlookers", [1, 30])
@@ -98,6 +106,6 @@ def test_the_store_is_read_as_often_for_many_as_for_one(onlookers: int, monkeypa
             bell()
         return await asyncio.gather(*looking)
 
-    assert asyncio.run(watched()) == [[1, 2]] * onlookers
+    assert in_a_loop(watched()) == [[1, 2]] * onlookers
     assert len(reads) == 2
     assert len(bells) == 1  # that of the followers as a whole: nobody who left is still rung for
