@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,14 +11,10 @@ import pytest
 
 from labctl.services.following import Followers, Glances
 
-
-def in_a_loop(work: Coroutine[Any, Any, Any]) -> Any:
-    """Run in a thread of its own: a browser that drives other tests keeps a loop in this one."""
-    with ThreadPoolExecutor(1) as thread:
-        return thread.submit(asyncio.run, work).result()
+Loop = Callable[[Any], Any]
 
 
-def test_a_moment_is_looked_up_once_for_all_who_ask() -> None:
+def test_a_moment_is_looked_up_once_for_all_who_ask(in_a_loop: Loop) -> None:
     asked: list[str] = []
 
     async def crowd() -> list[int]:
@@ -30,7 +25,7 @@ def test_a_moment_is_looked_up_once_for_all_who_ask() -> None:
     assert len(asked) <= 2  # two where the moment ends in between
 
 
-def test_after_the_bell_everybody_looks_anew() -> None:
+def test_after_the_bell_everybody_looks_anew(in_a_loop: Loop) -> None:
     state = ["running"]
 
     async def two() -> tuple[str, str]:
@@ -43,7 +38,7 @@ def test_after_the_bell_everybody_looks_anew() -> None:
     assert in_a_loop(two()) == ("running", "done")
 
 
-def test_one_who_leaves_takes_nothing_from_the_others() -> None:
+def test_one_who_leaves_takes_nothing_from_the_others(in_a_loop: Loop) -> None:
     async def leaving() -> int:
         glances, may = Glances(), asyncio.Event()
         loop = asyncio.get_running_loop()
@@ -62,7 +57,7 @@ def test_one_who_leaves_takes_nothing_from_the_others() -> None:
     assert in_a_loop(leaving()) == 7
 
 
-def test_what_cannot_be_read_is_said_to_everybody() -> None:
+def test_what_cannot_be_read_is_said_to_everybody(in_a_loop: Loop) -> None:
     def look() -> int:
         raise OSError("no disk")
 
@@ -74,7 +69,9 @@ def test_what_cannot_be_read_is_said_to_everybody() -> None:
 
 
 @pytest.mark.parametrize("onlookers", [1, 30])
-def test_the_store_is_read_as_often_for_many_as_for_one(onlookers: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_store_is_read_as_often_for_many_as_for_one(
+    onlookers: int, monkeypatch: pytest.MonkeyPatch, in_a_loop: Loop
+) -> None:
     monkeypatch.setattr("labctl.services.following.FRESH_S", 1e9)  # only the bell ends a moment here
     monkeypatch.setattr("labctl.services.following.event_answer", lambda row: row)
     rows = [SimpleNamespace(id=1)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -252,7 +251,9 @@ def test_calibrations_can_be_asked_for_by_head(loopback: Ask) -> None:
         assert answer.status_code in {400, 404}, path
 
 
-def test_the_service_tells_its_manager(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_service_tells_its_manager(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, in_a_loop: Callable[..., Any]
+) -> None:
     import socket
 
     from labctl.api import watchdog
@@ -268,7 +269,7 @@ def test_the_service_tells_its_manager(monkeypatch: pytest.MonkeyPatch, tmp_path
         store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
         with TestClient(create_app(House(store, CLOCK))):
             assert manager.recv(100) == b"READY=1"
-            asyncio.run(watchdog.alive())
+            in_a_loop(watchdog.alive())
             assert manager.recv(100) == b"WATCHDOG=1"
         assert manager.recv(100).startswith(b"STOPPING=1\nWATCHDOG_USEC=")
     monkeypatch.setenv("WATCHDOG_USEC", "60000000")
