@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from instruments.clock import SystemClock
 from labctl.services import running
 from procedures.operator import PersonOperator
 from tests.web.conftest import Faults, Service
@@ -111,3 +112,25 @@ def test_a_service_without_a_bench_says_how_to_start_one(tmp_path: Path, chromiu
         page.close()
     finally:
         serving.stop()
+
+
+def test_a_bench_that_was_not_confirmed_safe_is_told_and_cleared_by_a_person(
+    service: Service, visit: Callable[..., Page]
+) -> None:
+    from playwright.sync_api import expect
+
+    start(service)
+    service.post("/api/campaigns/1/abort", {"reason": "enough", "by": "Ann"})
+    store, bench = service.house.store, "single-axis-sim"
+    store.benches.mark(bench, "the chamber did not answer: its set point is not known", SystemClock().utc())
+    page = visit("/bench")
+    told = page.get_by_text(f"Bench {bench} was not confirmed safe")
+    expect(told).to_be_visible()
+    expect(page.locator("main")).to_contain_text("the chamber did not answer")
+    expect(page.get_by_role("region", name="Nothing runs")).to_contain_text("No campaign starts before")
+    page.get_by_role("button", name="I have looked, it is safe").click()
+    asked = page.get_by_role("dialog")
+    asked.get_by_label("Your name").fill("Ann")
+    asked.get_by_role("button", name="It is safe", exact=True).click()
+    expect(told).to_have_count(0)
+    assert store.benches.unconfirmed(bench) == ""
