@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -32,9 +33,11 @@ class Served:
 
 @contextmanager
 def serve(database: Path, *options: str) -> Iterator[Served]:
-    """Serve a database until the block ends."""
+    """Serve a database until the block ends; answers are kept beside it, so that the first is a first."""
     words = ["serve", "--port", "0", "--json", "--database", str(database), *options]
-    with subprocess.Popen([sys.executable, "-m", "labctl", *words], stdout=subprocess.PIPE, text=True) as service:
+    kept = {**os.environ, "XDG_CACHE_HOME": str(database.parent / "cache")}
+    command = [sys.executable, "-m", "labctl", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=kept) as service:
         assert service.stdout is not None
         try:
             url = next(line for line in service.stdout if '"url"' in line).split('"')[3]
