@@ -12,10 +12,17 @@ from labctl.fitting.effects import read_formula
 from labctl.services import calibrations as services
 from labctl.services import criticism as criticism_services
 from labctl.services.acts import CertifyRequest, FitRequest, ImproveRequest
-from labctl.services.answers import CalibrationRow, Certified, CriticismAnswer, FitAnswer, LadderAnswer, VersionAnswer
+from labctl.services.answers import (
+    CalibrationRow,
+    Certified,
+    CriticismAnswer,
+    FitAnswer,
+    LadderAnswer,
+    ResidualsAnswer,
+    VersionAnswer,
+)
 from labctl.services.improving import PreviewAnswer, preview_unit
 from labctl.services.pictures import PictureAnswer, pictures_unit
-from labctl.services.residuals import ResidualsAnswer
 from labctl.services.surfaces import SurfaceAnswer, surface_of
 from labctl.services.uncertainty import UncertaintyAnswer, uncertainty_at
 

@@ -39,7 +39,7 @@ def check(
 def status(as_json: Json = False, database: Database = None) -> None:
     """Say which benches were not confirmed safe when their last campaign ended."""
     from labctl.services.benches import bench_statuses
-    from labctl.services.opening import open_reading
+    from labctl.services.reading import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         benches = bench_statuses(store)

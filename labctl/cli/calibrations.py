@@ -150,7 +150,7 @@ def calibration(
 ) -> None:
     """Print a calibration as a file to load elsewhere."""
     from labctl.services.calibrations import calibration_file
-    from labctl.services.opening import open_reading
+    from labctl.services.reading import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         content = calibration_file(store, serial, version, format_).content

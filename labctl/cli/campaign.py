@@ -171,7 +171,7 @@ def print_campaign(answer: CampaignAnswer) -> None:
 def list_(as_json: Json = False, database: Database = None) -> None:
     """List all campaigns, newest first."""
     from labctl.services.campaigns import list_campaigns
-    from labctl.services.opening import open_reading
+    from labctl.services.reading import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         answers = list_campaigns(store)
@@ -198,7 +198,8 @@ def status(campaign: CampaignId = None, as_json: Json = False, database: Databas
 def look(database: str | None, campaign: int | None) -> CampaignAnswer:
     """Return where a campaign is; without a number the newest."""
     from labctl.services.campaigns import campaign_status
-    from labctl.services.opening import open_reading, service_url
+    from labctl.services.opening import service_url
+    from labctl.services.reading import open_reading
 
     with open_reading(database) as store:
         answer = campaign_status(store, campaign)

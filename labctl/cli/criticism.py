@@ -13,6 +13,7 @@ from labctl.cli.options import Database, Json, RecordingId, Serial
 from labctl.cli.output import console, figure, print_json, table
 
 if TYPE_CHECKING:
+    from labctl.fitting.effects import Formula
     from labctl.services.answers import CriticismAnswer, FitAnswer, LadderAnswer
 
 VersionOption = Annotated[int | None, typer.Option("--version", metavar="N", help="Version; default: the newest.")]
@@ -39,11 +40,11 @@ def criticise(
     database: Database = None,
 ) -> None:
     """Hold a version against a recording: what is left, where, and which effect may be missing."""
-    from labctl.services.criticism import criticise_unit, with_files, write_next
-    from labctl.services.opening import open_reading
+    from labctl.services.criticism import criticise_unit, write_next
+    from labctl.services.reading import open_reading
 
     with one_clear_line(), open_reading(database) as store:
-        answer = criticise_unit(store, serial, version, recording, with_files(formula or []))
+        answer = criticise_unit(store, serial, version, recording, written(formula))
         if next_recipe is not None:
             write_next(answer, next_recipe)
         if report is not None:
@@ -56,6 +57,15 @@ def criticise(
         print_criticism(answer)
     if answer.verdict == "insufficient_data":
         raise typer.Exit(1)
+
+
+def written(sources: list[str] | None) -> list[Formula]:
+    """Return the formulas of a command line. Raises BadInput."""
+    if not sources:
+        return []
+    from labctl.services.formulas import with_files
+
+    return with_files(sources)
 
 
 def print_criticism(answer: CriticismAnswer) -> None:
@@ -141,7 +151,7 @@ def improve(
 ) -> None:
     """Change a version's effects and fit again: a new version, with the error before and after."""
     from labctl.services.acts import ImproveRequest
-    from labctl.services.criticism import as_lines
+    from labctl.services.formulas import as_lines
     from labctl.services.opening import open_acts
 
     def names(given: list[str] | None) -> list[str]:
@@ -182,7 +192,7 @@ def print_improvement(answer: FitAnswer) -> None:
 def ladder(serial: Serial, as_json: Json = False, database: Database = None) -> None:
     """Show the error, version by version, down to the noise floor."""
     from labctl.services.criticism import ladder as ladder_of
-    from labctl.services.opening import open_reading
+    from labctl.services.reading import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         answer = ladder_of(store, serial)

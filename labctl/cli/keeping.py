@@ -44,7 +44,7 @@ def key_create(
 def key_list(as_json: Json = False, database: Database = None) -> None:
     """List every key that was made, by name; the keys themselves are kept nowhere."""
     from labctl.services.keys import list_keys
-    from labctl.services.opening import open_reading
+    from labctl.services.reading import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         answers = list_keys(store)
@@ -80,7 +80,7 @@ def audit_list(
 ) -> None:
     """List who did what, when and why."""
     from labctl.services.audit import AuditAnswer, list_audit
-    from labctl.services.opening import open_reading
+    from labctl.services.reading import open_reading
 
     answers: list[AuditAnswer] = []
     with one_clear_line(), open_reading(database) as store:
@@ -108,7 +108,7 @@ def audit_verify(
 ) -> None:
     """Find the first row that was changed, moved, or follows a missing one."""
     from labctl.services.audit import verify_audit
-    from labctl.services.opening import open_reading
+    from labctl.services.reading import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         answer = verify_audit(store, anchor)

@@ -43,7 +43,7 @@ def export_recording(
     database: Database = None,
 ) -> None:
     """Write a recording in the interchange format: every reading, as it was measured."""
-    from labctl.services.opening import open_reading
+    from labctl.services.reading import open_reading
     from labctl.services.recordings import export_recording as export
 
     with one_clear_line(), open_reading(database) as store:

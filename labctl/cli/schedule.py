@@ -59,7 +59,8 @@ def list_(
     database: Database = None,
 ) -> None:
     """List what begins when, next first."""
-    from labctl.services.opening import open_reading, service_url
+    from labctl.services.opening import service_url
+    from labctl.services.reading import open_reading
     from labctl.services.scheduling import list_starts
 
     with one_clear_line(), open_reading(database) as store:
@@ -84,7 +85,7 @@ def list_(
 @app.command("show")
 def show(start: StartId, as_json: Json = False, database: Database = None) -> None:
     """Say when an entry begins next and what became of each start that fell due."""
-    from labctl.services.opening import open_reading
+    from labctl.services.reading import open_reading
     from labctl.services.scheduling import start_status
 
     with one_clear_line(), open_reading(database) as store:

@@ -83,6 +83,36 @@ class CriticismAnswer(Answer):
     )
 
 
+class ResidualColumns(Answer):
+    """One row per data set and axis, as lists of equal length. A data set far longer than the others is in pieces."""
+
+    dataset: list[int] = Field(default_factory=list)
+    axis: list[str] = Field(default_factory=list)
+    position: list[str] = Field(default_factory=list)
+    run: list[int] = Field(default_factory=list)
+    table_rate_dps: list[float] = Field(default_factory=list)
+    own_rate_dps: list[float] = Field(
+        default_factory=list, description="True rate along the axis itself, the Earth's included where it is known."
+    )
+    temperature_c: list[float] = Field(default_factory=list)
+    t_s: list[float | None] = Field(default_factory=list)
+    n: list[int | None] = Field(default_factory=list, description="Readings behind the data set; null: not known.")
+    measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
+    modelled_error_dps: list[float] = Field(default_factory=list)
+    residual_dps: list[float] = Field(default_factory=list, description="Measured minus modelled error.")
+    floor_dps: list[float | None] = Field(default_factory=list, description="What noise alone leaves of this mean.")
+    over_floor: list[float | None] = Field(default_factory=list, description="Residual over floor, as in the map.")
+
+
+class ResidualsAnswer(Answer):
+    """What a version leaves of a recording."""
+
+    serial: str
+    version: int
+    recording: int
+    columns: ResidualColumns
+
+
 class LadderRow(Answer):
     """One version of a unit's calibration, with its errors."""
 

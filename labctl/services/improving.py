@@ -24,11 +24,12 @@ from labctl.fitting.presets import changed
 from labctl.fitting.threads import single_threaded
 from labctl.recording import Recording
 from labctl.services.acts import ImproveRequest
-from labctl.services.answers import Answer, ErrorFigures, FitAnswer, ModelAnswer, Validity
-from labctl.services.criticism import model_of, readings_of, version_of
+from labctl.services.answers import Answer, ErrorFigures, FitAnswer, ModelAnswer, ResidualColumns, Validity
+from labctl.services.criticism import version_of
+from labctl.services.judging import model_of, readings_of
 from labctl.services.kept import kept
 from labctl.services.recordings import newest_recording
-from labctl.services.residuals import ResidualColumns, residual_columns
+from labctl.services.residuals import residual_columns
 from labctl.store import CalibrationRecord, NewCalibration, Store
 
 

@@ -152,10 +152,3 @@ def open_acts(database: str | None) -> Iterator[Acts]:
         return
     with open_store(location, write=True) as store:
         yield LocalActs(store, SystemClock())
-
-
-@contextmanager
-def open_reading(database: str | None) -> Iterator[Store]:
-    """Give the store to read from, also while another process writes."""
-    with open_store(database or default_database(), write=False) as store:
-        yield store

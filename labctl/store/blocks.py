@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import blosc2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -83,6 +82,8 @@ def _compress(stack: NDArray[Any], effort: int) -> bytes:
         return b""
     if effort == 0:
         return stack.tobytes()
+    import blosc2  # noqa: PLC0415  0.1 s that only readings need
+
     packed: bytes = blosc2.compress2(
         np.ascontiguousarray(stack),
         codec=blosc2.Codec.ZSTD,
@@ -95,6 +96,8 @@ def _compress(stack: NDArray[Any], effort: int) -> bytes:
 
 
 def _decompress(data: bytes) -> bytes:
+    import blosc2  # noqa: PLC0415  as above
+
     return bytes(blosc2.decompress2(data, nthreads=1)) if data else b""
 
 
