@@ -21,7 +21,7 @@ export function visibility(rows) {
     h("p", { class: "soft small" }, "Beside each: the smallest size that is just detectable, in the effect's unit. ppm: millionths, of the rate or of the full effect."),
     unseen.length ? table([
       { title: "Could not be found", cell: effect },
-      { title: "Why, and what would show it", cell: (row) => (row.why === "channel" ? `needs ${row.needs.map(words).join(", ")}, which is not logged` : [h("span", {}, "this schedule does not part it from the rest"), row.experiment ? h("span", { class: "soft small beside" }, `Try: ${row.experiment}`) : null]) },
+      { title: "Why, and what would show it", prose: true, cell: (row) => (row.why === "channel" ? `needs ${row.needs.map(words).join(", ")}, which is not logged` : [h("span", {}, "this schedule does not part it from the rest"), row.experiment ? h("span", { class: "soft small beside" }, `Try: ${row.experiment}`) : null]) },
     ], unseen, { label: "Effects this plan could not find" }) : notice("good", "Nothing of the catalogue stays hidden from it."),
     fitted.length ? h("p", { class: "soft small" }, "In the usual model already: ", fitted.flatMap((row, k) => (k ? [", ", effect(row)] : [effect(row)])), ".") : null,
   ];

@@ -33,14 +33,14 @@ export const notice = (kind, ...children) => h("div", { class: `notice ${kind}`,
 export const empty = (...children) => h("div", { class: "empty stack" }, ...children);
 export const busy = (text) => h("p", { class: "busy soft", role: "status" }, text);
 
-/** A table: columns are {title, number?, cell(row)}. On a phone its rows become cards, unless they are `dense`. */
+/** A table: columns are {title, number?, prose?, cell(row)}. On a phone its rows become cards, unless they are `dense`. */
 export function table(columns, rows, { label, selected, onrow, first, dense } = {}) {
   return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": label },
     h("table", { class: dense ? "data" : "data cards", style: first ? `--first: ${first}` : null },
       h("thead", {}, h("tr", {}, columns.map((c) => h("th", { class: c.number ? "number" : null, scope: "col" }, c.title)))),
       h("tbody", {}, rows.map((row) =>
         h("tr", { "aria-selected": selected?.(row) ? "true" : null, onclick: onrow ? () => onrow(row) : null },
-          columns.map((c) => h("td", { class: c.number ? "number" : null, "data-title": typeof c.title === "string" && c.title ? c.title : null }, h("div", {}, c.cell(row)))))))));
+          columns.map((c) => h("td", { class: c.number ? "number" : c.prose ? "prose" : null, "data-title": typeof c.title === "string" && c.title ? c.title : null }, h("div", {}, c.cell(row)))))))));
 }
 
 /** Labelled select: options are [value, text]. */

@@ -97,7 +97,7 @@ function acts(history) {
     { title: "When", cell: (act) => instant(act.at) },
     { title: "What", cell: (act) => `${act.act} version ${act.version}` },
     { title: "Who", cell: (act) => act.by },
-    { title: "Why", cell: (act) => act.reason },
+    { title: "Why", prose: true, cell: (act) => act.reason },
   ], history, { label: "Certifications" });
 }
 
