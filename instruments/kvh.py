@@ -167,8 +167,8 @@ class KvhLines:
         deadline = self._clock.now_s() + SILENCE_S
         while self._clock.now_s() < deadline:
             self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
-            found = self._decode(self._take())
-            if len(found):
+            data = self._take()
+            if data and len(found := self._decode(data)):
                 self._last_line_s = self._clock.now_s()
                 newest = slice(len(found) - 1, len(found))
                 return Readings(
@@ -185,7 +185,8 @@ class KvhLines:
     def _take(self) -> bytes:
         port = self._opened()
         try:
-            return bytes(port.read(port.in_waiting))
+            waiting = port.in_waiting
+            return bytes(port.read(waiting)) if waiting else b""
         except (serial.SerialException, OSError) as error:
             self._lose(error)
             raise

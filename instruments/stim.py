@@ -137,8 +137,8 @@ class Stim300:
         deadline = self._clock.now_s() + START_WITHIN_S
         while self._clock.now_s() < deadline:
             self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
-            found = self._decode(self._take())
-            if len(found):
+            data = self._take()
+            if data and len(found := self._decode(data)):
                 self._last_frame_s = self._clock.now_s()
                 newest = slice(len(found) - 1, len(found))
                 return Readings(
@@ -159,7 +159,8 @@ class Stim300:
     def _take(self) -> bytes:
         port = self._opened()
         try:
-            return bytes(port.read(port.in_waiting))
+            waiting = port.in_waiting
+            return bytes(port.read(waiting)) if waiting else b""
         except (serial.SerialException, OSError) as error:
             self._lose(error)
             raise
