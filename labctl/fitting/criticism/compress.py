@@ -207,7 +207,9 @@ def _from_samples(recording: Recording, outliers: bool) -> Compressed:
     there = padded.there
     for axis in axes if outliers else ():
         there = there * _inside(outputs[axis], padded.there)
-    basis, present = _basis(there, since, angle)
+    # The steps' lines need a turn, from wherever: both of their waves are taken out.
+    turned = angle if angle is not None else np.deg2rad(padded.of(numbers["table_rate_dps"])) * since
+    basis, present = _basis(there, since, turned, angle)
     count = np.maximum(there.sum(axis=1), 1.0)
     basis /= np.sqrt(count)[None, :, None]
     nodes, weights = _nodes(recording, numbers, texts, padded, there, since, basis)
@@ -236,13 +238,16 @@ def _inside(values: NDArray[np.float64], there: NDArray[np.float64]) -> NDArray[
 
 
 def _basis(
-    there: NDArray[np.float64], since: NDArray[np.float64], angle: NDArray[np.float64] | None
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return orthonormal functions, (R, m, n), and which exist in which data set, (R, m)."""
+    there: NDArray[np.float64], since: NDArray[np.float64], turned: NDArray[np.float64],
+    angle: NDArray[np.float64] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:  # fmt: skip
+    """Return orthonormal functions, (R, m, n), and which exist in which data set, (R, m).
+
+    `turned` is how far the table turned, `angle` where it stands, where that was recorded, rad.
+    """
     wanted = [there, since, np.exp(-since / START_TAU_S)]
-    lines: list[NDArray[np.float64]] = []
+    lines = [wave(k * turned) for k in STEP_LINES for wave in (np.cos, np.sin)]
     if angle is not None:
-        lines = [wave(k * angle) for k in STEP_LINES for wave in (np.cos, np.sin)]
         wanted += [wave(k * angle) for k in WAVES for wave in (np.cos, np.sin)]
     functions = [*lines, *wanted]
     found = np.zeros((len(functions), *there.shape))

@@ -20,6 +20,8 @@ from labctl.fitting.model import ErrorModel
 #: From this evidence on, the scatter of the coordinates is estimated again without what the leader explains.
 SECOND_LOOK = 6.0
 ROBUST = 1.4826
+#: A formula of which the base leaves less than this has nothing of its own.
+LEAST_APART = 1e-5
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,10 @@ def design_of(data: Compressed, model: ErrorModel, axis: str, catalogue: Mapping
         t_s = data.at_sets(np.asarray(nodes["t_s"], dtype=np.float64))
     run = data.at_sets(np.asarray(nodes["run"] if "run" in nodes else np.ones(len(nodes)), dtype=np.float64))
     level = level_of(base, data)
-    options = [centred(option, level) for option in options_of(data, axis, model.reference, catalogue)]
+    options = [
+        apart(centred(option, level), base[:, :, precision == 0])
+        for option in options_of(data, axis, model.reference, catalogue)
+    ]
     return Design(base, precision, options, data.present, t_s, np.rint(run).astype(np.int64))
 
 
@@ -89,6 +94,19 @@ def centred(option: Option, level: NDArray[np.float64] | None) -> Option:
     if level is None:
         return option
     return replace(option, rows=option.rows - level[:, :, None] * option.rows[0].mean(axis=0))
+
+
+def apart(option: Option, base: NDArray[np.float64]) -> Option:
+    """Return a person's formula without what the base (R, m, k) has of it; other options as they are.
+
+    Nobody writes a formula so that it is small at the middle of what was measured: of `supply_v * table_rate_dps` all
+    but a hundredth is scale factor, and that hundredth is what was meant. What is the base's altogether stays.
+    """
+    if option.term is None or not option.term.formula or base.shape[2] == 0:
+        return option
+    taken, *_ = np.linalg.lstsq(base[0], option.rows[0], rcond=1e-9)
+    rows = option.rows - base @ taken
+    return replace(option, rows=rows) if np.linalg.norm(rows) > LEAST_APART * np.linalg.norm(option.rows) else option
 
 
 def weigh(
