@@ -17,6 +17,7 @@ from instruments.clock import Clock, sleep_until
 from instruments.errors import Garbled, LimitError, LinkError, NoReply, Refused, WrongInstrument
 from instruments.ports import Ports
 from instruments.table import Spin, TableLimits
+from instruments.wires import BROKEN
 
 REPLY_S = 1.0
 HOME_S = 120.0
@@ -209,13 +210,13 @@ class ArrickC4:
             return
         try:
             self._open().reset_input_buffer()
-        except (serial.SerialException, OSError) as error:
+        except BROKEN as error:
             self._lose(error)
 
     def _send(self, command: str) -> None:
         try:
             self._open().write((command + self.settings.terminator).encode("ascii"))
-        except (serial.SerialException, OSError) as error:
+        except BROKEN as error:
             self._lose(error)
 
     def _lose(self, error: Exception) -> None:
@@ -239,7 +240,7 @@ class ArrickC4:
                         self.name,
                         f"{self.settings.port} gave no answer in {timeout_s:.1f} s; check power, cable and baud rate",
                     )
-        except (serial.SerialException, OSError) as error:
+        except BROKEN as error:
             self._lose(error)
             raise
 

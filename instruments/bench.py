@@ -111,6 +111,15 @@ class BenchFile(Strict):
     gyros: tuple[GyroSettings, ...] = Field(min_length=1)
     simulation: SimulationSettings | None = None
 
+    @model_validator(mode="after")
+    def _every_unit_is_one(self) -> BenchFile:
+        """Two units under one name or number would be taken for one, and their readings for its."""
+        for what in ("name", "serial", "port"):
+            given = [value for unit in self.gyros if (value := getattr(unit, what)) is not None]
+            if twice := next((value for value in given if given.count(value) > 1), None):
+                raise ValueError(f"two gyros have the {what} {twice!r}; each needs its own")
+        return self
+
     @property
     def is_simulated(self) -> bool:
         """Whether every instrument is reached by sim://."""

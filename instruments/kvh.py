@@ -15,6 +15,7 @@ from instruments.errors import LimitError, LinkError, NoReply
 from instruments.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.ports import Ports
 from instruments.stream_time import FRESH_PERIODS, StreamTime
+from instruments.wires import BROKEN
 
 SILENCE_S = 2.0
 EMPTY_EVERY_S = 1.0
@@ -110,7 +111,7 @@ class KvhLines:
         try:
             if self.format.start_command:
                 self._port.write(self.format.start_command.encode() * 3)  # there is no read-back: sent three times
-        except (serial.SerialException, OSError) as error:
+        except BROKEN as error:
             self._lose(error)
         self._time = None
         self._drop()
@@ -119,7 +120,7 @@ class KvhLines:
     def _drop(self) -> None:
         try:
             self._opened().reset_input_buffer()
-        except (serial.SerialException, OSError) as error:
+        except BROKEN as error:
             self._lose(error)
         self._rest, self._in_line = b"", False
         if self._time is not None:
@@ -187,7 +188,7 @@ class KvhLines:
         try:
             waiting = port.in_waiting
             return bytes(port.read(waiting)) if waiting else b""
-        except (serial.SerialException, OSError) as error:
+        except BROKEN as error:
             self._lose(error)
             raise
 

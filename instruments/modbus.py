@@ -20,6 +20,7 @@ from pymodbus.pdu import ModbusPDU
 from instruments.clock import Clock, sleep_until
 from instruments.errors import Garbled, InstrumentError, LimitError, LinkError, NoReply, Refused
 from instruments.modbus_registers import Register, WordOrder
+from instruments.wires import BROKEN
 
 if TYPE_CHECKING:
     from instruments.simulators.device import SimulatedDevice
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 Client = ModbusTcpClient | ModbusSerialClient
+LOST: tuple[type[Exception], ...] = (ConnectionException, *BROKEN)
 #: How long to wait before each further try. A late reply of the failed try arrives meanwhile, and is thrown away.
 RETRY_PAUSES_S = (0.1, 1.0)
 TRIES = 1 + len(RETRY_PAUSES_S)
@@ -214,7 +216,7 @@ class Registers:
         try:
             client = self._connected()
             answer = ask(client)
-        except (ConnectionException, OSError) as error:
+        except LOST as error:
             text = f"cannot {what}, the link is gone ({error}); check cable and power"
             raise LinkError(self._device, text) from error
         except (ModbusException, *UNDECODABLE) as error:

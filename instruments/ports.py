@@ -17,11 +17,13 @@ from instruments.bench import BenchFile
 from instruments.clock import Clock
 from instruments.errors import LinkError
 from instruments.simulators.device import SimulatedDevice
+from instruments.wires import BROKEN
 
 if TYPE_CHECKING:
     from instruments.simulators.faults import Faults
 
 SIMULATED = "sim://"
+NOT_OPENED: tuple[type[Exception], ...] = (*BROKEN, ValueError)
 
 
 class Simulation(Protocol):
@@ -77,7 +79,7 @@ class Ports:
         try:
             wall_s = self.clock.wall_s(timeout_s)
             return serial.serial_for_url(url, baudrate=baudrate, timeout=wall_s, write_timeout=wall_s, exclusive=True)
-        except (serial.SerialException, OSError, ValueError) as error:
+        except NOT_OPENED as error:
             raise LinkError(
                 device, f"port {url} cannot be opened ({error}); check the cable, the port's name and who else uses it"
             ) from error

@@ -16,6 +16,7 @@ from instruments.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.ports import Ports
 from instruments.stim_frames import LAYOUTS, Layout, int16, int24, scan
 from instruments.stream_time import FRESH_PERIODS, StreamTime
+from instruments.wires import BROKEN
 
 AXES = ("x", "y", "z")
 RATE_PER_LSB = 2.0**-14
@@ -92,7 +93,7 @@ class Stim300:
     def _drop(self) -> None:
         try:
             self._opened().reset_input_buffer()
-        except (serial.SerialException, OSError) as error:
+        except BROKEN as error:
             self._lose(error)
         self._rest, self._counter = b"", None
         if self._time is not None:
@@ -161,7 +162,7 @@ class Stim300:
         try:
             waiting = port.in_waiting
             return bytes(port.read(waiting)) if waiting else b""
-        except (serial.SerialException, OSError) as error:
+        except BROKEN as error:
             self._lose(error)
             raise
 

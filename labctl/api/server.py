@@ -51,6 +51,11 @@ def open_house(request: ServeRequest, url: str | None) -> House:
         runner = None
         if name is not None:
             bench = load_bench(name)
+            if request.simulate and not bench.is_simulated:
+                raise BadInput(
+                    f"--simulate with --bench {name}: that bench has real instruments, and they would move; leave "
+                    "--simulate out, or name a bench of sim:// addresses"
+                )
 
             def make_clock() -> Clock:
                 own_pace = request.speed == 0 or not bench.is_simulated

@@ -66,6 +66,7 @@ class BenchRunner:
         self._left = False  #: a campaign was left half done here, and nobody has taken it up yet
         self._unsaid: _Unsaid | None = None
         self._stops = False
+        self.used = False  #: whether anything was asked of the bench here
         self._listeners: list[Callable[[], None]] = []
 
     @property
@@ -121,6 +122,7 @@ class BenchRunner:
         job = _Job(self._store.campaigns.get(prepared.id), prepared.operator, control)
         job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
         self._job = job
+        self.used = True
         if self._stops:  # while the bench was being opened
             control.abort(STOPS)
         job.thread.start()
@@ -171,6 +173,7 @@ class BenchRunner:
             except (LabctlError, InstrumentError) as error:
                 why_not = f"not taken up: {error}"
             with self._guard:  # whatever hinders the campaign, its last process may have left the bench as it was
+                self.used = True
                 leave_safe(self._store, self._bench, self._make_clock())
             self._store.campaigns.close_unfinished(row.id, why_not, self._make_clock().utc())
         self._left = False

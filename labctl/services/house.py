@@ -131,12 +131,14 @@ class House:
             self.scheduler.close()
         if self._runner is not None:
             self._runner.close()
-            self.left = self._how_left(self._runner.bench.name)
+            self.left = self._how_left(self._runner)
         self.store.close()
 
-    def _how_left(self, bench: str) -> str:
+    def _how_left(self, runner: BenchRunner) -> str:
+        bench = runner.bench.name
         try:
-            return how_left(bench, self.store.benches.unconfirmed(bench))
+            unconfirmed = self.store.benches.unconfirmed(bench)
+            return how_left(bench, unconfirmed) if runner.used or unconfirmed else f"bench {bench} was not used"
         except StoreError as error:
             return f"whether bench {bench} is safe cannot be read ({error}); look at it"
 

@@ -88,7 +88,17 @@ class Formula(Effect):
             return channels.rate_dps(axis)
         if name == "temperature_c":
             return channels.temperature_c(axis)
-        return np.asarray(channels[name], dtype=np.float64)
+        if name not in channels:
+            if name == "table_rate_dps" and len(channels.rates) == 1:  # in use there is no table: what turns is the unit
+                return channels.rate_dps(axis)
+            raise BadInput(
+                f"formula {self.name!r}: there is no column {name!r} here; the rate along the gyro's own axis is "
+                f"{OWN_RATE}"
+            )
+        values = channels[name]
+        if values.dtype.kind not in "fiub":
+            raise BadInput(f"formula {self.name!r}: column {name!r} holds text ({values[0]!s}), not numbers")
+        return np.asarray(values, dtype=np.float64)
 
 
 def _parsed(name: str, text: str) -> ast.Expression:

@@ -1,0 +1,49 @@
+"""A cable that goes away under an open port: one error that names the device, whatever the library lets out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from instruments.arrick import ArrickC4
+from instruments.bench import GyroSettings, TableSettings
+from instruments.clock import VirtualClock
+from instruments.errors import LinkError
+from instruments.kvh import KvhDsp3000
+from instruments.ports import Ports
+from instruments.stim import Stim300
+
+
+def stim(port: str, clock: VirtualClock) -> Callable[[], Any]:
+    unit = Stim300(
+        GyroSettings(name="mems", driver="stim300", port=port, serial="S-1", max_rate_dps=400.0), Ports(clock), clock
+    )
+    unit.start()
+    return unit.glance
+
+
+def kvh(port: str, clock: VirtualClock) -> Callable[[], Any]:
+    settings = GyroSettings(name="fog", driver="kvh-dsp3000", port=port, serial="F-1", max_rate_dps=100.0)
+    unit = KvhDsp3000(settings, Ports(clock), clock)
+    unit.start()
+    return unit.glance
+
+
+def table(port: str, clock: VirtualClock) -> Callable[[], Any]:
+    settings = TableSettings(port=port, max_rate_dps=100.0, acceleration_dps2=50.0)
+    found = ArrickC4(settings, Ports(clock), clock)
+    found._open()
+    return found._fresh
+
+
+@pytest.mark.parametrize("instrument", [stim, kvh, table])
+def test_a_cable_that_goes_away_is_a_broken_link(instrument: Callable[..., Callable[[], Any]]) -> None:
+    ours, theirs = os.openpty()
+    look = instrument(os.ttyname(theirs), VirtualClock())
+    os.close(theirs)
+    os.close(ours)
+    with pytest.raises(LinkError, match=r"the link /dev/pts/\d+ broke"):
+        look()
