@@ -12,12 +12,14 @@ import pytest
 import sqlalchemy as sa
 
 from instruments.bench import BenchFile
-from instruments.clock import VirtualClock
+from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
-from labctl.errors import BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
+from labctl.api.server import ServeRequest, open_house
+from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
 from labctl.services import bench_runner, resuming
 from labctl.services.acts import CampaignRequest
 from labctl.services.bench_runner import BenchRunner
+from labctl.services.house import House
 from labctl.services.opening import LocalActs
 from labctl.services.planning import load_bench
 from labctl.services.recordings import newest_recording
@@ -242,3 +244,15 @@ def test_an_interrupt_waits_for_the_end_of_a_write_and_is_not_lost_when_that_fai
     with pytest.raises(KeyboardInterrupt):
         interrupted_write(reached, error)
     assert reached == ["the end"]
+
+
+def test_a_bench_that_was_not_used_is_not_called_safe(store: Store) -> None:
+    house = House(store, SystemClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
+    house.close()
+    assert house.left == "bench single-axis-sim was not used"
+
+
+def test_simulate_never_takes_a_real_bench(tmp_path: Path) -> None:
+    asked = ServeRequest(bench="example-real", simulate=True, database=str(tmp_path / "lab.sqlite"))
+    with pytest.raises(BadInput, match="--simulate with --bench example-real: that bench has real instruments"):
+        open_house(asked, None)
