@@ -70,8 +70,9 @@ def written(sources: list[str] | None) -> list[Formula]:
 
 def print_criticism(answer: CriticismAnswer) -> None:
     """Print a criticism for a person: the verdict, the errors, a small map, then the table."""
+    whole = not console.is_terminal  # a program that reads lines gets each sentence on one
     for line in answer.text:
-        console.print(line, style="bold" if line is answer.text[0] else None, markup=False)
+        console.print(line, style="bold" if line is answer.text[0] else None, markup=False, soft_wrap=whole)
     error = answer.error
     console.print(
         f"{answer.serial} version {answer.version}, recording {answer.recording}: "
@@ -98,11 +99,23 @@ def print_criticism(answer: CriticismAnswer) -> None:
             f"({experiment['hours']:.0f} h, {100 * experiment['power']:.0f} % sure to)",
             markup=False,
         )
-    if answer.not_testable:
-        hidden = [f"{line['effect']}" for line in answer.not_testable]
-        console.print(f"this recording cannot say anything about: {', '.join(hidden)}", style="dim", markup=False)
+    for why in _not_testable(answer):
+        console.print(why, style="dim", markup=False, soft_wrap=whole)
     if answer.named:
-        console.print(f"next: labctl improve {answer.serial} --add {answer.named[0]}", style="dim", markup=False)
+        fitted = {each["effect"] for each in answer.suspects if each["rms_after_dps"] is not None}
+        first = next((name for name in answer.named if name in fitted), answer.named[0])
+        console.print(f"next: labctl improve {answer.serial} --add {first}", style="dim", markup=False)
+
+
+def _not_testable(answer: CriticismAnswer) -> list[str]:
+    """Return what a recording says nothing of: what its schedule hides, and what is for want of a channel."""
+    hidden = [line["effect"] for line in answer.not_testable if line["why"] != "channel"]
+    lacking: dict[str, list[str]] = {}
+    for line in answer.not_testable:
+        if line["why"] == "channel":
+            lacking.setdefault(", ".join(line["needs"]), []).append(line["effect"])
+    said = [f"this schedule cannot say anything about: {', '.join(hidden)}"] if hidden else []
+    return said + [f"not recorded: {channel}, which would show {', '.join(each)}" for channel, each in lacking.items()]
 
 
 def _print_static(static: dict[str, Any]) -> None:

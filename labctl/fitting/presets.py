@@ -47,7 +47,8 @@ def _nodes(context: Context, points: int, name: str) -> tuple[float, ...]:
     if len(means) < points:
         raise NotEnoughData(
             f"{context.info.serial}: model {name} interpolates between {points} temperatures; the recording has "
-            f"{len(means)}, measure at {points - len(means)} more"
+            f"{len(means)}, measure at {points - len(means)} more; a recording at fewer is fitted by "
+            "`--effects bias,scale_factor,misalignment`"
         )
     return tuple(float(t) for t in means)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
@@ -133,6 +134,18 @@ def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
     return change
 
 
+def _refuse_what_changes_nothing(
+    wanted: Sequence[Term], model: ErrorModel, request: ImproveRequest, version: int
+) -> None:
+    """Raise BadInput for an effect that is there already. One with a shape may be added again: it gets another."""
+    fixed = {term.effect for term in model.terms if not term.parameters}
+    for term in wanted:
+        if term.effect in request.remove:
+            raise BadInput(f"effect {term.effect!r} is both added and taken out; say one of the two")
+        if term.effect in fixed and term == Term(term.effect):
+            raise BadInput(f"effect {term.effect!r} is in version {version} already ({', '.join(model.effect_ids)})")
+
+
 def _fitted(store: Store, row: CalibrationRecord, number: int, request: ImproveRequest) -> _Change:
     model = model_of(row)
     points = store.recordings.points(number)
@@ -144,6 +157,7 @@ def _fitted(store: Store, row: CalibrationRecord, number: int, request: ImproveR
     wanted = [*(parse_term(text) for text in request.add), *(Term(f.id, formula=f.text) for f in written)]
     if not wanted and not request.remove:
         raise BadInput("say what to change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
+    _refuse_what_changes_nothing(wanted, model, request, row.version)
     base, _ = changed(model, (), tuple(request.remove)).build(context)
     add = tuple(_shaped(store, number, points, base, term) for term in wanted)
     before = fit_context(context, changed(model))

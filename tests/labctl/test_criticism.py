@@ -136,6 +136,16 @@ def test_a_channel_that_was_not_kept_silences_its_effects(channel: str, silenced
     assert not silenced & set(found.verdict.named)
 
 
+def test_what_is_suspected_is_not_called_beyond_what_the_recording_can_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("labctl.fitting.criticism.criticise.LEAST_VISIBLE", 1.1)  # as if the schedule hid everything
+    found = held(single_axis(1, **HELD), full=True)
+    hidden = {line["effect"] for line in found.not_testable}
+    assert found.verdict.named
+    assert hidden
+    assert not hidden & set(found.verdict.named)
+    assert not hidden & {s.candidate.id for s in found.suspects if s.candidate.log_bf > 0}
+
+
 def test_without_the_chamber_nothing_wrong_is_said() -> None:
     assert held(without(single_axis(2), "chamber_c", "chamber_setpoint_c")).verdict.form == "adequate"
 
@@ -266,6 +276,8 @@ def test_the_whole_walk(bring: Callable[[Recording], Lab]) -> None:
     assert [step["version"] for step in steps] == [1, 2]
     assert steps[1]["rms_dps"] < steps[0]["rms_dps"]
     assert lab.json("criticise", "FOG-0001")["verdict"] == "adequate"
+    again = lab.run("improve", "FOG-0001", "--add", "scale_factor_asymmetry", status=2)
+    assert "'scale_factor_asymmetry' is in version 2 already" in again.stderr
     back = lab.json("improve", "FOG-0001", "--remove", "scale_factor_asymmetry")
     assert back["model"]["effects"] == ["rate_temperature_surface"]
     text = lab.run("criticise", "FOG-0001", "--version", "1").stdout

@@ -89,7 +89,7 @@ class Formula(Effect):
         if name == "temperature_c":
             return channels.temperature_c(axis)
         if name not in channels:
-            if name == "table_rate_dps" and len(channels.rates) == 1:  # in use there is no table: what turns is the unit
+            if name == "table_rate_dps" and len(channels.rates) == 1:  # in use the unit turns without a table
                 return channels.rate_dps(axis)
             raise BadInput(
                 f"formula {self.name!r}: there is no column {name!r} here; the rate along the gyro's own axis is "
