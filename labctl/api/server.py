@@ -27,6 +27,7 @@ from labctl.store import Store
 from labctl.store.database import Database
 
 SIMULATED_BENCH = "triaxial-sim"
+LAST_PORT = 65535
 
 
 @dataclass(frozen=True)
@@ -75,12 +76,16 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> str:
     """
     if not 0 <= request.speed < float("inf"):
         raise BadInput(f"--speed {request.speed}: a positive number, or 0 for as fast as it can")
+    if not 0 <= request.port <= LAST_PORT:
+        raise BadInput(f"--port {request.port}: 1 to {LAST_PORT}, or 0 for a free one")
     if not 1 <= request.max_upload_mib <= 1 << 20:
         raise BadInput(f"--max-upload-mib {request.max_upload_mib}: 1 to {1 << 20}")
     with socket.socket(socket.AF_INET6 if ":" in request.host else socket.AF_INET) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((request.host, request.port))
+        except socket.gaierror as error:
+            raise BadInput(f"--host {request.host}: {error.strerror}; name an address of this machine") from error
         except OSError as error:
             raise BadInput(f"--port {request.port} on {request.host}: {error.strerror}; name another, or 0") from error
         at = f"[{request.host}]" if ":" in request.host else request.host
@@ -114,7 +119,10 @@ def access_for(request: ServeRequest, house: House, at: str) -> Access:
     upload = request.max_upload_mib * MIB
     if _is_loopback(request.host) and not request.require_keys:
         return Access(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload)
-    refuse_open_doors(house.store, request.host)
+    asked = (
+        "--require-keys" if _is_loopback(request.host) else f"--host {request.host}: other machines could reach this"
+    )
+    refuse_open_doors(house.store, asked)
     return Access(keys=True, upload_bytes=upload)
 
 

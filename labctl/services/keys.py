@@ -114,10 +114,7 @@ def refuse_beyond(caller: Caller, needed: Role) -> None:
         raise NotAllowed(f"{caller.name} is {caller.role.value}; this asks for the role {needed.value}")
 
 
-def refuse_open_doors(store: Store, host: str) -> None:
-    """Raise BadInput when others could reach a service that has no key in force to ask them for."""
+def refuse_open_doors(store: Store, why: str) -> None:
+    """Raise BadInput when a service has to ask for keys and none is in force; `why` says what makes it ask."""
     if all(row.revoked_at is not None for row in store.keys.all()):
-        raise BadInput(
-            f"--host {host}: other machines could reach this service and there is no key to ask them for; "
-            "make one first: labctl key create NAME --role operator"
-        )
+        raise BadInput(f"{why}, and there is no key to ask for; make one first: labctl key create NAME --role operator")

@@ -85,9 +85,7 @@ def test_in_use_the_tables_rate_is_that_of_the_only_axis() -> None:
 def test_of_three_axes_it_is_refused_by_name() -> None:
     recording = three_axes(1)
     used = in_use(recording, SUPPLY)
-    with pytest.raises(
-        BadInput, match="no column 'table_rate_dps' here; the rate along the gyro's own axis is rate_dps"
-    ):
+    with pytest.raises(BadInput, match="no column 'table_rate_dps' here"):
         used.compensate(np.zeros((2, 3)), 25.0, {"supply_v": np.full(2, 5.0)})
 
 

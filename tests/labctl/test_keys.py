@@ -167,13 +167,13 @@ def test_keys_over_http_and_in_the_audit_trail(guarded: Guarded) -> None:
 
 def test_any_other_address_needs_a_key_first(tmp_path: Path) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
-        with pytest.raises(BadInput, match=r"--host 0\.0\.0\.0: .* labctl key create"):
-            refuse_open_doors(store, "0.0.0.0")
+        with pytest.raises(BadInput, match=r"--host 0\.0\.0\.0, .* labctl key create"):
+            refuse_open_doors(store, "--host 0.0.0.0")
         create_key(store, KeyRequest(name="only", role=Role.VIEWER), CLOCK.utc())
-        refuse_open_doors(store, "0.0.0.0")
+        refuse_open_doors(store, "--host 0.0.0.0")
         revoke_key(store, "only", "x", CLOCK.utc())
         with pytest.raises(BadInput, match="no key"):
-            refuse_open_doors(store, "0.0.0.0")
+            refuse_open_doors(store, "--host 0.0.0.0")
 
 
 Ask = Callable[..., Any]
