@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labctl.calibration import Calibration
-from labctl.errors import BadInput
+from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.channels import Channels
 from labctl.fitting.model import FittedModel
 
@@ -43,6 +43,11 @@ def rate_uncertainty(calibration: Calibration, rate_dps: float, temperature_c: f
         raise BadInput(
             f"{calibration.serial} version {calibration.version}: its model also needs {', '.join(fitted.model.needs)};"
             " an uncertainty at a rate and a temperature alone is not defined"
+        )
+    if any(np.isnan(fit.covariance).any() for fit in fitted.axes.values()):
+        raise NotEnoughData(
+            f"{calibration.serial} version {calibration.version} has as many coefficients as data sets: nothing is "
+            "left to be uncertain by; measure more data sets"
         )
     beyond = _beyond_floor(calibration)
     return {axis: _of_axis(fitted, axis, rate_dps, temperature_c, beyond) for axis in calibration.axes}

@@ -14,6 +14,7 @@ from labctl.fitting.channels import Array, Channels, channels_of
 from labctl.fitting.earth import up_rate_dps
 from labctl.fitting.levels import temperature_levels
 from labctl.fitting.noise import Scatter
+from labctl.fitting.thermometer import with_temperature
 from labctl.recording import Recording, RecordingInfo, to_points
 
 
@@ -83,7 +84,10 @@ class Context:
 
 
 def context_of(recording: Recording) -> Context:
-    """Return what a fit of this recording works on; raises BadInput for coefficients, NotEnoughData when empty."""
+    """Return what a fit of this recording works on.
+
+    Raises BadInput for coefficients, NotEnoughData when empty or where nothing says how warm the unit was.
+    """
     if recording.info.kind == "coefficients":
         raise BadInput(
             f"{recording.info.serial}: the recording is a table of coefficients; only model weiss1995 takes one"
@@ -91,6 +95,7 @@ def context_of(recording: Recording) -> Context:
     points = to_points(recording)
     if len(points) == 0:
         raise NotEnoughData(f"{recording.info.serial}: the recording has no complete data set with valid readings")
+    points = with_temperature(points)
     info = points.info
     outputs: dict[str, Array] = {axis: points.gyro_dps(axis) for axis in info.axes}
     return Context(info, channels_of(points, up_rate_dps(info)), outputs, _white(points))

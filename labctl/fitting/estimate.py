@@ -31,7 +31,8 @@ class Solution:
     residual: Array
     white_dps: float | None  #: of a data-set mean; None when only the total is known
     drift: Drift
-    scale: float  #: factor on the covariance estimated from the residuals; 1 where the white noise is known
+    scale: float  #: factor on the covariance estimated from the residuals; 1 where the white noise is known;
+    #: NaN, as the covariance then is, where neither the residuals nor the readings say anything about noise
     rank: int
 
 
@@ -142,12 +143,14 @@ def _collect(points: list[_Point], design: NDArray[np.float64], y: Array, scatte
     best = points[int(np.argmax(weights))]
     size = np.sqrt(sum(w * p.scale * p.drift.drift_dps**2 for w, p in zip(weights, points, strict=True)))
     white = None if scatter.white_var is None else float(np.sqrt(scatter.white_var.mean()))
+    # as many coefficients as data sets leave no residuals, and so nothing to be uncertain by
+    blind = np.nan if white is None and design.shape[0] == design.shape[1] else 1.0
     return Solution(
         np.asarray(values),
-        np.asarray(covariance),
+        np.asarray(covariance) * blind,
         y - design @ np.asarray(values),
         white,
         Drift(float(size), best.drift.tau_s, best.drift.per_rate * float(np.sqrt(best.scale))),
-        best.scale,
+        best.scale * blind,
         design.shape[1],
     )

@@ -21,6 +21,7 @@ from labctl.fitting.levels import folds
 from labctl.fitting.model import AxisFit, ErrorModel, FittedModel
 from labctl.fitting.presets import Preset, preset_for
 from labctl.fitting.temperature import LagrangeTable
+from labctl.fitting.thermometer import is_chambers
 from labctl.fitting.threads import single_threaded
 from labctl.recording import Recording
 
@@ -60,15 +61,18 @@ class FitResult:
 
 
 def coefficients_json(model: ErrorModel, fit: AxisFit) -> dict[str, Any]:
-    """Return named coefficients with standard uncertainty and unit; over nodes for a temperature table."""
-    u = fit.u
+    """Return named coefficients with standard uncertainty and unit; over nodes for a temperature table.
+
+    The uncertainty is None where there were no more data than coefficients.
+    """
+    u = np.where(np.isnan(fit.u), None, fit.u)  # type: ignore[call-overload]
     if isinstance(model.temperature, LagrangeTable):
         table: dict[str, Any] = {"temperature_c": list(model.temperature.nodes_c)}
         for name, unit, values, us in zip(fit.names, fit.units, fit.values, u, strict=True):
             table[name] = {"value": values.tolist(), "u": us.tolist(), "unit": unit}
         return table
     return {
-        name: {"value": float(values[0]), "u": float(us[0]), "unit": unit}
+        name: {"value": float(values[0]), "u": us[0], "unit": unit}
         for name, unit, values, us in zip(fit.names, fit.units, fit.values, u, strict=True)
     }
 
@@ -279,15 +283,18 @@ def _noise_json(solution: Solution) -> dict[str, Any]:
         "drift_dps": drift.drift_dps,
         "drift_tau_s": drift.tau_s if drift.drift_dps > 0 else None,
         "per_rate": drift.per_rate,
-        "covariance_scale": solution.scale,
+        "covariance_scale": None if np.isnan(solution.scale) else solution.scale,
     }
 
 
 def _environment(context: Context, turning: Mapping[str, Array]) -> dict[str, Any]:
     info = context.info
+    said: dict[str, Any] = {}
+    if is_chambers(context.channels.columns):
+        said["temperature"] = "the chamber's: the recording has no thermometer of the unit's own"
     if info.latitude_deg is None:
-        return {"earth_rate": "not subtracted: the latitude of the bench is not known"}
-    said: dict[str, Any] = {
+        return {**said, "earth_rate": "not subtracted: the latitude of the bench is not known"}
+    said |= {
         "earth_rate": "subtracted",
         "latitude_deg": info.latitude_deg,
         "along_table_axis_dps": up_rate_dps(info),

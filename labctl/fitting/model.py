@@ -117,7 +117,7 @@ class AxisFit:
 
     @property
     def u(self) -> NDArray[np.float64]:
-        """Standard uncertainties, (k, m)."""
+        """Standard uncertainties, (k, m); NaN where there were no more data than coefficients."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(self.values.shape)
 
 
@@ -223,7 +223,8 @@ class FittedModel:
                     "names": list(fit.names),
                     "units": list(fit.units),
                     "values": fit.values.tolist(),
-                    "covariance": fit.covariance.tolist(),
+                    # NaN, which JSON has not, becomes null, and NaN again when it is read
+                    "covariance": np.where(np.isnan(fit.covariance), None, fit.covariance).tolist(),  # type: ignore[call-overload]
                 }
                 for axis, fit in self.axes.items()
             },

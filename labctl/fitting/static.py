@@ -13,6 +13,7 @@ from labctl.fitting.allan import LEAST_READINGS, Allan, allan
 from labctl.fitting.channels import Array
 from labctl.fitting.plain import plain, plain_list
 from labctl.recording import Recording
+from labctl.recording.points import temperature_of
 
 #: A temperature that stays within this counts as one.
 ONE_TEMPERATURE_K = 1.0
@@ -78,10 +79,9 @@ def static_record(recording: Recording, least_s: float = 0.0) -> StaticRecord | 
     if not known:
         return None
     dataset = np.asarray(recording.columns["dataset"])[rows]
-    warm = np.asarray(recording.columns["temperature_c"], dtype=np.float64)[rows]
-    return StaticRecord(
-        int(dataset[0]), int(dataset[-1]), float(warm.mean()), float(len(t_s) * period_s), known
-    )  # fmt: skip
+    warm = temperature_of(recording.columns)
+    mean_c = float(warm[rows].mean()) if warm is not None else np.nan
+    return StaticRecord(int(dataset[0]), int(dataset[-1]), mean_c, float(len(t_s) * period_s), known)
 
 
 def longest_stretch(recording: Recording) -> slice | None:
@@ -102,7 +102,9 @@ def longest_stretch(recording: Recording) -> slice | None:
         still &= np.asarray(columns["valid"]) != 0
     begins = np.flatnonzero(still & np.concatenate([[True], ~(together & still[:-1])]))
     ends = np.flatnonzero(still & np.concatenate([~(together & still[1:]), [True]])) + 1
-    warm = np.asarray(columns["temperature_c"], dtype=np.float64)
+    warm = temperature_of(columns)
+    if warm is None:  # noise can be looked at all the same
+        warm = np.zeros(len(recording))
     best = slice(0, 0)
     for begin, end in sorted(zip(begins, ends, strict=True), key=lambda pair: pair[0] - pair[1]):
         if end - begin <= best.stop - best.start:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.recording import Recording
+from labctl.recording.recording import Columns, Recording
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
 #: Columns that one data set has one value of: its first reading's.
 FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg")
+#: A data set longer than this, through which the temperature moves by more than that, is no one point: it is taken in
+#: pieces of about a minute, as long as the data sets of the published schedules.
+LONG_S = 600.0
+MOVED_K = 1.0
+PIECE_S = 60.0
 
 
 def dataset_starts(dataset: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -19,9 +25,68 @@ def dataset_starts(dataset: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.flatnonzero(np.concatenate([[True], dataset[1:] != dataset[:-1]]))
 
 
+def temperature_of(columns: Columns) -> NDArray[np.float64] | None:
+    """Return how warm the unit was, (n,) deg C, or None where nobody knows.
+
+    The one place that decides: the unit's own thermometer, and where it has none the chamber's stands in for it.
+    """
+    warm = columns.get("temperature_c", columns.get("chamber_c"))
+    return None if warm is None else np.asarray(warm, dtype=np.float64)
+
+
+def pieces(columns: Columns) -> NDArray[np.int64]:
+    """Return labels (n,) of readings: they rise with the data set, and within one that is taken in pieces."""
+    dataset, warm = np.asarray(columns["dataset"]), temperature_of(columns)
+    piece = np.zeros(len(dataset), dtype=np.int64)
+    if len(dataset) and "t_s" in columns and warm is not None:
+        t_s = np.asarray(columns["t_s"], dtype=np.float64)
+        starts = dataset_starts(dataset)
+        for begin, end in zip(starts, np.append(starts[1:], len(dataset)), strict=True):
+            piece[begin:end] = _minutes(t_s[begin:end] - t_s[begin], warm[begin:end])
+    changes = (dataset[1:] != dataset[:-1]) | (piece[1:] != piece[:-1])
+    return np.concatenate([[0], np.cumsum(changes)]).astype(np.int64)
+
+
+def _minutes(since_s: NDArray[np.float64], temperature_c: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the piece of each reading of a data set, (n,); all 0 where it stays whole."""
+    length_s = float(since_s[-1])
+    whole = np.zeros(len(since_s), dtype=np.int64)
+    if not length_s > LONG_S:
+        return whole
+    parts = round(length_s / PIECE_S)
+    piece = np.minimum(since_s / length_s * parts, parts - 1).astype(np.int64)
+    readings = np.bincount(piece)
+    # of means, so that neither the thermometer's noise nor a stray reading counts as a move
+    means = np.bincount(piece, weights=temperature_c)[readings > 0] / readings[readings > 0]
+    return piece if np.ptp(means) > MOVED_K else whole
+
+
+def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Recording:
+    """Return points in which each data set that is taken in pieces has a row for each of them, under its own number.
+
+    For means that are kept without their readings: `readings_of` returns those of a data set, and is asked for the long
+    ones only. What the readings do not say, such as the set point, a piece has from its data set.
+    """
+    columns = {name: np.asarray(values) for name, values in points.columns.items()}
+    if not np.any(columns.get("duration_s", np.zeros(1)) > LONG_S):
+        return points
+    rows: list[dict[str, NDArray[Any]]] = []
+    for row in range(len(points)):
+        kept = {name: values[row : row + 1] for name, values in columns.items()}
+        if kept["duration_s"][0] > LONG_S:
+            info = points.info.model_copy(update={"kind": "samples"})
+            found = to_points(Recording(info, readings_of(int(kept["dataset"][0]))))
+            if len(found) > 1:
+                kept = {n: found.columns[n] if n in found.columns else v.repeat(len(found)) for n, v in kept.items()}
+        rows.append(kept)
+    joined = {name: np.concatenate([kept[name] for kept in rows]) for name in columns} if rows else columns
+    return Recording(points.info, joined, points.environment)
+
+
 def to_points(recording: Recording) -> Recording:
     """Return the recording with one row per data set (kind "points"); points and coefficients return as they are.
 
+    A long data set through which the temperature moved has a row for each of its pieces, under its own number.
     Only valid readings count. `t_s` is the middle of the data set, `table_angle_deg` its start, `duration_s` its
     length; each gyro column gains `_std` (n - 1) and, where every set has readings enough, `_white_std`; every row
     gains `n`. A data set without a valid reading is left out.
@@ -31,7 +96,7 @@ def to_points(recording: Recording) -> Recording:
     columns = recording.columns
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     rows = {name: np.asarray(values)[valid] for name, values in columns.items() if name != "valid"}
-    starts = dataset_starts(rows["dataset"])
+    starts = dataset_starts(pieces(rows))
     counts = np.diff(np.append(starts, len(rows["dataset"])))
     points: dict[str, NDArray[Any]] = {}
     for name, values in rows.items():

@@ -12,7 +12,7 @@ from labctl.exports import export_calibration
 from labctl.fitting import fit
 from labctl.services.acts import CertifyRequest, FitRequest
 from labctl.services.answers import CalibrationRow, Certified, FitAnswer, VersionAnswer
-from labctl.services.recordings import newest_recording
+from labctl.services.recordings import newest_recording, points_of
 from labctl.store import CertificationRow, NewCalibration, Store
 
 
@@ -31,7 +31,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
     Raises NotFound, BadInput for an unknown model or effect, NotEnoughData.
     """
     recording = newest_recording(store, serial, request.recording)
-    source = store.recordings.points(recording)
+    source = points_of(store, recording)
     result = fit(source, request.model, request.effects)
     campaign = store.recordings.get(recording).campaign
     made = {

@@ -29,7 +29,7 @@ from labctl.services.answers import Answer, ErrorFigures, FitAnswer, ModelAnswer
 from labctl.services.criticism import version_of
 from labctl.services.judging import model_of, readings_of
 from labctl.services.kept import kept
-from labctl.services.recordings import newest_recording
+from labctl.services.recordings import newest_recording, points_of
 from labctl.services.residuals import residual_columns
 from labctl.store import CalibrationRecord, NewCalibration, Store
 
@@ -148,7 +148,7 @@ def _refuse_what_changes_nothing(
 
 def _fitted(store: Store, row: CalibrationRecord, number: int, request: ImproveRequest) -> _Change:
     model = model_of(row)
-    points = store.recordings.points(number)
+    points = points_of(store, number)
     context = context_of(points)
     for effect_id in request.remove:
         if effect_id not in model.effect_ids:

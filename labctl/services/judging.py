@@ -19,6 +19,7 @@ from labctl.services.answers import CriticismAnswer, ResidualsAnswer
 from labctl.services.criticism_text import answer_of
 from labctl.services.experiments import experiments_for
 from labctl.services.formulas import catalogue_with
+from labctl.services.recordings import points_of
 from labctl.services.residuals import residual_columns
 from labctl.store import CalibrationRecord, Store
 
@@ -27,7 +28,7 @@ def judged(
     store: Store, row: CalibrationRecord, recording: int, competing: Sequence[Formula]
 ) -> tuple[CriticismAnswer, ResidualsAnswer]:
     """Hold a version against a recording; returns what is said of it and what it leaves. Raises BadInput."""
-    catalogue, points = catalogue_with(competing), store.recordings.points(recording)
+    catalogue, points = catalogue_with(competing), points_of(store, recording)
     found = criticise(readings_of(store, recording), model_of(row), catalogue, points=points)
     columns = residual_columns(found.data, found.residuals, points, found.base)
     return (

@@ -12,12 +12,13 @@ from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.allan import LEAST_READINGS, allan
 from labctl.fitting.static import StaticRecord, static_record
 from labctl.recording import Recording, RecordingInfo
+from labctl.recording.points import temperature_of
 from labctl.services.answers import Answer
 from labctl.services.kept import kept
 from labctl.store import Store
 
 #: What a static record is looked for in, beside the outputs.
-NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "temperature_c", "valid")
+NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "temperature_c", "chamber_c", "valid")
 
 
 class AllanAnswer(Answer):
@@ -66,8 +67,9 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
     axes = {axis: noise for axis, noise in found.items() if noise is not None}
     if not axes:
         raise NotEnoughData(f"data set {dataset}: its readings do not scatter, so they say nothing about noise")
-    warm = float(np.asarray(columns["temperature_c"], dtype=np.float64)[valid].mean())
-    return StaticRecord(dataset, dataset, warm, len(t_s) * period_s, axes)
+    warm = temperature_of(columns)
+    mean_c = float(warm[valid].mean()) if warm is not None else np.nan
+    return StaticRecord(dataset, dataset, mean_c, len(t_s) * period_s, axes)
 
 
 def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 import numpy as np
 
 from labctl.errors import BadRecording, NotEnoughData, NotFound
-from labctl.recording import RecordingInfo, read_recording, write_recording
+from labctl.recording import Recording, RecordingInfo, read_recording, write_recording
+from labctl.recording.points import with_pieces
 from labctl.services.answers import Imported
 from labctl.store import RecordingRow, Store
 
@@ -70,6 +71,14 @@ def export_recording(
     """Write a recording, or its points (one row per data set), into a new folder; returns the names of its files."""
     taken = store.recordings.points(recording) if points else store.recordings.samples(recording)
     return write_recording(taken, folder, file_format)
+
+
+def points_of(store: Store, recording: int) -> Recording:
+    """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces."""
+    points = store.recordings.points(recording)
+    if store.recordings.get(recording).kind != "samples":
+        return points
+    return with_pieces(points, lambda dataset: store.recordings.dataset(recording, dataset))
 
 
 def newest_recording(store: Store, serial: str, recording: int | None) -> int:

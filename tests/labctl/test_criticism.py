@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -137,7 +138,8 @@ def test_a_channel_that_was_not_kept_silences_its_effects(channel: str, silenced
 
 
 def test_what_is_suspected_is_not_called_beyond_what_the_recording_can_say(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("labctl.fitting.criticism.criticise.LEAST_VISIBLE", 1.1)  # as if the schedule hid everything
+    module = import_module("labctl.fitting.criticism.criticise")  # the package has the function under this name
+    monkeypatch.setattr(module, "LEAST_VISIBLE", 1.1)  # as if the schedule hid everything
     found = held(single_axis(1, **HELD), full=True)
     hidden = {line["effect"] for line in found.not_testable}
     assert found.verdict.named

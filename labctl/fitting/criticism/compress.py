@@ -19,8 +19,9 @@ from labctl.fitting.earth import up_rate_dps
 from labctl.fitting.effects import Column
 from labctl.fitting.past import past_of
 from labctl.fitting.static import StaticRecord
+from labctl.fitting.thermometer import with_temperature
 from labctl.recording import Recording, RecordingInfo, to_points
-from labctl.recording.points import dataset_starts
+from labctl.recording.points import dataset_starts, pieces
 
 #: Where slow regressors are evaluated within a data set.
 NODES = 12
@@ -89,7 +90,11 @@ class Compressed:
 
 
 def compress(recording: Recording, *, outliers: bool = True) -> Compressed:
-    """Return a recording compressed; points have their means only. Without `outliers` every reading counts."""
+    """Return a recording compressed; points have their means only. Without `outliers` every reading counts.
+
+    Raises NotEnoughData where nothing says how warm the unit was.
+    """
+    recording = with_temperature(recording)
     return _from_samples(recording, outliers) if recording.info.kind == "samples" else _from_points(recording)
 
 
@@ -139,15 +144,17 @@ def _pad(dataset: NDArray[np.int64]) -> _Padded:
     return _Padded(there.astype(np.float64), np.where(there, starts[:, None] + offset, 0))
 
 
-def _pieces(dataset: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return labels (n,) that change with the data set, and within one that is far longer than usual: a static record.
+def _pieces(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
+    """Return labels (n,) that change with the row of the fit, and within one that is far longer than usual.
 
-    As one of the rows it would need room, and would be a single mean, for what drifts all the while.
+    A static record at one temperature is one row of the fit. Here it would need room, and would be a single mean, for
+    what drifts all the while.
     """
-    starts = dataset_starts(dataset)
-    counts = np.diff(np.append(starts, len(dataset)))
+    rows = pieces(columns)
+    starts = dataset_starts(rows)
+    counts = np.diff(np.append(starts, len(rows)))
     parts = -(-counts // max(int(LONGEST * np.median(counts)), 1))
-    ordinal = np.arange(len(dataset)) - np.repeat(starts, counts)
+    ordinal = np.arange(len(rows)) - np.repeat(starts, counts)
     first = np.concatenate([[0], np.cumsum(parts)[:-1]])
     return np.repeat(first, counts) + ordinal * np.repeat(parts, counts) // np.repeat(counts, counts)
 
@@ -196,7 +203,7 @@ def thin(recording: Recording) -> Recording:
 
 def _from_samples(recording: Recording, outliers: bool) -> Compressed:
     numbers, dataset, texts = _decimated(recording)
-    padded = _pad(_pieces(dataset))
+    padded = _pad(_pieces({"dataset": dataset, **numbers}))
     m = len(padded.there)
     begin = padded.index[:, 0]
     t_s = numbers.get("t_s", np.arange(len(dataset), dtype=np.float64) / FASTEST_HZ)

@@ -32,6 +32,7 @@ from labctl.fitting.fit import FitResult, fit_context
 from labctl.fitting.model import ErrorModel
 from labctl.fitting.presets import changed
 from labctl.fitting.static import LONG_S, static_record
+from labctl.fitting.thermometer import with_temperature
 from labctl.fitting.threads import single_threaded
 from labctl.recording import Recording
 
@@ -99,6 +100,7 @@ def criticise(
 
     Raises NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict.
     """
+    recording = with_temperature(recording)
     data = replace(compress(recording), static=static_record(recording, 0.0 if full else LONG_S))
     context = context_of(points or recording)
     if shape_only:
@@ -115,9 +117,11 @@ def criticise(
     seen = weighed if last is weighed else with_noise_of(weighed, last)
     left = residuals_of(seen)
     direct = fit_context(context, _direct(model)).error.rms_dps if model.argument == "output" else None
+    suspects = tuple(_suspects(weighed, seen, context, forward, verdict))
+    spoken_for = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return Criticism(
         verdict, data, base, direct, weighed, left,
-        tuple(_suspects(weighed, seen, context, forward, verdict)), tuple(_not_testable(weighed, catalogue)),
+        suspects, tuple(line for line in _not_testable(weighed, catalogue) if line["effect"] not in spoken_for),
         _explained(begun),
         views_of(seen, left, recording, catalogue),
     )  # fmt: skip

@@ -57,9 +57,9 @@ function list(first, second) {
     { title: "Axis", cell: (row) => row.axis },
     { title: "Coefficient", cell: (row) => h("code", {}, row.name) },
     { title: "Value", number: true, cell: (row) => number(row.value, 5) },
-    { title: "Expanded uncertainty, k = 2", number: true, cell: (row) => number(K * row.u, 2) },
+    { title: "Expanded uncertainty, k = 2", number: true, cell: (row) => (row.u === null ? "–" : number(K * row.u, 2)) },
     second ? { title: `Version ${second.version}`, number: true, cell: (row) => (row.beside ? number(row.beside.value, 5) : "–") } : null,
-    second ? { title: "Differs by", number: true, cell: (row) => (row.beside ? `${number(Math.abs(row.value - row.beside.value) / Math.hypot(row.u, row.beside.u), 2)} u` : "–") } : null,
+    second ? { title: "Differs by", number: true, cell: (row) => (row.beside && row.u !== null && row.beside.u !== null ? `${number(Math.abs(row.value - row.beside.value) / Math.hypot(row.u, row.beside.u), 2)} u` : "–") } : null,
     { title: "Unit", cell: (row) => (row.unit === "1" ? "–" : row.unit) },
   ].filter(Boolean), rows, { dense: true, label: "Coefficients" });
 }
