@@ -37,18 +37,20 @@ def check(
 
 @app.command("status")
 def status(as_json: Json = False, database: Database = None) -> None:
-    """Say which benches were not confirmed safe when their last campaign ended."""
-    from labctl.services.benches import bench_statuses
+    """Say which benches were not confirmed safe when their last campaign ended, or had none: their process is gone."""
+    from labctl.services.benches import look_at_benches
     from labctl.services.reading import open_reading
 
     with one_clear_line(), open_reading(database) as store:
-        benches = bench_statuses(store)
+        benches = look_at_benches(store)
     if as_json:
         print_json(benches)
     else:
         for bench in benches:
-            console.print(f"{bench.name:18} {bench.unconfirmed or 'nothing is unconfirmed'}", markup=False)
-    if any(bench.unconfirmed for bench in benches):
+            said = [bench.unconfirmed, *(f"nobody has made it safe: {left}" for left in bench.left)]
+            for line in filter(None, said if any(said) else ["nothing is unconfirmed"]):
+                console.print(f"{bench.name:18} {line}", markup=False, soft_wrap=True)
+    if any(bench.unconfirmed or bench.left for bench in benches):
         raise typer.Exit(1)
 
 

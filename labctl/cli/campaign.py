@@ -9,7 +9,7 @@ import typer
 from labctl.cli import schedule
 from labctl.cli.errors import ending_is_an_interrupt, one_clear_line
 from labctl.cli.options import BenchName, Database, Json
-from labctl.cli.output import console, figure, print_json, table
+from labctl.cli.output import complaints, console, figure, print_json, table
 
 if TYPE_CHECKING:
     from labctl.services.answers import CampaignAnswer, PlanAnswer
@@ -127,8 +127,13 @@ def start(
             answer = RemoteActs(url).start_campaign(request)
         else:
             with ending_is_an_interrupt(), CampaignProgress(quiet=as_json) as progress:
-                answer = run_here(database, request, progress.update, Attendant().attend)
+                answer = run_here(database, request, progress.update, Attendant().attend, _say)
     print_end(answer, as_json=as_json)
+
+
+def _say(text: str) -> None:
+    """Print what is worth knowing beside the answer."""
+    complaints.print(f"labctl: {text}", markup=False)
 
 
 def print_end(answer: CampaignAnswer, *, as_json: bool) -> None:

@@ -35,13 +35,18 @@ def serve(
     database: Database = None,
 ) -> None:
     """Serve calibrations over HTTP and run campaigns on the bench. Stops with Ctrl-C, bench left safe."""
-    from labctl.api.server import ServeRequest, serve_forever
+    from labctl.api.server import SIMULATED_BENCH, ServeRequest, serve_forever
+
+    named = bench or (SIMULATED_BENCH if simulate else None)
 
     def ready(url: str) -> None:
+        unconfirmed, cut_short = ("", "") if named is None else _found(named, database)
         if as_json:
-            print_json({"url": url}, one_line=True)
-        else:
-            console.print(f"labctl listens on {url}  (API text: {url}/api-docs)", markup=False)
+            print_json({"url": url, "unconfirmed": unconfirmed, "cut_short": cut_short}, one_line=True)
+            return
+        console.print(f"labctl listens on {url}  (API text: {url}/api-docs)", markup=False)
+        for text in filter(None, (unconfirmed, cut_short)):
+            console.print(text, style="yellow", markup=False, soft_wrap=True)
 
     # the HTTP server, once stopped, raises the signal again: with its own meaning that would end us before the bench
     with one_clear_line(), ending_is_an_interrupt():
@@ -51,6 +56,19 @@ def serve(
         )  # fmt: skip
         left = serve_forever(request, ready)
     complaints.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
+
+
+def _found(source: str, database: str | None) -> tuple[str, str]:
+    """Say what is wrong with a bench when its service starts, and which campaign was left there; empty for nothing."""
+    from labctl.services.planning import load_bench
+    from labctl.services.reading import open_reading
+    from labctl.services.resuming import to_be_taken_up
+    from labctl.services.running import how_left
+
+    name = load_bench(source).name
+    with open_reading(database) as store:
+        unconfirmed = store.benches.unconfirmed(name)
+        return how_left(name, unconfirmed) if unconfirmed else "", to_be_taken_up(store, name)
 
 
 def simulator(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from datetime import timedelta
 from typing import Literal
 
+from instruments.bench import BenchFile
 from labctl.services.answers import CampaignAnswer, EventAnswer, OutputAnswer, PromptAnswer
 from labctl.store import CampaignRow, EventRow, Store
 from procedures.control import Wish
@@ -88,13 +90,47 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
 
 def list_campaigns(store: Store) -> list[CampaignAnswer]:
     """Return every campaign, newest first."""
-    return [looked_after(from_rows(store, row), by_somebody=store.is_held) for row in store.campaigns.all()]
+    return _told(store, store.campaigns.all)
 
 
 def campaign_status(store: Store, campaign: int | None) -> CampaignAnswer:
     """Return where a campaign is; without a number the newest. Raises NotFound."""
-    row = store.campaigns.newest() if campaign is None else store.campaigns.get(campaign)
-    return looked_after(from_rows(store, row), by_somebody=store.is_held)
+    number = store.campaigns.newest().id if campaign is None else campaign
+    return _told(store, lambda: [store.campaigns.get(number)])[0]
+
+
+def _told(store: Store, read: Callable[[], list[CampaignRow]]) -> list[CampaignAnswer]:
+    """Return campaigns as the database tells them, those that nobody runs as left.
+
+    Whoever wrote to the database may have ended its campaign after the rows were read and let go before the lock was
+    looked at: rows are read again before anything is called left.
+    """
+    rows = read()
+    left = {row.id for row in rows if row.state not in ENDED}
+    if left and store.is_held:
+        left.clear()
+    if left:
+        rows = read()
+    return [looked_after(from_rows(store, row), by_somebody=row.id not in left) for row in rows]
+
+
+def left_behind(store: Store) -> list[CampaignAnswer]:
+    """Return the campaigns that no process runs any more and that have not ended, newest first."""
+    return [answer for answer in _told(store, store.campaigns.unfinished) if answer.abandoned]
+
+
+def cut_short(answer: CampaignAnswer) -> str:
+    """Say that a campaign was left, and what a person can do about it."""
+    return (
+        f"campaign {answer.id} was cut short at {100 * answer.progress:.0f} %; `labctl campaign resume {answer.id}` "
+        f"takes it up, `labctl campaign abort {answer.id}` ends it"
+    )
+
+
+def outlives_its_process(row: CampaignRow) -> bool:
+    """Return whether a campaign's bench is still there, as it was, when the process that drove it is gone."""
+    # the simulation may be another labctl's, whose settings are not known any more
+    return not BenchFile.model_validate({**row.bench, "simulation": None}).is_simulated
 
 
 def looked_after(answer: CampaignAnswer, *, by_somebody: bool) -> CampaignAnswer:

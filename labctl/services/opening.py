@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from instruments.bench import BenchFile
 from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
@@ -28,7 +27,7 @@ from labctl.services.acts import (
 from labctl.services.answers import BenchStatus, CampaignAnswer, Certified, FitAnswer, Imported, ScheduledAnswer
 from labctl.services.beginnings import SimulatedRecording
 from labctl.services.benches import bench_status
-from labctl.services.campaigns import campaign_status
+from labctl.services.campaigns import campaign_status, outlives_its_process
 from labctl.services.planning import bench_for, load_bench, load_recipe
 from labctl.store import Store, holder_of, open_store
 
@@ -79,7 +78,7 @@ class LocalActs:
         self._note_campaign("abort", campaign, reason)
         row, at = self._store.campaigns.get(campaign), self._clock.utc()
         said = f"left unfinished; {reason}"
-        if row.state in UNDER_WAY and not BenchFile.model_validate(dict(row.bench)).is_simulated:
+        if row.state in UNDER_WAY and outlives_its_process(row):
             text = f"the process that ran campaign {campaign} ended before it could make the bench safe"
             self._store.benches.mark(row.bench_name, text, at)
             said += f". Nobody has made bench {row.bench_name} safe: look at it, then `labctl bench clear`"

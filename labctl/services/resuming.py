@@ -15,7 +15,7 @@ from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.services.acts import ResumeRequest
 from labctl.services.answers import CampaignAnswer
-from labctl.services.campaigns import answer_of
+from labctl.services.campaigns import from_rows
 from labctl.services.leases import holding, open_for
 from labctl.services.planning import load_bench
 from labctl.services.power import boot_id, power_failed
@@ -23,15 +23,13 @@ from labctl.services.running import (
     Attend,
     Observe,
     Prepared,
-    answers_noted,
     clock_for,
     operator_of,
     refuse_unconfirmed,
-    run,
+    run_attended,
 )
 from labctl.store import CampaignRow, Standing, Store, TakeUp, open_store
 from procedures.plan import Plan
-from procedures.progress import Progress
 from procedures.recipe import Recipe
 from procedures.safe import make_safe
 from procedures.takeup import Restart
@@ -133,6 +131,19 @@ def too_often(standing: Standing) -> str | None:
     return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
 
 
+def to_be_taken_up(store: Store, bench: str) -> str:
+    """Say which campaign a service finds left on its bench when it starts, and what becomes of it; empty for none."""
+    row = next((row for row in store.campaigns.unfinished() if row.bench_name == bench), None)
+    if row is None:
+        return ""
+    text = f"campaign {row.id} was cut short at {100 * from_rows(store, row).progress:.0f} %"
+    if store.benches.unconfirmed(bench):
+        return f"{text} and is not taken up: bench {bench} was not confirmed safe"
+    if why_not := too_often(store.interruptions.standing(row.id)):
+        return f"{text} and is not taken up: {why_not}"
+    return f"{text} and is taken up now, safe state first"
+
+
 def leave_safe(store: Store, bench_file: BenchFile, clock: Clock) -> None:
     """Make a bench safe whose campaign is not taken up; what cannot be confirmed stays on its status."""
     if bench_file.is_simulated:  # it ended with its process
@@ -168,14 +179,7 @@ def resume_here(
             return VirtualClock(standing.last_at) if isinstance(clock, VirtualClock) else clock
 
         prepared = prepare_resume(store, row.id, bench_file, make_clock, request)
-        if attend is not None:
-            attend(prepared.operator, answers_noted(store, prepared))
-
-        def seen(progress: Progress) -> None:
-            if observe is not None:
-                observe(answer_of(row, progress))
-
-        return run(store, prepared, control, seen)
+        return run_attended(store, prepared, control, observe, attend)
 
 
 def _newest_unfinished(store: Store) -> CampaignRow:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 
 from pydantic import Field
@@ -15,15 +15,16 @@ from instruments.gyro import Gyro
 from instruments.hand import NoHand
 from instruments.open import Bench, open_bench
 from labctl.config import default_database
-from labctl.errors import BadInput, Conflict, Stopped
+from labctl.errors import BadInput, Conflict, Stopped, StoreError
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.acts import Request
 from labctl.services.answers import CampaignAnswer
-from labctl.services.campaigns import answer_of
+from labctl.services.campaigns import ENDED, answer_of, cut_short, from_rows
 from labctl.services.leases import holding, open_for
 from labctl.services.planning import bench_for, load_bench, load_recipe
 from labctl.services.power import boot_id
 from labctl.store import NewCampaign, NewUnit, Store
+from labctl.store.database import NOT_KEPT, note_campaign
 from procedures.control import Control
 from procedures.engine import Engine
 from procedures.limits import BenchLimits
@@ -166,17 +167,25 @@ def run(
 
     Raises Stopped after a Ctrl-C.
     """
-    journal = store.campaigns.journal(prepared.id)
-    engine = Engine(
+    return _drive(store, prepared, _engine(store, prepared, control, observe))
+
+
+def _engine(
+    store: Store, prepared: Prepared, control: Control | None, observe: Callable[[Progress], None] | None
+) -> Engine:
+    return Engine(
         prepared.plan,
         prepared.bench,
-        journal,
+        store.campaigns.journal(prepared.id),
         prepared.clock,
         prepared.operator,
         control=control or Control(),
         observer=observe,
         start_s=prepared.start_s,
     )
+
+
+def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignAnswer:
     try:
         engine.run(prepared.start_at, prepared.restart)
     except KeyboardInterrupt as interrupt:
@@ -204,6 +213,23 @@ def _stopped(store: Store, prepared: Prepared, engine: Engine) -> str:
     return f"campaign {prepared.id} was stopped; {left}; `labctl campaign resume {prepared.id}` goes on with it"
 
 
+def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: StoreError) -> str:
+    """Say how a campaign ended that could not be written any more, and what is known of its bench."""
+    complaints, ended, marked = "; ".join(engine.complaints), False, ""
+    with suppress(StoreError):
+        ended, marked = store.campaigns.get(campaign).state in ENDED, store.benches.unconfirmed(bench)
+    left = how_left(bench, complaints)
+    if complaints and not marked:  # nothing that `labctl bench clear` could take back
+        left = f"bench {bench} is NOT confirmed safe, and that could not be written down: {complaints}; look at it"
+    elif not complaints and not ended:
+        left += ", but that could not be written down"
+    cause = str(error).partition(NOT_KEPT)[0]
+    return (
+        f"campaign {campaign} was cut short: {cause}; what was measured before is kept; {left}; once there is room "
+        f"again, `labctl campaign resume {campaign}` goes on with it"
+    )
+
+
 def answers_noted(store: Store, prepared: Prepared) -> Callable[[str], None]:
     """Return what writes an answer that was given at this terminal into the audit trail."""
 
@@ -219,18 +245,50 @@ def run_here(
     request: StartRequest,
     observe: Observe | None = None,
     attend: Attend | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> CampaignAnswer:
-    """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks."""
+    """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks.
+
+    `say` is told of a campaign that was left on a simulated bench. Raises Conflict for one on any other bench.
+    """
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
     with open_for(bench_file, database or default_database()) as store, holding(store, bench_file) as control:
         clock = clock_for(bench_file, request.speed)
+        for text in _left_on(store, bench_file):
+            if not bench_file.is_simulated:
+                raise Conflict(f"bench {bench_file.name}: {text}; nothing is begun there before")
+            if say is not None:
+                say(text)
         prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip)
-        row = store.campaigns.get(prepared.id)
-        if attend is not None:
-            attend(prepared.operator, answers_noted(store, prepared))
+        return run_attended(store, prepared, control, observe, attend)
 
-        def seen(progress: Progress) -> None:
-            if observe is not None:
-                observe(answer_of(row, progress))
 
-        return run(store, prepared, control, seen)
+def _left_on(store: Store, bench: BenchFile) -> list[str]:
+    """Say which campaigns were left on a bench that this process holds."""
+    if bench.is_simulated and not store.is_sole_writer:  # it has no lease: another process may run them
+        return []
+    rows = [row for row in store.campaigns.unfinished() if row.bench_name == bench.name]
+    return [cut_short(from_rows(store, row)) for row in rows]
+
+
+def run_attended(
+    store: Store, prepared: Prepared, control: Control, observe: Observe | None, attend: Attend | None
+) -> CampaignAnswer:
+    """Run a prepared campaign to its end at somebody's terminal.
+
+    Raises Stopped after a Ctrl-C, StoreError when it cannot be written any more; both say how the bench was left.
+    """
+    row = store.campaigns.get(prepared.id)
+    note_campaign(store.location, row.id)
+    if attend is not None:
+        attend(prepared.operator, answers_noted(store, prepared))
+
+    def seen(progress: Progress) -> None:
+        if observe is not None:
+            observe(answer_of(row, progress))
+
+    engine = _engine(store, prepared, control, seen)
+    try:
+        return _drive(store, prepared, engine)
+    except StoreError as error:
+        raise type(error)(_unwritten(store, row.id, row.bench_name, engine, error)) from error

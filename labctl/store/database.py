@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,14 @@ from filelock import FileLock, Timeout
 from sqlalchemy.exc import DatabaseError
 from sqlalchemy.pool import StaticPool
 
-from labctl.errors import Conflict, DiskFull, StoreError
+from labctl.errors import BadInput, Conflict, DiskFull, StoreError
 from labctl.store import migrations
 from labctl.store.seal import count_commit, missing, seal
 
 BUSY_MS = 5000
 #: What SQLite and PostgreSQL call a full disk.
 SQLITE_FULL, POSTGRESQL_DISK_FULL = 13, "53100"
+NOT_KEPT = "; nothing of this act was kept"
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,17 @@ class Holder:
 
     pid: int
     url: str | None  #: of the service, where the holder is one
+    campaign: int | None = None  #: that runs in the holder's terminal, where the holder is no service
+
+
+def _held_by(holder: Holder) -> str:
+    if holder.campaign is not None:
+        return (
+            f"campaign {holder.campaign} runs in process {holder.pid}'s terminal: Ctrl-C there ends it safely; a "
+            "campaign under `labctl serve` can be paused and aborted from here. Anything else waits for its end"
+        )
+    who = f"the service at {holder.url}" if holder.url else f"another labctl (process {holder.pid})"
+    return f"{who} writes to this database now; wait for it, or ask it"
 
 
 def is_url(location: str) -> bool:
@@ -65,9 +78,38 @@ def _note_path(location: str) -> Path:
 def _read_note(location: str) -> Holder:
     try:
         note = json.loads(_note_path(location).read_text(encoding="utf-8"))
-        return Holder(int(note["pid"]), note["url"])
+        return Holder(int(note["pid"]), note["url"], note.get("campaign"))
     except (OSError, ValueError, KeyError):
         return Holder(0, None)
+
+
+def note_campaign(location: str, campaign: int) -> None:
+    """Say beside a database that this process holds it for a campaign; other processes can tell people so."""
+    if is_url(location):
+        return
+    with suppress(OSError):  # a disk that is full: nobody needs the note
+        note = {"pid": os.getpid(), "url": None, "campaign": campaign}
+        _note_path(location).write_text(json.dumps(note), encoding="utf-8")
+
+
+def shown(location: str) -> str:
+    """Return a database's path or URL as it may be printed: without its password."""
+    return re.sub(r"(://[^/?#:@]*):.*@", r"\1:***@", location)
+
+
+def _engine_of(url: str) -> sa.Engine:
+    """Return an engine for a database that is named by URL. Raises BadInput for one that is not known here."""
+    known = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
+    try:
+        if sa.make_url(url).get_backend_name() == "postgresql":
+            return sa.create_engine(url)
+    except (sa.exc.ArgumentError, ValueError):  # ValueError: a port that is no number
+        pass
+    except ModuleNotFoundError as error:
+        raise BadInput(
+            f"--database {shown(url)}: {error.name} is not installed here: `pip install 'labctl[postgresql]'`; {known}"
+        ) from error
+    raise BadInput(f"--database {shown(url)}: no database that labctl knows; {known}")
 
 
 class Database:
@@ -77,7 +119,7 @@ class Database:
     """
 
     def __init__(self, location: str, *, write: bool, url: str | None = None, as_it_is: bool = False) -> None:
-        self.location = location
+        self.location, self._shown = location, shown(location)
         self.writes = write
         self._guard = threading.RLock()
         self._lock: FileLock | None = None
@@ -112,8 +154,7 @@ class Database:
         except Timeout:
             self._lock = None
             holder = _read_note(self.location)
-            where = f"the service at {holder.url}" if holder.url else f"another labctl (process {holder.pid})"
-            raise Conflict(f"{self.location}: {where} writes to this database now; wait for it, or ask it") from None
+            raise Conflict(f"{self.location}: {_held_by(holder)}") from None
         try:
             self.announce(url)
         except OSError:
@@ -127,7 +168,7 @@ class Database:
 
     def _make_engine(self, *, write: bool) -> sa.Engine:
         if not self._sqlite:
-            return sa.create_engine(self.location)
+            return _engine_of(self.location)
         options: dict[str, Any] = {"poolclass": StaticPool} if write else {}
         engine = sa.create_engine(
             f"sqlite:///{self.location}",
@@ -159,7 +200,7 @@ class Database:
                 found = migrations.revision_of(connection)
             if found == migrations.HEAD:
                 return
-            migrations.refuse_unknown(found, self.location)
+            migrations.refuse_unknown(found, self._shown)
             if not write:
                 Database(self.location, write=True).close()
                 return
@@ -167,7 +208,7 @@ class Database:
                 migrations.upgrade(connection)
         except DatabaseError as error:
             raise StoreError(
-                f"{self.location}: not a labctl database, or damaged ({error.orig}); "
+                f"{self._shown}: not a labctl database, or damaged ({error.orig}); "
                 "restore a backup, or name another file with --database"
             ) from error
 
@@ -200,8 +241,8 @@ class Database:
     def _trouble(self, error: sa.exc.DatabaseError) -> StoreError:
         full = getattr(error.orig, "sqlite_errorcode", None) == SQLITE_FULL
         if full or getattr(error.orig, "sqlstate", None) == POSTGRESQL_DISK_FULL:
-            return DiskFull(f"{self.location}: the disk is full; nothing of this act was kept. Make room, then go on")
-        return StoreError(f"{self.location}: {error.orig}; nothing of this act was kept")
+            return DiskFull(f"{self._shown}: the disk is full{NOT_KEPT}. Make room, then go on")
+        return StoreError(f"{self._shown}: {error.orig}{NOT_KEPT}")
 
     def _sync(self, synced: bool) -> None:
         if not self._sqlite or synced == self._synced:
@@ -220,7 +261,7 @@ class Database:
             with self._reader.connect() as connection:
                 yield connection
         except sa.exc.DatabaseError as error:
-            raise StoreError(f"{self.location}: {error.orig}") from error
+            raise StoreError(f"{self._shown}: {error.orig}") from error
 
     def close(self) -> None:
         """Close the database and let the next writer in."""

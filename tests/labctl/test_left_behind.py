@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import signal
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -10,20 +12,23 @@ from typing import Any
 
 import pytest
 import sqlalchemy as sa
+from typer.testing import CliRunner
 
 from instruments.bench import BenchFile
 from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
 from labctl.api.server import ServeRequest, open_house
+from labctl.cli.app import app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
 from labctl.services import bench_runner, resuming
 from labctl.services.acts import CampaignRequest
 from labctl.services.bench_runner import BenchRunner
+from labctl.services.campaigns import campaign_status, list_campaigns
 from labctl.services.house import House
 from labctl.services.opening import LocalActs
 from labctl.services.planning import load_bench
 from labctl.services.recordings import newest_recording
-from labctl.services.running import prepare, run
+from labctl.services.running import StartRequest, prepare, run, run_here
 from labctl.store import Store, open_store
 from labctl.store.database import Database
 from procedures.control import Control
@@ -256,3 +261,109 @@ def test_simulate_never_takes_a_real_bench(tmp_path: Path) -> None:
     asked = ServeRequest(bench="example-real", simulate=True, database=str(tmp_path / "lab.sqlite"))
     with pytest.raises(BadInput, match="--simulate with --bench example-real: that bench has real instruments"):
         open_house(asked, None)
+
+
+def labctl(location: str, *arguments: str) -> Any:
+    return CliRunner().invoke(app, [*arguments, "--database", location])
+
+
+@pytest.fixture
+def left(tmp_path: Path) -> str:
+    """A database in which a campaign was left half done by a process that is gone."""
+    location = str(tmp_path / "lab.sqlite")
+    with open_store(location, write=True) as opened:
+        left_running(opened)
+    return location
+
+
+@pytest.mark.parametrize("look", [lambda store: campaign_status(store, 1), lambda store: list_campaigns(store)[0]])
+def test_a_campaign_that_ends_while_it_is_looked_at_was_not_left(
+    left: str, monkeypatch: pytest.MonkeyPatch, look: Any
+) -> None:
+    def ends(_store: Store) -> bool:
+        with open_store(left, write=True) as writer:
+            writer.campaigns.close_unfinished(1, "enough", AT, "aborted")
+        return False
+
+    monkeypatch.setattr(Store, "is_held", property(ends))
+    with open_store(left, write=False) as reader:
+        answer = look(reader)
+    assert (answer.state, answer.abandoned, answer.reason) == ("aborted", False, "enough")
+
+
+@pytest.mark.usefixtures("real")
+def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str) -> None:
+    status = labctl(left, "bench", "status")
+    assert (status.exit_code, "nothing is unconfirmed" in status.stdout) == (1, False)
+    what = "campaign 1 was cut short at 0 %; `labctl campaign resume 1` takes it up, `labctl campaign abort 1` ends it"
+    assert what in status.stdout
+    assert json.loads(labctl(left, "bench", "status", "--json").stdout)[0]["left"] == [what]
+    refused = labctl(left, "campaign", "start", "short", "--bench", BENCH.name)
+    assert (refused.exit_code, what in refused.stderr) == (2, True)
+    with open_store(left, write=True) as opened:
+        assert len(opened.campaigns.all()) == 1
+        assert "labctl campaign" not in labctl(left, "bench", "status").stdout  # somebody writes: it may be running
+    assert labctl(left, "campaign", "abort", "1").exit_code == 0
+    again = json.loads(labctl(left, "bench", "status", "--json").stdout)[0]
+    assert (again["left"], "before it could make the bench safe" in again["unconfirmed"]) == ([], True)
+
+
+def test_a_simulated_bench_only_says_that_a_campaign_was_left(left: str) -> None:
+    assert labctl(left, "bench", "status").exit_code == 0
+    started = labctl(left, "campaign", "start", "short", "--bench", BENCH.name, "--json")
+    assert "campaign 1 was cut short at 0 %; `labctl campaign resume 1` takes it up" in started.stderr
+    assert (json.loads(started.stdout)["id"], json.loads(started.stdout)["state"]) == (2, "done")
+
+
+@pytest.mark.parametrize(("complaints", "said"), [
+    ((), "bench single-axis-sim is safe, but that could not be written down;"),
+    (("table to rest: no answer",), "NOT confirmed safe, and that could not be written down: table to rest: no answer"),
+])  # fmt: skip
+def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, complaints: tuple[str, ...], said: str
+) -> None:
+    disk, location = FullDisk(monkeypatch), str(tmp_path / "lab.sqlite")
+    monkeypatch.setattr("procedures.engine.make_safe", lambda *_: complaints)
+
+    def fills(answer: Any) -> None:
+        disk.full = disk.full or answer.step == 5
+
+    with pytest.raises(DiskFull) as caught:
+        run_here(location, StartRequest(recipe="short", bench=BENCH.name), fills)
+    text = str(caught.value)
+    assert text.startswith("campaign 1 was cut short: the disk is full; what was measured before is kept; ")
+    assert said in text
+    assert text.endswith("`labctl campaign resume 1` goes on with it")
+    assert "nothing of this act" not in text
+
+
+def test_a_service_that_starts_says_what_it_finds(left: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def serve(_request: Any, ready: Any) -> str:
+        ready("http://127.0.0.1:1")
+        return ""
+
+    monkeypatch.setattr("labctl.api.server.serve_forever", serve)
+    assert "campaign 1 was cut short at 0 % and is taken up now" in labctl(left, "serve", "--bench", BENCH.name).stdout
+    with open_store(left, write=True) as opened:
+        opened.benches.mark(BENCH.name, "table to rest: no answer", AT)
+    lines = labctl(left, "serve", "--bench", BENCH.name).stdout.splitlines()
+    assert len(lines) == 3
+    assert "is NOT confirmed safe: table to rest: no answer" in lines[1]
+    assert lines[2].startswith("campaign 1 was cut short at 0 % and is not taken up: ")
+    told = json.loads(labctl(left, "serve", "--bench", BENCH.name, "--json").stdout)
+    assert (told["url"], "no answer" in told["unconfirmed"]) == ("http://127.0.0.1:1", True)
+    other = json.loads(labctl(left, "serve", "--bench", "triaxial-sim", "--json").stdout)
+    assert (other["unconfirmed"], other["cut_short"]) == ("", "")
+
+
+def test_another_terminal_is_told_where_a_campaign_runs(tmp_path: Path) -> None:
+    location, said = str(tmp_path / "lab.sqlite"), []
+
+    def look(_answer: Any) -> None:
+        if not said:
+            said.extend(labctl(location, "campaign", act, "1") for act in ("pause", "abort", "resume"))
+
+    run_here(location, StartRequest(recipe="short"), look)
+    for result in said:
+        assert result.exit_code == 2
+        assert f"campaign 1 runs in process {os.getpid()}'s terminal: Ctrl-C there ends it safely" in result.stderr

@@ -170,6 +170,26 @@ def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(tmp_path: Path, nu
 
 
 @pytest.mark.timeout(400)
+def test_impatience_after_the_end_was_written_changes_nothing_any_more(tmp_path: Path) -> None:
+    database = tmp_path / "lab.sqlite"
+    arguments = ("campaign", "start", "short", "--bench", "single-axis-sim", "--speed", "15", "--json")
+    with subprocess.Popen(
+        command(database, *arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        begun(database)
+        process.send_signal(signal.SIGINT)
+        while process.poll() is None and ended(database)[0] != "aborted":
+            SystemClock().sleep(0.01)  # another process has its own pace
+        while process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            SystemClock().sleep(0.002)
+        _, said = process.communicate(timeout=100)
+    assert process.returncode == 130, said
+    assert said.count("\n") == 1
+    assert "campaign 1 was stopped; bench single-axis-sim is safe" in said
+
+
+@pytest.mark.timeout(400)
 def test_a_service_that_is_interrupted_twice_ends_its_campaign_first(tmp_path: Path) -> None:
     database = tmp_path / "lab.sqlite"
     arguments = ("serve", "--bench", "single-axis-sim", "--speed", "15", "--port", "0", "--json")

@@ -16,9 +16,10 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from sqlalchemy.dialects import postgresql
 
-from labctl.errors import Conflict, NotCertified, NotFound, StoreError
+from labctl.errors import BadInput, Conflict, NotCertified, NotFound, StoreError
 from labctl.recording import Recording, RecordingInfo, to_points
 from labctl.store import NewCalibration, Store, holder_of, migrations, open_store, tables
+from labctl.store.database import Database
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
@@ -179,3 +180,15 @@ def test_certifying_an_older_version_is_a_rollback(store: Store) -> None:
 def test_naive_instants_are_refused(store: Store) -> None:
     with pytest.raises(sa.exc.StatementError, match="needs a time zone"):
         store.calibrations.add("G-1", datetime(2026, 1, 1), _calibration)  # noqa: DTZ001  that is the point
+
+
+@pytest.mark.parametrize("url", [
+    "postgres://ada:secret@x/y", "sqlite:///lab.sqlite", "nonsense://ada:s@cret@x", "://ada:secret@",
+    "postgresql+psycopg://ada:secret@x:port/y", "postgresql+psycopg9://ada:secret@x/y",
+])  # fmt: skip
+def test_a_database_url_that_labctl_does_not_know_is_refused_without_its_password(url: str) -> None:
+    with pytest.raises(BadInput, match=r"--database .*path of an SQLite file, or postgresql\+psycopg://") as caught:
+        Store(Database(url, write=False))
+    assert url.partition("://")[0] in str(caught.value)
+    assert "secret" not in str(caught.value)
+    assert "cret" not in str(caught.value)

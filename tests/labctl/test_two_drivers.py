@@ -148,6 +148,10 @@ def test_the_second_is_refused_and_takes_over_when_the_first_is_killed(simulator
     heard_before_the_kill = len(simulator.heard)
     first.send_signal(signal.SIGKILL)
     first.wait(timeout=WAIT_S)
+    assert "labctl campaign abort 1" in simulator.refused("lab.sqlite")  # a person decides about what was left
+    for decided in (["campaign", "abort", "1"], ["bench", "clear", "single-axis-sim", "--by", "Ada"]):
+        command = [sys.executable, "-m", "labctl", *decided, "--database", str(simulator.folder / "lab.sqlite")]
+        subprocess.run(command, check=True, capture_output=True)
     second = simulator.drive(SECOND_DPS, "lab.sqlite")
     simulator.wait_for(speed_command(SECOND_DPS))
     simulator.wait_for("!1m1")
