@@ -14,6 +14,7 @@ import sqlalchemy as sa
 from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy.dialects import postgresql
 
 from labctl.errors import BadInput, Conflict, NotCertified, NotFound, StoreError
@@ -55,6 +56,19 @@ def test_migrations_make_todays_tables(location: str) -> None:
     with engine.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": False})
         assert compare_metadata(context, tables.metadata) == []
+    engine.dispose()
+
+
+def test_the_steps_are_those_that_alembic_finds(location: str) -> None:
+    scripts = ScriptDirectory.from_config(migrations.configuration())
+    assert scripts.get_current_head() == migrations.HEAD
+    assert {script.revision for script in scripts.walk_revisions()} == migrations.KNOWN
+    engine = sa.create_engine(f"sqlite:///{location}")
+    with engine.connect() as connection:
+        assert migrations.revision_of(connection) is None
+    with open_store(location, write=True), engine.connect() as connection:
+        assert migrations.revision_of(connection) == migrations.HEAD
+        assert MigrationContext.configure(connection).get_current_revision() == migrations.HEAD
     engine.dispose()
 
 
