@@ -101,10 +101,17 @@ class BenchBusy(Conflict):
 
 
 class StoreError(LabctlError):
-    """The database cannot be used: newer than the code, damaged, locked, or the disk is full."""
+    """The database cannot be used: newer than the code, damaged, locked, or the disk is full.
+
+    `cause` says what happened, without what became of the act that met it.
+    """
 
     status = 503
     slug = "store"
+
+    def __init__(self, text: str, *, cause: str = "") -> None:
+        super().__init__(text)
+        self.cause = cause or text
 
 
 class DiskFull(StoreError):

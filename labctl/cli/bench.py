@@ -38,11 +38,11 @@ def check(
 @app.command("status")
 def status(as_json: Json = False, database: Database = None) -> None:
     """Say which benches were not confirmed safe when their last campaign ended, or had none: their process is gone."""
-    from labctl.services.benches import look_at_benches
+    from labctl.services.benches import bench_statuses
     from labctl.services.reading import open_reading
 
     with one_clear_line(), open_reading(database) as store:
-        benches = look_at_benches(store)
+        benches = bench_statuses(store)
     if as_json:
         print_json(benches)
     else:

@@ -278,6 +278,9 @@ class BenchStatus(Answer):
     last_used_at: datetime
     unconfirmed: str = Field(default="", description="Until a person has looked and clears it; empty when all is well.")
     unconfirmed_at: datetime | None = None
+    left: list[str] = Field(
+        default_factory=list, description="Campaigns that no process runs any more and nobody has ended."
+    )
 
 
 class StartEventAnswer(Answer):

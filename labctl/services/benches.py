@@ -7,8 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
 from instruments.bench import shipped_benches
 from instruments.clock import ScaledClock, SystemClock, VirtualClock
 from instruments.open import check
@@ -43,17 +41,6 @@ def bench_status(row: BenchRow) -> BenchStatus:
 
 
 def bench_statuses(store: Store) -> list[BenchStatus]:
-    """Return every bench that was used, and what its last safe state could not confirm."""
-    return [bench_status(row) for row in store.benches.all()]
-
-
-class BenchLook(BenchStatus):
-    """A bench, and the campaigns that were left on it."""
-
-    left: list[str] = Field(default=[], description="Campaigns that no process runs any more and nobody has ended.")
-
-
-def look_at_benches(store: Store) -> list[BenchLook]:
     """Return every bench that was used, with the campaigns that were left on it by a process that is gone.
 
     Those of simulated benches are left out: such a bench ended with its process.
@@ -62,7 +49,7 @@ def look_at_benches(store: Store) -> list[BenchLook]:
     for answer in left_behind(store):
         if outlives_its_process(store.campaigns.get(answer.id)):
             left.setdefault(answer.bench, []).append(cut_short(answer))
-    return [BenchLook(**asdict(row), left=left.get(row.name, [])) for row in store.benches.all()]
+    return [bench_status(row).model_copy(update={"left": left.get(row.name, [])}) for row in store.benches.all()]
 
 
 def serve_simulator(

@@ -119,12 +119,15 @@ def left_behind(store: Store) -> list[CampaignAnswer]:
     return [answer for answer in _told(store, store.campaigns.unfinished) if answer.abandoned]
 
 
+def how_far(answer: CampaignAnswer) -> str:
+    """Say that a campaign was left, and how far it was."""
+    return f"campaign {answer.id} was cut short at {100 * answer.progress:.0f} %"
+
+
 def cut_short(answer: CampaignAnswer) -> str:
     """Say that a campaign was left, and what a person can do about it."""
-    return (
-        f"campaign {answer.id} was cut short at {100 * answer.progress:.0f} %; `labctl campaign resume {answer.id}` "
-        f"takes it up, `labctl campaign abort {answer.id}` ends it"
-    )
+    takes_up, ends = f"`labctl campaign resume {answer.id}`", f"`labctl campaign abort {answer.id}`"
+    return f"{how_far(answer)}; {takes_up} takes it up, {ends} ends it"
 
 
 def outlives_its_process(row: CampaignRow) -> bool:

@@ -15,7 +15,7 @@ from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.services.acts import ResumeRequest
 from labctl.services.answers import CampaignAnswer
-from labctl.services.campaigns import from_rows
+from labctl.services.campaigns import from_rows, how_far
 from labctl.services.leases import holding, open_for
 from labctl.services.planning import load_bench
 from labctl.services.power import boot_id, power_failed
@@ -136,7 +136,7 @@ def to_be_taken_up(store: Store, bench: str) -> str:
     row = next((row for row in store.campaigns.unfinished() if row.bench_name == bench), None)
     if row is None:
         return ""
-    text = f"campaign {row.id} was cut short at {100 * from_rows(store, row).progress:.0f} %"
+    text = how_far(from_rows(store, row))
     if store.benches.unconfirmed(bench):
         return f"{text} and is not taken up: bench {bench} was not confirmed safe"
     if why_not := too_often(store.interruptions.standing(row.id)):

@@ -24,7 +24,7 @@ from labctl.services.leases import holding, open_for
 from labctl.services.planning import bench_for, load_bench, load_recipe
 from labctl.services.power import boot_id
 from labctl.store import NewCampaign, NewUnit, Store
-from labctl.store.database import NOT_KEPT, note_campaign
+from labctl.store.database import note_campaign
 from procedures.control import Control
 from procedures.engine import Engine
 from procedures.limits import BenchLimits
@@ -223,9 +223,8 @@ def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: S
         left = f"bench {bench} is NOT confirmed safe, and that could not be written down: {complaints}; look at it"
     elif not complaints and not ended:
         left += ", but that could not be written down"
-    cause = str(error).partition(NOT_KEPT)[0]
     return (
-        f"campaign {campaign} was cut short: {cause}; what was measured before is kept; {left}; once there is room "
+        f"campaign {campaign} was cut short: {error.cause}; what was measured before is kept; {left}; once there is room "
         f"again, `labctl campaign resume {campaign}` goes on with it"
     )
 

@@ -28,7 +28,6 @@ from labctl.store.seal import count_commit, missing, seal
 BUSY_MS = 5000
 #: What SQLite and PostgreSQL call a full disk.
 SQLITE_FULL, POSTGRESQL_DISK_FULL = 13, "53100"
-NOT_KEPT = "; nothing of this act was kept"
 
 
 @dataclass(frozen=True)
@@ -241,8 +240,10 @@ class Database:
     def _trouble(self, error: sa.exc.DatabaseError) -> StoreError:
         full = getattr(error.orig, "sqlite_errorcode", None) == SQLITE_FULL
         if full or getattr(error.orig, "sqlstate", None) == POSTGRESQL_DISK_FULL:
-            return DiskFull(f"{self._shown}: the disk is full{NOT_KEPT}. Make room, then go on")
-        return StoreError(f"{self._shown}: {error.orig}{NOT_KEPT}")
+            cause = f"{self._shown}: the disk is full"
+            return DiskFull(f"{cause}; nothing of this act was kept. Make room, then go on", cause=cause)
+        cause = f"{self._shown}: {error.orig}"
+        return StoreError(f"{cause}; nothing of this act was kept", cause=cause)
 
     def _sync(self, synced: bool) -> None:
         if not self._sqlite or synced == self._synced:

@@ -151,15 +151,22 @@ def ended(database: Path) -> tuple[str, str]:
         return row.state, row.reason
 
 
-@pytest.mark.timeout(400)
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(tmp_path: Path, number: signal.Signals) -> None:
-    database = tmp_path / "lab.sqlite"
+@contextlib.contextmanager
+def campaigning(database: Path) -> Iterator[subprocess.Popen[str]]:
+    """A campaign at a terminal of its own that has begun to measure."""
     arguments = ("campaign", "start", "short", "--bench", "single-axis-sim", "--speed", "15", "--json")
     with subprocess.Popen(
         command(database, *arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         begun(database)
+        yield process
+
+
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(tmp_path: Path, number: signal.Signals) -> None:
+    database = tmp_path / "lab.sqlite"
+    with campaigning(database) as process:
         process.send_signal(number)
         process.send_signal(number)
         _, said = process.communicate(timeout=100)
@@ -172,11 +179,7 @@ def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(tmp_path: Path, nu
 @pytest.mark.timeout(400)
 def test_impatience_after_the_end_was_written_changes_nothing_any_more(tmp_path: Path) -> None:
     database = tmp_path / "lab.sqlite"
-    arguments = ("campaign", "start", "short", "--bench", "single-axis-sim", "--speed", "15", "--json")
-    with subprocess.Popen(
-        command(database, *arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        begun(database)
+    with campaigning(database) as process:
         process.send_signal(signal.SIGINT)
         while process.poll() is None and ended(database)[0] != "aborted":
             SystemClock().sleep(0.01)  # another process has its own pace
