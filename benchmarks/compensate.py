@@ -6,7 +6,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from benchmarks.machine import describe, median_s
-from labctl.fitting.horner import Surface
+from labctl.fitting.models.polynomial_surface import Surface
 
 N = 4_000_000
 

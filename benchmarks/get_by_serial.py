@@ -15,7 +15,8 @@ import sqlalchemy as sa
 
 from benchmarks.machine import describe
 from benchmarks.served import serve
-from labctl.store import open_store, tables
+from labctl.store import open_store
+from labctl.store.schema import tables
 
 UNITS = 100_000
 PER_S = 500

@@ -12,7 +12,7 @@ import httpx
 from benchmarks.browser import chromium, marked_s, opened, version
 from benchmarks.machine import describe
 from benchmarks.served import serve
-from labctl.services.running import StartRequest, run_here
+from labctl.services.campaigns.execution import StartRequest, run_here
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

@@ -14,7 +14,7 @@ from typing import Any
 
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
-from labctl.fitting.papers import in_paper_units
+from labctl.fitting.models.paper_units import in_paper_units
 from labctl.recording import OutputUnit, RecordingInfo
 
 SCHEMA = "labctl-calibration/1"

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
-from labctl.fitting.channels import Channels
-from labctl.fitting.horner import Surface, surface_of
-from labctl.fitting.linear import Linear, linear_of
-from labctl.fitting.model import FittedModel
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.models.error_model import FittedModel
+from labctl.fitting.models.matrix_form import Linear, linear_of
+from labctl.fitting.models.polynomial_surface import Surface, surface_of
 
 Array = NDArray[np.float64]
 Outside = Literal["clamp", "refuse"]

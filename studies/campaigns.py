@@ -7,13 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from instruments.bench import BenchFile, GyroSettings, SimulationSettings
+from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
 from instruments.clock import VirtualClock
-from instruments.ports import open_simulation
+from instruments.transport.factory import open_simulation
 from labctl.recording import Recording
-from labctl.services.planning import limits_of, load_bench, load_recipe
-from labctl.services.sizing import hidden_recording
-from procedures.plan import Plan, make_plan
+from labctl.services.planning.loading import limits_of, load_bench, load_recipe
+from labctl.services.simulation.sizing import hidden_recording
+from procedures.planning.plan import Plan, make_plan
 
 #: name -> recipe, bench, readings per second, whether re-ordered
 PROTOCOLS = {

@@ -11,14 +11,14 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.bench import SimulationSettings
+from instruments.bench_config import SimulationSettings
 from instruments.clock import VirtualClock
-from instruments.ports import open_simulation
+from instruments.transport.factory import open_simulation
 from labctl.fitting import fit
-from labctl.fitting.fit import FitResult
-from labctl.services.planning import limits_of, load_bench, load_recipe
-from labctl.services.simulate import simulate
-from procedures.plan import make_plan
+from labctl.fitting.estimation.fit import FitResult
+from labctl.services.planning.loading import limits_of, load_bench, load_recipe
+from labctl.services.simulation.recordings import simulate
+from procedures.planning.plan import make_plan
 
 SEEDS = 20
 RATE_HZ = 10.0

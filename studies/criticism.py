@@ -16,17 +16,17 @@ from typing import Any
 import numpy as np
 
 from labctl.errors import LabctlError
-from labctl.fitting.context import context_of
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.residuals import residuals_of
 from labctl.fitting.criticism.verdict import overlap
-from labctl.fitting.fit import fit_context
-from labctl.fitting.model import ErrorModel
-from labctl.fitting.presets import changed, preset_for
+from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.estimation.fit import fit_context
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording
-from studies import peers, tables
+from studies import baselines, report_tables
 from studies.campaigns import MODELS, OUTSIDE, PROTOCOLS, campaign
-from studies.sizes import sizes
+from studies.effect_sizes import sizes
 
 Task = dict[str, Any]
 ROOT = Path(__file__).resolve().parent.parent
@@ -52,7 +52,7 @@ ANSWERED_BY = (
     "labctl/recording",
     "instruments/simulators",
     "studies/campaigns.py",
-    "studies/peers.py",
+    "studies/baselines.py",
 )
 
 
@@ -98,7 +98,7 @@ def one(task: Task) -> Task:
         answer["drift"] = replace(found, residuals=residuals_of(found.weighed)).drift_over_datasheet
     if WITH_PEERS and found.weighed is not None:
         designs = found.weighed.designs
-        answer["peers"] = clock("peers", lambda: peers.ask(found.data, designs))
+        answer["peers"] = clock("peers", lambda: baselines.ask(found.data, designs))
     return {**answer, "seconds": clock.seconds}
 
 
@@ -179,7 +179,7 @@ def answers_file() -> Path:
 
 def run() -> str:
     """Run what is not yet there, and return the tables."""
-    if WITH_PEERS and (absent := peers.missing()):
+    if WITH_PEERS and (absent := baselines.missing()):
         return f"not installed: {', '.join(absent)}; `make study` installs them, LABCTL_STUDY_PEERS=0 does without"
     kept = answers_file()
     kept.parent.mkdir(parents=True, exist_ok=True)
@@ -194,7 +194,7 @@ def run() -> str:
             out.flush()
             if number % 50 == 0:
                 print(f"{number} of {len(left)}", file=sys.stderr)
-    return tables.report([done[_key(task)] for task in wanted], peers.versions() if WITH_PEERS else {})
+    return report_tables.report([done[_key(task)] for task in wanted], baselines.versions() if WITH_PEERS else {})
 
 
 def _read(kept: Path) -> dict[str, Task]:

@@ -12,17 +12,17 @@ from typing import Any, get_args
 
 import numpy as np
 
-from instruments.bench import BenchFile
+from instruments.bench import open_bench
+from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
-from instruments.gyro import Readings
-from instruments.open import open_bench
-from instruments.ports import Simulation, open_simulation
-from instruments.simulators.faults import FaultKind
-from labctl.services import running
-from labctl.services.planning import load_bench
+from instruments.interfaces.gyro import Readings
+from instruments.simulators.links.faults import FaultKind
+from instruments.transport.factory import Simulation, open_simulation
+from labctl.services.campaigns import execution
+from labctl.services.planning.loading import load_bench
 from labctl.store import Store, StoreJournal
-from labctl.store.database import Database
-from studies.mortal import all_readings
+from labctl.store.connection.database import Database
+from studies.crashable_process import all_readings
 
 CAMPAIGNS = int(os.environ.get("LABCTL_STUDY_FAULTS", "500"))
 RECIPE = """
@@ -164,13 +164,13 @@ def _campaign(seed: int, bench: BenchFile, armed: tuple[Armed, ...], folder: Pat
     store = Store(database)
     hung = False
     opened = open_bench(bench, clock, simulation)
-    prepared = running.prepare(store, RECIPE, bench, clock, clip=False, opened=opened)
+    prepared = execution.prepare(store, RECIPE, bench, clock, clip=False, opened=opened)
     journal = CountingJournal(database, prepared.id)
     store.campaigns.journal = lambda _: journal  # type: ignore[method-assign]  # what a study looks through
     for each in armed:
         simulation.faults(each.url).arm(each.kind, **each.settings)
     try:
-        running.run(store, prepared)
+        execution.run(store, prepared)
     except Hung:
         hung = True
     row = store.campaigns.get(prepared.id)

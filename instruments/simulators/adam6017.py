@@ -6,11 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from instruments.bench import BenchFile
-from instruments.gyrostar import CHANNELS, FULL_CODE, RANGES_V, Options
-from instruments.simulators.faults import Faults
-from instruments.simulators.modbus_device import ModbusDevice, int16, items
-from instruments.simulators.world import World
+from instruments.bench_config import BenchFile
+from instruments.drivers.gyrostar import CHANNELS, FULL_CODE, RANGES_V, Options
+from instruments.simulators.links.faults import Faults
+from instruments.simulators.links.modbus_device import ModbusDevice, int16, items
+from instruments.simulators.physics.world import World
 
 UNUSED_RANGE = 0x0143
 

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from instruments.bench import BenchFile
+from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from instruments.errors import LinkError
 from instruments.simulators.adam6017 import Adam6017
-from instruments.simulators.arrick import SimulatedC4
+from instruments.simulators.arrick_c4 import SimulatedC4
 from instruments.simulators.device import SimulatedDevice
-from instruments.simulators.faults import Faults, FaultyWire
 from instruments.simulators.kvh import SimulatedDsp3000, SimulatedRd2100
-from instruments.simulators.sim_serial import room_bytes
-from instruments.simulators.stim import SimulatedStim300
+from instruments.simulators.links.faults import Faults, FaultyWire
+from instruments.simulators.links.serial_port import room_bytes
+from instruments.simulators.physics.world import World
+from instruments.simulators.stim300 import SimulatedStim300
 from instruments.simulators.watlow_f4 import SimulatedF4
 from instruments.simulators.watlow_f4t import SimulatedF4T
-from instruments.simulators.world import World
 
 Factory = Callable[[World, BenchFile, str, Faults], SimulatedDevice]
 

@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from instruments.bench import BenchFile
-from instruments.kvh import DSP3000, RD2100, LineFormat
-from instruments.simulators.faults import Faults
-from instruments.simulators.world import World
+from instruments.bench_config import BenchFile
+from instruments.drivers.kvh import DSP3000, RD2100, LineFormat
+from instruments.simulators.links.faults import Faults
+from instruments.simulators.physics.world import World
 
 #: Lines that a port can hold: older ones are skipped.
 MOST_LINES = 400

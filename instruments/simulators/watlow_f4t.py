@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from instruments.bench import BenchFile
-from instruments.simulators.faults import Faults
-from instruments.simulators.modbus_device import Cell, ModbusDevice, constant, float32, int16, items
-from instruments.simulators.world import World
+from instruments.bench_config import BenchFile
+from instruments.simulators.links.faults import Faults
+from instruments.simulators.links.modbus_device import Cell, ModbusDevice, constant, float32, int16, items
+from instruments.simulators.physics.world import World
 
 ROOM_C = 25.0
 ALARMS = 4

@@ -9,21 +9,10 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from labctl import web
-from labctl.api import (
-    api_docs,
-    calibrations,
-    campaigns,
-    health,
-    keys,
-    plans,
-    problems,
-    recordings,
-    schedule,
-    units,
-    watchdog,
-)
-from labctl.api.door import Access, Door
-from labctl.services.house import House
+from labctl.api import problems, swagger_ui, systemd
+from labctl.api.middleware import Access, Door
+from labctl.api.routers import admin, calibrations, campaigns, health, plans, recordings, schedule, units
+from labctl.services.app import House
 
 DESCRIPTION = """
 Calibrations of gyroscopes by serial number, the campaigns that measured them, and the recordings behind them.
@@ -50,11 +39,11 @@ def create_app(house: House, access: Access | None = None) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         house.start()
-        watchdog.ready()
+        systemd.ready()
         try:
             yield
         finally:
-            watchdog.stopping()
+            systemd.stopping()
             house.close()
 
     app = FastAPI(
@@ -68,7 +57,7 @@ def create_app(house: House, access: Access | None = None) -> FastAPI:
     )
     app.state.house = house
     problems.install(app)
-    rooms = (health, units, calibrations, plans, campaigns, schedule, recordings, keys, api_docs)
+    rooms = (health, units, calibrations, plans, campaigns, schedule, recordings, admin, swagger_ui)
     for room in rooms:
         app.include_router(room.router)
     web.install(app)

@@ -13,7 +13,7 @@ from starlette.exceptions import HTTPException
 
 from instruments.errors import InstrumentError
 from labctl.errors import DiskFull, LabctlError, NotIdentified, TooLarge
-from procedures.errors import PlanRefused, ProcedureError, StalePrompt
+from procedures.contracts.errors import PlanRefused, ProcedureError, StalePrompt
 
 TYPE_PREFIX = "urn:labctl:problem:"
 

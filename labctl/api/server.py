@@ -12,19 +12,19 @@ from dataclasses import dataclass
 import uvicorn
 
 from instruments.clock import Clock, WallClock
-from labctl.api import watchdog
+from labctl.api import systemd
 from labctl.api.app import create_app
-from labctl.api.door import LOOPBACK_NAMES, MIB, Access
+from labctl.api.middleware import LOOPBACK_NAMES, MIB, Access
 from labctl.config import default_database
 from labctl.errors import BadInput
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.house import House
-from labctl.services.keys import refuse_open_doors
-from labctl.services.leases import hold_bench
-from labctl.services.planning import load_bench
-from labctl.services.running import clock_for
+from labctl.services.admin.api_keys import refuse_open_doors
+from labctl.services.app import House
+from labctl.services.benches.lease import hold_bench
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.execution import clock_for
+from labctl.services.planning.loading import load_bench
 from labctl.store import Store
-from labctl.store.database import Database
+from labctl.store.connection.database import Database
 
 SIMULATED_BENCH = "triaxial-sim"
 LAST_PORT = 65535
@@ -97,7 +97,7 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> str:
             house.close()
             raise
         settings = uvicorn.Config(
-            app, log_level="warning", lifespan="on", callback_notify=watchdog.alive, timeout_notify=watchdog.period_s(),
+            app, log_level="warning", lifespan="on", callback_notify=systemd.alive, timeout_notify=systemd.period_s(),
             proxy_headers=False,
         )  # fmt: skip
         server = uvicorn.Server(settings)

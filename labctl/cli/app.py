@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from labctl.actor import Actor, acting
-from labctl.cli import bench, calibrations, campaign, criticism, keeping, recordings, running, serving
+from labctl.cli import admin, bench, calibrations, campaign, campaign_control, criticism, recordings, server
 from labctl.config import os_user
 
 app = typer.Typer(
@@ -22,14 +22,14 @@ app = typer.Typer(
 )
 app.add_typer(bench.app, name="bench")
 app.add_typer(campaign.app, name="campaign")
-running.add_to(campaign.app)
+campaign_control.add_to(campaign.app)
 app.add_typer(recordings.export_app, name="export")
-app.add_typer(keeping.key_app, name="key")
-app.add_typer(keeping.audit_app, name="audit")
+app.add_typer(admin.key_app, name="key")
+app.add_typer(admin.audit_app, name="audit")
 COMMANDS: dict[str, Callable[..., None]] = {
-    "demo": serving.demo,
-    "serve": serving.serve,
-    "simulator": serving.simulator,
+    "demo": server.demo,
+    "serve": server.serve,
+    "simulator": server.simulator,
     "simulate": recordings.simulate,
     "import": recordings.import_,
     "fit": calibrations.fit,
@@ -41,8 +41,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "revoke": calibrations.revoke,
     "calibration": calibrations.calibration,
     "compensate": calibrations.compensate,
-    "backup": keeping.backup,
-    "check": keeping.check,
+    "backup": admin.backup,
+    "check": admin.check,
 }
 for name, command in COMMANDS.items():
     app.command(name)(command)

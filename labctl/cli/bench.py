@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from labctl.cli.errors import one_clear_line
+from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json
 
@@ -20,7 +20,7 @@ def check(
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
     """Talk to every instrument of a bench and say what answered. Nothing moves."""
-    from labctl.services.benches import check_bench
+    from labctl.services.benches.check import check_bench
 
     with one_clear_line():
         checks = check_bench(bench)
@@ -38,8 +38,8 @@ def check(
 @app.command("status")
 def status(as_json: Json = False, database: Database = None) -> None:
     """Say which benches were not confirmed safe when their last campaign ended, or had none: their process is gone."""
-    from labctl.services.benches import bench_statuses
-    from labctl.services.reading import open_reading
+    from labctl.services.benches.check import bench_statuses
+    from labctl.services.commands.open import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         benches = bench_statuses(store)
@@ -63,8 +63,8 @@ def clear(
     database: Database = None,
 ) -> None:
     """Say that you have looked at a bench that was not confirmed safe; campaigns may start on it again."""
-    from labctl.services.acts import ClearRequest
-    from labctl.services.opening import open_acts
+    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.protocol import ClearRequest
 
     with one_clear_line(), open_acts(database) as acts:
         answer = acts.clear_bench(bench, ClearRequest(by=by, reason=reason))
@@ -74,7 +74,7 @@ def clear(
 @app.command("list")
 def list_(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001
     """List the benches that ship with labctl."""
-    from labctl.services.benches import shipped
+    from labctl.services.benches.check import shipped
 
     benches = shipped()
     if as_json:

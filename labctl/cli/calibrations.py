@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from labctl.cli.errors import one_clear_line
+from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json, RecordingId, Serial
 from labctl.cli.output import console, figure, print_json, table
 
 if TYPE_CHECKING:
-    from labctl.services.answers import FitAnswer
+    from labctl.services.schemas.answers import FitAnswer
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
 By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it.")]
@@ -33,8 +33,8 @@ def fit(
     database: Database = None,
 ) -> None:
     """Fit a model to a recording; it becomes the unit's next calibration version."""
-    from labctl.services.acts import FitRequest
-    from labctl.services.opening import open_acts
+    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.protocol import FitRequest
 
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
     with one_clear_line(), open_acts(database) as acts:
@@ -81,7 +81,7 @@ def print_table(coefficients: dict[str, object]) -> None:
 
 def effects(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001
     """List the catalogue of physical effects and the model presets."""
-    from labctl.services.catalogue import catalogue
+    from labctl.services.effects import catalogue
 
     answer = catalogue()
     if as_json:
@@ -127,8 +127,8 @@ def _act(
     as_json: bool,
     database: str | None,
 ) -> None:
-    from labctl.services.acts import CertifyRequest
-    from labctl.services.opening import open_acts
+    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.protocol import CertifyRequest
 
     with one_clear_line(), open_acts(database) as acts:
         request = CertifyRequest(by=by, reason=reason, due_days=due_days)
@@ -149,8 +149,8 @@ def calibration(
     database: Database = None,
 ) -> None:
     """Print a calibration as a file to load elsewhere."""
-    from labctl.services.calibrations import calibration_file
-    from labctl.services.reading import open_reading
+    from labctl.services.calibrations.fitting import calibration_file
+    from labctl.services.commands.open import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         content = calibration_file(store, serial, version, format_).content
@@ -173,7 +173,7 @@ def compensate(
     database: Database = None,  # noqa: ARG001  needs none: a calibration file is enough
 ) -> None:
     """Correct a file of readings by a calibration file; needs no database."""
-    from labctl.services.compensation import compensate_file
+    from labctl.services.calibrations.apply import compensate_file
 
     with one_clear_line():
         answer = compensate_file(calibration_file, source, target, outside)

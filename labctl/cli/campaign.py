@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labctl.cli import schedule
-from labctl.cli.errors import ending_is_an_interrupt, one_clear_line
+from labctl.cli.error_reporting import ending_is_an_interrupt, one_clear_line
 from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import complaints, console, figure, print_json, table
 
 if TYPE_CHECKING:
-    from labctl.services.answers import CampaignAnswer, PlanAnswer
+    from labctl.services.schemas.answers import CampaignAnswer, PlanAnswer
 
 app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units.")
 app.add_typer(schedule.app, name="schedule")
@@ -34,8 +34,8 @@ def plan(
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
     """Say what a campaign would do and how long it takes. Nothing moves."""
-    from labctl.services.planning import describe_plan
-    from labctl.services.schedules import visibility as look
+    from labctl.services.planning.loading import describe_plan
+    from labctl.services.simulation.walk import visibility as look
 
     with one_clear_line():
         answer = describe_plan(recipe, bench, clip=clip, look=look if visibility else None)
@@ -105,13 +105,13 @@ def start(
 
     With --at or --cron it is entered into the schedule, which only a service (`labctl serve`) carries out.
     """
-    from labctl.cli.attendant import Attendant
-    from labctl.cli.progress import CampaignProgress
-    from labctl.services.acts import CampaignRequest
-    from labctl.services.opening import service_url
-    from labctl.services.planning import own_text
-    from labctl.services.running import StartRequest, run_here
-    from labctl.services.scheduling import is_scheduled
+    from labctl.cli.progress_bar import CampaignProgress
+    from labctl.cli.terminal_operator import Attendant
+    from labctl.services.campaigns.execution import StartRequest, run_here
+    from labctl.services.commands.local import service_url
+    from labctl.services.commands.protocol import CampaignRequest
+    from labctl.services.planning.loading import own_text
+    from labctl.services.schedule.queue import is_scheduled
 
     with one_clear_line():
         wanted = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}
@@ -122,7 +122,7 @@ def start(
             return
         request = StartRequest(recipe=recipe, bench=bench, clip=clip, speed=speed, seed=seed)
         if url := service_url(database):
-            from labctl.services.remote import RemoteActs
+            from labctl.services.commands.remote import RemoteActs
 
             answer = RemoteActs(url).start_campaign(request)
         else:
@@ -175,8 +175,8 @@ def print_campaign(answer: CampaignAnswer) -> None:
 @app.command("list")
 def list_(as_json: Json = False, database: Database = None) -> None:
     """List all campaigns, newest first."""
-    from labctl.services.campaigns import list_campaigns
-    from labctl.services.reading import open_reading
+    from labctl.services.campaigns.status import list_campaigns
+    from labctl.services.commands.open import open_reading
 
     with one_clear_line(), open_reading(database) as store:
         answers = list_campaigns(store)
@@ -202,14 +202,14 @@ def status(campaign: CampaignId = None, as_json: Json = False, database: Databas
 
 def look(database: str | None, campaign: int | None) -> CampaignAnswer:
     """Return where a campaign is; without a number the newest."""
-    from labctl.services.campaigns import campaign_status
-    from labctl.services.opening import service_url
-    from labctl.services.reading import open_reading
+    from labctl.services.campaigns.status import campaign_status
+    from labctl.services.commands.local import service_url
+    from labctl.services.commands.open import open_reading
 
     with open_reading(database) as store:
         answer = campaign_status(store, campaign)
     if url := service_url(database):
-        from labctl.services.remote import RemoteActs
+        from labctl.services.commands.remote import RemoteActs
 
         return RemoteActs(url).campaign(answer.id)
     return answer

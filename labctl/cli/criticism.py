@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from labctl.cli.errors import one_clear_line
+from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json, RecordingId, Serial
 from labctl.cli.output import console, figure, print_json, table
 
 if TYPE_CHECKING:
     from labctl.fitting.effects import Formula
-    from labctl.services.answers import CriticismAnswer, FitAnswer, LadderAnswer
+    from labctl.services.schemas.answers import CriticismAnswer, FitAnswer, LadderAnswer
 
 VersionOption = Annotated[int | None, typer.Option("--version", metavar="N", help="Version; default: the newest.")]
 FormulaOption = Annotated[
@@ -40,15 +40,15 @@ def criticise(
     database: Database = None,
 ) -> None:
     """Hold a version against a recording: what is left, where, and which effect may be missing."""
-    from labctl.services.criticism import criticise_unit, write_next
-    from labctl.services.reading import open_reading
+    from labctl.services.commands.open import open_reading
+    from labctl.services.criticism.criticise import criticise_unit, write_next
 
     with one_clear_line(), open_reading(database) as store:
         answer = criticise_unit(store, serial, version, recording, written(formula))
         if next_recipe is not None:
             write_next(answer, next_recipe)
         if report is not None:
-            from labctl.services.report import write_report
+            from labctl.services.criticism.report import write_report
 
             write_report(store, answer, report)
     if as_json:
@@ -163,9 +163,9 @@ def improve(
     database: Database = None,
 ) -> None:
     """Change a version's effects and fit again: a new version, with the error before and after."""
-    from labctl.services.acts import ImproveRequest
+    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.protocol import ImproveRequest
     from labctl.services.formulas import as_lines
-    from labctl.services.opening import open_acts
 
     def names(given: list[str] | None) -> list[str]:
         return [name.strip() for text in given or [] for name in text.split(",") if name.strip()]
@@ -204,8 +204,8 @@ def print_improvement(answer: FitAnswer) -> None:
 
 def ladder(serial: Serial, as_json: Json = False, database: Database = None) -> None:
     """Show the error, version by version, down to the noise floor."""
-    from labctl.services.criticism import ladder as ladder_of
-    from labctl.services.reading import open_reading
+    from labctl.services.commands.open import open_reading
+    from labctl.services.criticism.criticise import ladder as ladder_of
 
     with one_clear_line(), open_reading(database) as store:
         answer = ladder_of(store, serial)

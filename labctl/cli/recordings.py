@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from labctl.cli.errors import one_clear_line
+from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json
 
@@ -20,7 +20,7 @@ def import_(
     database: Database = None,
 ) -> None:
     """Take in a recording made on any bench, in the interchange format."""
-    from labctl.services.opening import open_acts
+    from labctl.services.commands.local import open_acts
 
     with one_clear_line(), open_acts(database) as acts:
         answer = acts.import_recording(folder)
@@ -43,8 +43,8 @@ def export_recording(
     database: Database = None,
 ) -> None:
     """Write a recording in the interchange format: every reading, as it was measured."""
-    from labctl.services.reading import open_reading
-    from labctl.services.recordings import export_recording as export
+    from labctl.services.commands.open import open_reading
+    from labctl.services.recordings.transfer import export_recording as export
 
     with one_clear_line(), open_reading(database) as store:
         written = export(store, recording, out, "csv" if csv else "parquet", points=points)
@@ -78,7 +78,7 @@ def simulate(
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
     """Make a recording on the simulated bench, with effects hidden in the gyro, in the interchange format."""
-    from labctl.services.simulate import SimulateRequest, simulate_recording
+    from labctl.services.simulation.recordings import SimulateRequest, simulate_recording
 
     with one_clear_line():
         answer = simulate_recording(

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labctl.cli.errors import one_clear_line
+from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import complaints, console, print_json, table
 
 if TYPE_CHECKING:
-    from labctl.services.acts import CampaignRequest
-    from labctl.services.answers import ScheduledAnswer
+    from labctl.services.commands.protocol import CampaignRequest
+    from labctl.services.schemas.answers import ScheduledAnswer
 
 app = typer.Typer(no_args_is_help=True, help="The schedule: campaigns that begin later, in a running service.")
 
@@ -30,7 +30,7 @@ def enter(
 ) -> None:
     """Enter a start into the schedule, and print the entry."""
     from labctl.errors import BadInput
-    from labctl.services.opening import open_acts
+    from labctl.services.commands.local import open_acts
 
     for option, value in (("--speed", pace), ("--seed", seed)):
         if value is not None:
@@ -59,9 +59,9 @@ def list_(
     database: Database = None,
 ) -> None:
     """List what begins when, next first."""
-    from labctl.services.opening import service_url
-    from labctl.services.reading import open_reading
-    from labctl.services.scheduling import list_starts
+    from labctl.services.commands.local import service_url
+    from labctl.services.commands.open import open_reading
+    from labctl.services.schedule.queue import list_starts
 
     with one_clear_line(), open_reading(database) as store:
         answers = list_starts(store, ended=ended)
@@ -85,8 +85,8 @@ def list_(
 @app.command("show")
 def show(start: StartId, as_json: Json = False, database: Database = None) -> None:
     """Say when an entry begins next and what became of each start that fell due."""
-    from labctl.services.reading import open_reading
-    from labctl.services.scheduling import start_status
+    from labctl.services.commands.open import open_reading
+    from labctl.services.schedule.queue import start_status
 
     with one_clear_line(), open_reading(database) as store:
         answer = start_status(store, start)
@@ -96,7 +96,7 @@ def show(start: StartId, as_json: Json = False, database: Database = None) -> No
 @app.command("cancel")
 def cancel(start: StartId, as_json: Json = False, database: Database = None) -> None:
     """Take an entry out of the schedule. A campaign that it has begun runs on."""
-    from labctl.services.opening import open_acts
+    from labctl.services.commands.local import open_acts
 
     with one_clear_line(), open_acts(database) as acts:
         answer = acts.cancel_start(start)

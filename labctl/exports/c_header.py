@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_SHARE
 from labctl.errors import BadInput
-from labctl.fitting.horner import Surface, surface_of
-from labctl.fitting.linear import Linear, linear_of
-from labctl.fitting.temperature import LagrangeTable
+from labctl.fitting.models.matrix_form import Linear, linear_of
+from labctl.fitting.models.polynomial_surface import Surface, surface_of
+from labctl.fitting.models.temperature import LagrangeTable
 
 HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * Hash of the calibration: {hash}

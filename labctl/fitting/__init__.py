@@ -1,12 +1,12 @@
 """Numbers only: a recording in, a model out. No database, no HTTP, no clock."""
 
-from labctl.fitting.channels import Channels
-from labctl.fitting.context import Context, context_of
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.fit_data import Context, context_of
 from labctl.fitting.effects import CATALOGUE, describe_effects
-from labctl.fitting.figures import ErrorFigures, Spread, by_turning_axis, rms
-from labctl.fitting.fit import FitResult, coefficients_json, fit, fit_turning, residuals
-from labctl.fitting.model import ErrorModel, FittedModel
-from labctl.fitting.presets import PRESETS, describe_presets
+from labctl.fitting.estimation.error_metrics import ErrorFigures, Spread, by_turning_axis, rms
+from labctl.fitting.estimation.fit import FitResult, coefficients_json, fit, fit_turning, residuals
+from labctl.fitting.models.error_model import ErrorModel, FittedModel
+from labctl.fitting.models.presets import PRESETS, describe_presets
 
 __all__ = [
     "CATALOGUE",

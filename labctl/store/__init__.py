@@ -5,18 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from labctl.store.audit import Audit, Broken, Head
-from labctl.store.backup import Copy, copy_database
-from labctl.store.benches import Benches, BenchRow
-from labctl.store.calibrations import Calibrations, NewCalibration
-from labctl.store.campaigns import Campaigns, NewCampaign
-from labctl.store.check import Checked, Finding, Progress, check
-from labctl.store.database import Database, Holder, holder_of, is_url
-from labctl.store.interruptions import Interruptions, Standing, TakeUp
-from labctl.store.journal import StoreJournal
-from labctl.store.keys import Keys
-from labctl.store.leases import LeaseRow, Leases
-from labctl.store.recordings import Recordings
+from labctl.store.connection.database import Database, Holder, holder_of, is_url
+from labctl.store.integrity.backup import Copy, copy_database
+from labctl.store.integrity.check import Checked, Finding, Progress, check
 from labctl.store.records import (
     AuditRow,
     CalibrationRecord,
@@ -31,8 +22,17 @@ from labctl.store.records import (
     StepRow,
     Unit,
 )
-from labctl.store.starts import NewStart, StartEventRow, StartRow, Starts
-from labctl.store.units import Units
+from labctl.store.repositories.audit import Audit, Broken, Head
+from labctl.store.repositories.benches import Benches, BenchRow
+from labctl.store.repositories.calibrations import Calibrations, NewCalibration
+from labctl.store.repositories.campaigns import Campaigns, NewCampaign
+from labctl.store.repositories.journal import StoreJournal
+from labctl.store.repositories.keys import Keys
+from labctl.store.repositories.leases import LeaseRow, Leases
+from labctl.store.repositories.recordings import Recordings
+from labctl.store.repositories.resume_points import Interruptions, Standing, TakeUp
+from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
+from labctl.store.repositories.units import Units
 
 __all__ = [
     "Audit",

@@ -1,18 +1,18 @@
 """A fixed selection of the study: something is hidden at a size z, or nothing is, and nobody tells the criticism.
 
-Sizes are those of `studies/sizes.json`. `make study` runs the whole of it, with rates and intervals.
+Sizes are those of `studies/effect_sizes.json`. `make study` runs the whole of it, with rates and intervals.
 """
 
 from __future__ import annotations
 
 import pytest
 
-from labctl.fitting.context import context_of
 from labctl.fitting.criticism import Criticism, criticise
-from labctl.fitting.presets import preset_for
+from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording
 from studies.campaigns import MODELS, campaign
-from studies.sizes import sizes
+from studies.effect_sizes import sizes
 
 SINGLE = (
     ("O", "scale_factor_asymmetry", 10),

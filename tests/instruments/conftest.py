@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from instruments.bench import BenchFile, read_bench
+from instruments.bench import Bench, open_bench
+from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
-from instruments.open import Bench, open_bench
 
 
 @dataclass

@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
-from instruments.bench import BenchFile, read_bench
+from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
-from instruments.gyrostar import Gyrostar
-from instruments.ports import Ports
+from instruments.drivers.gyrostar import Gyrostar
+from instruments.drivers.watlow_f4 import WatlowF4
+from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.simulators.bench import SimulatedBench
 from instruments.simulators.device import SimulatedDevice
-from instruments.simulators.faults import Faults
-from instruments.watlow_f4 import WatlowF4
-from instruments.watlow_f4t import WatlowF4T
+from instruments.simulators.links.faults import Faults
+from instruments.transport.factory import Ports
 
 
 class Tap:

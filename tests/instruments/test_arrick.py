@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from instruments.errors import Garbled, LimitError, LinkError, NoReply, Refused, WrongInstrument
-from instruments.table import Spin
+from instruments.interfaces.table import Spin
 
 Make = Callable[..., Any]
 URL = "sim://arrick"

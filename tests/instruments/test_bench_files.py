@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from instruments.bench import BenchFile, read_bench
+from instruments.bench_config import BenchFile, read_bench
 
 
 def two_units(**second: Any) -> dict[str, Any]:

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from instruments.bench import read_bench, shipped_benches
-from instruments.chamber import Chamber
+from instruments.bench import CHAMBERS, GYROS, TABLES
+from instruments.bench_config import read_bench, shipped_benches
 from instruments.errors import InstrumentError, LimitError, LinkError
-from instruments.gyro import Gyro
-from instruments.open import CHAMBERS, GYROS, TABLES
-from instruments.table import RateTable
+from instruments.interfaces.chamber import Chamber
+from instruments.interfaces.gyro import Gyro
+from instruments.interfaces.table import RateTable
 
 Make = Callable[..., Any]
 PROTOCOLS: dict[str, type] = {"table": RateTable, "chamber": Chamber, "gyro": Gyro}

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from instruments.drivers.gyrostar import FULL_CODE, RANGES_V, Options, make_channels
 from instruments.errors import Garbled, LinkError, NoReply, Refused, WrongInstrument
-from instruments.gyrostar import FULL_CODE, RANGES_V, Options, make_channels
 from instruments.simulators.adam6017 import code_of
 
 pytest_plugins = ["tests.instruments.modbus_rig"]

@@ -11,13 +11,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from instruments import modbus
 from instruments.clock import VirtualClock
 from instruments.errors import Garbled, InstrumentError, LimitError, LinkError, NoReply, Refused
-from instruments.modbus import Client, RefusedRegister, Registers
-from instruments.modbus_registers import Register
-from instruments.simulators.faults import Faults, FaultyWire
-from instruments.simulators.modbus_device import ModbusDevice, constant, int16
+from instruments.protocols.modbus_registers import Register
+from instruments.simulators.links.faults import Faults, FaultyWire
+from instruments.simulators.links.modbus_device import ModbusDevice, constant, int16
+from instruments.transport import modbus
+from instruments.transport.modbus import Client, RefusedRegister, Registers
 
 AIR = Register(100, "air temperature", "int16", "counts")
 SETPOINT = Register(300, "set point", "int16", "counts", low=-400, high=1500, access="rw")

@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from instruments.bench import BenchFile, read_bench
+from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import Clock, ScaledClock
+from instruments.drivers.gyrostar import Gyrostar
+from instruments.drivers.watlow_f4 import WatlowF4
+from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.errors import InstrumentError, LinkError
-from instruments.gyrostar import Gyrostar
-from instruments.ports import Ports
-from instruments.simulators.server import Server
-from instruments.watlow_f4 import WatlowF4
-from instruments.watlow_f4t import WatlowF4T
+from instruments.simulators.links.server import Server
+from instruments.transport.factory import Ports
 
 SPEED = 10.0
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instruments import gyrostar, watlow_f4, watlow_f4t
-from instruments.modbus_registers import Register
+from instruments.drivers import gyrostar, watlow_f4, watlow_f4t
+from instruments.protocols.modbus_registers import Register
 
 SIGNED = Register(100, "air", "int16", "counts")
 FLOAT = Register(2820, "air", "float32", "deg C")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from instruments.errors import LinkError, NoReply
-from instruments.stream_time import StreamTime
+from instruments.transport.sample_timing import StreamTime
 
 Make = Callable[..., Any]
 

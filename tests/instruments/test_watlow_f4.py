@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from instruments.chamber import ChamberLimits
 from instruments.errors import Garbled, LimitError, LinkError, NoReply, Refused, WrongInstrument
+from instruments.interfaces.chamber import ChamberLimits
 
 pytest_plugins = ["tests.instruments.modbus_rig"]
 

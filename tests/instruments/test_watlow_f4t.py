@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from instruments.chamber import ChamberLimits
+from instruments.drivers.watlow_f4t import ALARMS_EVERY_S
 from instruments.errors import Garbled, LimitError, LinkError, NoReply, Refused, WrongInstrument
-from instruments.watlow_f4t import ALARMS_EVERY_S
+from instruments.interfaces.chamber import ChamberLimits
 
 pytest_plugins = ["tests.instruments.modbus_rig"]
 

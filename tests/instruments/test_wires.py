@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from instruments.arrick import ArrickC4
-from instruments.bench import GyroSettings, TableSettings
+from instruments.bench_config import GyroSettings, TableSettings
 from instruments.clock import VirtualClock
+from instruments.drivers.arrick_c4 import ArrickC4
+from instruments.drivers.kvh import KvhDsp3000
+from instruments.drivers.stim300 import Stim300
 from instruments.errors import LinkError
-from instruments.kvh import KvhDsp3000
-from instruments.ports import Ports
-from instruments.stim import Stim300
+from instruments.transport.factory import Ports
 
 
 def stim(port: str, clock: VirtualClock) -> Callable[[], Any]:

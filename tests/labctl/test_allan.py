@@ -9,13 +9,13 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from labctl.fitting.allan import DEG_PER_HOUR, DEG_PER_ROOT_HOUR, Allan, allan, overlapping_variance
-from labctl.fitting.context import context_of
-from labctl.fitting.criticism.compress import compress
 from labctl.fitting.criticism.criticise import criticise
 from labctl.fitting.criticism.noise_grid import expected_drift_dps, noise_grid
-from labctl.fitting.presets import preset_for
-from labctl.fitting.static import LONG_S, longest_stretch, static_record
+from labctl.fitting.criticism.reduction import compress
+from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.data.static_record import LONG_S, longest_stretch, static_record
+from labctl.fitting.models.presets import preset_for
+from labctl.fitting.numeric.allan import DEG_PER_HOUR, DEG_PER_ROOT_HOUR, Allan, allan, overlapping_variance
 from labctl.recording import Recording, RecordingInfo
 
 PERIOD_S = 0.1

@@ -11,14 +11,14 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.services.beginnings import examples
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.house import House
-from labctl.services.planning import load_bench
-from labctl.services.running import prepare
-from labctl.services.simulate import hiding
+from labctl.services.app import House
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.execution import prepare
+from labctl.services.planning.loading import load_bench
+from labctl.services.recordings.examples import examples
+from labctl.services.simulation.recordings import hiding
 from labctl.store import Store
-from labctl.store.database import Database
+from labctl.store.connection.database import Database
 from tests.labctl.test_api_pages import client  # noqa: F401  a fixture
 
 HIDE = ["scale_factor_asymmetry=0.02"]

@@ -15,12 +15,12 @@ from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.compensator import Compensator
 from labctl.recording import Recording
-from labctl.services import judging
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.house import House
-from labctl.services.planning import load_bench
+from labctl.services.app import House
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.criticism import evaluation
+from labctl.services.planning.loading import load_bench
 from labctl.store import Store
-from labctl.store.database import Database
+from labctl.store.connection.database import Database
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOG = "/api/units/OSU-FOG-2024"
@@ -95,7 +95,7 @@ def test_residuals_are_the_rows_behind_the_map(
     rows = answer["columns"]
     assert {len(values) for values in rows.values()} == {3 * 630}
     with monkeypatch.context() as patched:  # one work gives both
-        patched.setattr(judging, "readings_of", None)
+        patched.setattr(evaluation, "readings_of", None)
         maps = client.get(f"{path}/1/criticism").json()["maps"]
     cells = by_cell(rows, "residual_dps", "over_floor", "table_rate_dps", "temperature_c", "position")
     for part in maps:

@@ -8,10 +8,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from instruments.clock import VirtualClock
-from labctl.services.plans import _forecast
-from labctl.services.running import prepare
+from labctl.services.campaigns.execution import prepare
+from labctl.services.planning.planner import _forecast
 from labctl.store import StepRow, Store
-from procedures.recipe import shipped_recipes
+from procedures.recipe.recipe import shipped_recipes
 from tests.labctl.test_api_pages import client, ran  # noqa: F401  fixtures
 
 ENDLESS = """

@@ -13,12 +13,12 @@ from hypothesis import HealthCheck, settings
 
 from instruments.clock import VirtualClock
 from labctl.api import create_app
-from labctl.services.acts import CertifyRequest, FitRequest
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.house import House
-from labctl.services.planning import load_bench
+from labctl.services.app import House
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.commands.protocol import CertifyRequest, FitRequest
+from labctl.services.planning.loading import load_bench
 from labctl.store import Store
-from labctl.store.database import Database
+from labctl.store.connection.database import Database
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 UNIT = "OSU-FOG-2024"

@@ -13,7 +13,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from labctl.recording import Recording, RecordingInfo, read_recording
-from labctl.services import envelopes
+from labctl.services.recordings import envelopes
 from tests.labctl.conftest import STARTED
 from tests.labctl.test_api_pages import client, taken_in  # noqa: F401  a fixture
 

@@ -12,16 +12,16 @@ from typing import Any
 import pytest
 
 from labctl.actor import Actor, acting, actor
-from labctl.cli import attendant
-from labctl.cli.attendant import Attendant
+from labctl.cli import terminal_operator
+from labctl.cli.terminal_operator import Attendant
 from labctl.config import os_user
 from labctl.errors import Stopped
-from labctl.services import resuming, running
-from labctl.services.acts import ResumeRequest
-from labctl.services.resuming import resume_here
-from labctl.services.running import StartRequest, run_here
+from labctl.services.campaigns import execution, resume
+from labctl.services.campaigns.execution import StartRequest, run_here
+from labctl.services.campaigns.resume import resume_here
+from labctl.services.commands.protocol import ResumeRequest
 from labctl.store import open_store
-from procedures.operator import PersonOperator, Prompt
+from procedures.contracts.operator import PersonOperator, Prompt
 
 QUESTION = Prompt("q1", "mount", "turn the units")
 WAIT_S = 30.0
@@ -35,7 +35,7 @@ class Terminal:
         self.stdin = os.fdopen(theirs, encoding="utf-8")
         self._answer = answer
         monkeypatch.setattr("sys.stdin", self.stdin)
-        monkeypatch.setattr(attendant.complaints, "print", self._shown)
+        monkeypatch.setattr(terminal_operator.complaints, "print", self._shown)
 
     def type(self, text: str) -> None:
         os.write(self.ours, text.encode())
@@ -89,7 +89,7 @@ def test_answers_and_resumes_at_a_terminal_are_in_the_audit_trail(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     location = str(tmp_path / "lab.sqlite")
-    for module in (running, resuming):
+    for module in (execution, resume):
         monkeypatch.setattr(module, "operator_of", lambda _: PersonOperator())
     seen: list[int] = []
 

@@ -17,20 +17,20 @@ from typer.testing import CliRunner
 from instruments.clock import SystemClock, VirtualClock
 from labctl.actor import Actor, acting
 from labctl.api import create_app
-from labctl.api.door import ASKING
+from labctl.api.middleware import ASKING
 from labctl.cli.app import app
 from labctl.config import os_user
 from labctl.errors import BadInput
-from labctl.services.acts import CampaignRequest, ConfirmRequest, ReasonRequest
-from labctl.services.answers import CampaignAnswer
-from labctl.services.audit import anchor_of, verify_audit
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.campaigns import campaign_status
-from labctl.services.house import House
-from labctl.services.planning import load_bench
-from labctl.services.running import prepare, run
-from labctl.store import Store, migrations, open_store
-from labctl.store.database import Database
+from labctl.services.admin.audit import anchor_of, verify_audit
+from labctl.services.app import House
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.execution import prepare, run
+from labctl.services.campaigns.status import campaign_status
+from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest
+from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.answers import CampaignAnswer
+from labctl.store import Store, migrate, open_store
+from labctl.store.connection.database import Database
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -132,7 +132,7 @@ def test_rows_of_before_the_head_get_one(location: str) -> None:
     """A database that stood at the first step, with a trail in it, is whole after migrating."""
     database = Database(location, write=True)
     with Store(database).audit._database.writing() as connection:
-        config = migrations.configuration(connection)
+        config = migrate.configuration(connection)
         command.downgrade(config, "0001")
     database.close()
     columns = "at, actor, action, subject, detail, previous_hash, hash"

@@ -14,21 +14,22 @@ from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
 from labctl.actor import Actor, acting
 from labctl.api import create_app
-from labctl.api.door import Access
+from labctl.api.middleware import Access
 from labctl.errors import BenchBusy, Conflict
-from labctl.services import leases, resuming, running
-from labctl.services.acts import CampaignRequest, ResumeRequest
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.campaigns import campaign_status
-from labctl.services.house import House
-from labctl.services.keys import KeyRequest, Role, create_key
-from labctl.services.leases import STOP_S, BenchHold
-from labctl.services.planning import load_bench
-from labctl.services.running import prepare
-from labctl.services.scheduling import start_status
+from labctl.services.admin.api_keys import KeyRequest, Role, create_key
+from labctl.services.app import House
+from labctl.services.benches import lease
+from labctl.services.benches.lease import STOP_S, BenchHold
+from labctl.services.campaigns import execution, resume
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.execution import prepare
+from labctl.services.campaigns.status import campaign_status
+from labctl.services.commands.protocol import CampaignRequest, ResumeRequest
+from labctl.services.planning.loading import load_bench
+from labctl.services.schedule.queue import start_status
 from labctl.store import Store
-from labctl.store.database import Database
-from procedures.operator import PersonOperator
+from labctl.store.connection.database import Database
+from procedures.contracts.operator import PersonOperator
 
 BENCH = load_bench("single-axis-sim")
 START = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -97,7 +98,7 @@ def lab(tmp_path: Path) -> Iterator[Lab]:
 def moves(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Whenever a bench is opened."""
     opened: list[str] = []
-    for module in (running, resuming):
+    for module in (execution, resume):
         real = module.open_bench
 
         def opening(bench: Any, clock: Any, real: Any = real) -> Any:
@@ -162,7 +163,7 @@ def test_a_campaign_whose_bench_was_lost_is_taken_up_before_the_queue_goes_on(la
 def test_a_campaign_that_waits_keeps_its_bench_and_lets_it_go_when_it_is_lost(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(running, "operator_of", lambda _: PersonOperator())
+    monkeypatch.setattr(execution, "operator_of", lambda _: PersonOperator())
     seen: list[str] = []
 
     def heard() -> None:
@@ -212,11 +213,11 @@ def test_a_command_that_takes_a_campaign_up_needs_the_lease_too(
         raise Conflict("bench single-axis-sim is held by process 4321 on far-pc")
 
     with monkeypatch.context() as patched:
-        patched.setattr(leases, "hold_bench", taken)
+        patched.setattr(lease, "hold_bench", taken)
         with pytest.raises(Conflict, match="far-pc"):
-            resuming.resume_here(location, 1, None, None, ResumeRequest(by="Ada"))
+            resume.resume_here(location, 1, None, None, ResumeRequest(by="Ada"))
         assert moves == []
-    assert resuming.resume_here(location, None, None, None, ResumeRequest(by="Ada")).state == "done"
+    assert resume.resume_here(location, None, None, None, ResumeRequest(by="Ada")).state == "done"
 
 
 def test_a_service_takes_up_what_was_left_before_its_queue(tmp_path: Path) -> None:
@@ -247,7 +248,7 @@ def test_what_cannot_be_taken_up_waits_for_a_person_and_the_queue_goes_on(
     def silent(*_: Any) -> None:
         raise NoReply("table", "no answer")
 
-    monkeypatch.setattr(resuming, "open_bench", silent)
+    monkeypatch.setattr(resume, "open_bench", silent)
     lab.tick()
     left = campaign_status(lab.store, 1)
     assert (left.state, left.reason) == ("failed", "not taken up: table: no answer")

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from instruments.bench import read_bench
+from instruments.bench_config import read_bench
 from instruments.clock import VirtualClock
 from labctl.fitting import fit
-from labctl.services.planning import load_bench
-from labctl.services.running import StartRequest, prepare, run, run_here
+from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
+from labctl.services.planning.loading import load_bench
 from labctl.store import open_store
-from procedures.control import Control
+from procedures.contracts.control import Control
 
 TINY = """format = "labctl-recipe/1"
 name = "tiny"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from labctl.services.catalogue import catalogue
+from labctl.services.effects import catalogue
 
 
 def test_every_effect_tells_the_unit_of_its_sizes_and_whether_it_leaves() -> None:

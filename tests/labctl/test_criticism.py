@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 from labctl.errors import BadInput
-from labctl.fitting.context import context_of
 from labctl.fitting.criticism import Criticism, criticise
+from labctl.fitting.data.fit_data import context_of
 from labctl.fitting.effects import CATALOGUE, formulas
 from labctl.fitting.effects.formula import Formula
-from labctl.fitting.presets import preset_for
+from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording, write_recording
-from labctl.services.planning import limits_of, load_bench, load_recipe
-from labctl.services.sizing import hidden_recording
-from procedures.plan import make_plan
+from labctl.services.planning.loading import limits_of, load_bench, load_recipe
+from labctl.services.simulation.sizing import hidden_recording
+from procedures.planning.plan import make_plan
 from tests.labctl.test_cli import Lab
 
 HELD: dict[str, Any] = {"scale_factor_asymmetry": 2e-4}

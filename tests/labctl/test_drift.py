@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from labctl.fitting.noise import Drift, Scatter, whitened
+from labctl.fitting.numeric.drift_noise import Drift, Scatter, whitened
 
 DRIFTS = [Drift(0.0, 10.0), Drift(2.0, 300.0, 0.01), Drift(0.5, 1e5), Drift(3.0, 1e-3)]
 

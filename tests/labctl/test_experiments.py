@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from labctl.recording import write_recording
-from labctl.services.planning import load_recipe
-from procedures.recipe import Recipe
+from labctl.services.planning.loading import load_recipe
+from procedures.recipe.recipe import Recipe
 from tests.labctl.test_cli import Lab
 from tests.labctl.test_criticism import three_axes
 

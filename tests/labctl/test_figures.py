@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from labctl.figures import Picture, pictures_of, report_html
-from labctl.figures.maps import maps
-from labctl.figures.noise import ladder
-from labctl.fitting.static import static_record
+from labctl.fitting.data.static_record import static_record
+from labctl.plots import Picture, pictures_of, report_html
+from labctl.plots.noise import ladder
+from labctl.plots.residual_maps import maps
 from labctl.recording import write_recording
-from labctl.services.criticism_text import answer_of
+from labctl.services.criticism.report_text import answer_of
 from tests.labctl.test_allan import with_record_at_rest
 from tests.labctl.test_cli import Lab
 from tests.labctl.test_criticism import held, single_axis, three_axes

@@ -9,8 +9,8 @@ import pytest
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting import FittedModel, fit
-from labctl.fitting.papers import in_paper_units
-from labctl.fitting.temperature import LagrangeTable
+from labctl.fitting.models.paper_units import in_paper_units
+from labctl.fitting.models.temperature import LagrangeTable
 from labctl.recording import OutputUnit, Recording
 
 Grid = tuple[np.ndarray, np.ndarray]

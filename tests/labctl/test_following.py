@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from labctl.services.following import Followers, Glances
+from labctl.services.campaigns.event_stream import Followers, Glances
 
 Loop = Callable[[Any], Any]
 
@@ -72,8 +72,8 @@ def test_what_cannot_be_read_is_said_to_everybody(in_a_loop: Loop) -> None:
 def test_the_store_is_read_as_often_for_many_as_for_one(
     onlookers: int, monkeypatch: pytest.MonkeyPatch, in_a_loop: Loop
 ) -> None:
-    monkeypatch.setattr("labctl.services.following.FRESH_S", 1e9)  # only the bell ends a moment here
-    monkeypatch.setattr("labctl.services.following.event_answer", lambda row: row)
+    monkeypatch.setattr("labctl.services.campaigns.event_stream.FRESH_S", 1e9)  # only the bell ends a moment here
+    monkeypatch.setattr("labctl.services.campaigns.event_stream.event_answer", lambda row: row)
     rows = [SimpleNamespace(id=1)]
     state, reads, bells = ["running"], [], []
 

@@ -11,13 +11,13 @@ from labctl.calibration import build_calibration
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
 from labctl.fitting import FitResult
-from labctl.fitting.channels import Channels
-from labctl.fitting.context import context_of
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.fit_data import context_of
 from labctl.fitting.effects import CATALOGUE, Reference, Term, formulas
-from labctl.fitting.fit import fit_context
-from labctl.fitting.presets import changed, preset_for
+from labctl.fitting.estimation.fit import fit_context
+from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording
-from labctl.services.sizing import hidden_recording
+from labctl.services.simulation.sizing import hidden_recording
 from tests.labctl.test_criticism import _plan, held, single_axis, three_axes
 
 SUPPLY = "supply_scale: supply_v * table_rate_dps"

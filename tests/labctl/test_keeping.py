@@ -19,12 +19,12 @@ from instruments.clock import VirtualClock
 from labctl.cli.app import app
 from labctl.errors import DiskFull, StoreError
 from labctl.recording import read_recording
-from labctl.services.acts import CertifyRequest, FitRequest
-from labctl.services.opening import LocalActs
-from labctl.services.planning import load_bench
-from labctl.services.running import prepare, run
+from labctl.services.campaigns.execution import prepare, run
+from labctl.services.commands.local import LocalActs
+from labctl.services.commands.protocol import CertifyRequest, FitRequest
+from labctl.services.planning.loading import load_bench
 from labctl.store import Store, check, copy_database, open_store
-from labctl.store import seal as seals
+from labctl.store.connection import commit_counter as seals
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -268,7 +268,7 @@ def test_nothing_is_left_of_a_backup_that_fails(location: str, tmp_path: Path, m
         raise OSError(28, "No space left on device", "copy.sqlite")
 
     before = sorted(tmp_path.iterdir())
-    monkeypatch.setattr("labctl.store.backup._synced_digest", full)
+    monkeypatch.setattr("labctl.store.integrity.backup._synced_digest", full)
     assert "No space left on device" in labctl(location, "backup", str(tmp_path / "copy.sqlite"), status=2).stderr
     assert sorted(tmp_path.iterdir()) == before
 

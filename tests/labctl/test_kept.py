@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from labctl.services import kept as keeping
-from labctl.services.answers import Answer, Certified, LadderAnswer
-from labctl.services.kept import kept, kept_among
+from labctl.services import cache as keeping
+from labctl.services.cache import kept, kept_among
+from labctl.services.criticism import evaluation
+from labctl.services.schemas.answers import Answer, Certified, LadderAnswer
 from labctl.store import open_store
 from tests.labctl.test_cli import Lab
 from tests.labctl.test_criticism import single_axis
@@ -112,7 +113,6 @@ def test_a_recording_that_differs_in_one_reading_is_another(tmp_path: Path) -> N
 
 
 def test_criticise_looks_at_the_readings_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from labctl.services import judging
 
     lab = Lab(tmp_path)
     lab.run("simulate", "ojeda2000-121", "--out", str(tmp_path / "in"), "--seed", "2")
@@ -123,7 +123,7 @@ def test_criticise_looks_at_the_readings_once(tmp_path: Path, monkeypatch: pytes
     def never(*_: object) -> None:
         raise AssertionError("read again")
 
-    monkeypatch.setattr(judging, "readings_of", never)
+    monkeypatch.setattr(evaluation, "readings_of", never)
     assert lab.json("criticise", "FOG-0001") == first
     with pytest.raises(AssertionError, match="read again"):
         lab.run("criticise", "FOG-0001", "--formula", "wet: supply_v - 5")

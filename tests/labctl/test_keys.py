@@ -13,12 +13,12 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock
 from labctl import web
 from labctl.api import create_app
-from labctl.api.door import ASKING, LOOPBACK_NAMES, Access
+from labctl.api.middleware import ASKING, LOOPBACK_NAMES, Access
 from labctl.errors import BadInput, Conflict, NotFound
-from labctl.services.house import House
-from labctl.services.keys import KeyRequest, Role, create_key, digest_of, refuse_open_doors, revoke_key
+from labctl.services.admin.api_keys import KeyRequest, Role, create_key, digest_of, refuse_open_doors, revoke_key
+from labctl.services.app import House
 from labctl.store import Store, open_store
-from labctl.store.database import Database
+from labctl.store.connection.database import Database
 
 CLOCK = SystemClock()
 OPEN = {("get", "/health")}
@@ -256,21 +256,21 @@ def test_the_service_tells_its_manager(
 ) -> None:
     import socket
 
-    from labctl.api import watchdog
+    from labctl.api import systemd
 
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
-    watchdog.ready()  # nobody listens: nothing happens
+    systemd.ready()  # nobody listens: nothing happens
     address = str(tmp_path / "notify")
     monkeypatch.setenv("NOTIFY_SOCKET", address)
-    watchdog.ready()  # nobody listens there either
+    systemd.ready()  # nobody listens there either
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(address)
         manager.settimeout(5)
         store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
         with TestClient(create_app(House(store, CLOCK))):
             assert manager.recv(100) == b"READY=1"
-            in_a_loop(watchdog.alive())
+            in_a_loop(systemd.alive())
             assert manager.recv(100) == b"WATCHDOG=1"
         assert manager.recv(100).startswith(b"STOPPING=1\nWATCHDOG_USEC=")
     monkeypatch.setenv("WATCHDOG_USEC", "60000000")
-    assert watchdog.period_s() == 20
+    assert systemd.period_s() == 20

@@ -14,13 +14,13 @@ import pytest
 
 from instruments.clock import Clock, VirtualClock
 from labctl.errors import Conflict, StoreError
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.leases import RENEW_S, STOP_S, TERM_S, BenchHold, this_machine
-from labctl.services.planning import load_bench
-from labctl.services.running import prepare, run
+from labctl.services.benches.lease import RENEW_S, STOP_S, TERM_S, BenchHold, this_machine
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.execution import prepare, run
+from labctl.services.planning.loading import load_bench
 from labctl.store import LeaseRow, Store, open_store
-from labctl.store.database import Database
-from procedures.progress import Progress
+from labctl.store.connection.database import Database
+from procedures.monitoring.progress import Progress
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 BENCH = "gyro-bench"
@@ -223,7 +223,7 @@ def test_a_table_is_at_rest_before_a_lease_that_was_not_renewed_ends(store: Stor
 
 
 def test_a_service_that_lost_its_bench_begins_nothing(shared: Store) -> None:
-    from labctl.services.acts import CampaignRequest
+    from labctl.services.commands.protocol import CampaignRequest
 
     clock = VirtualClock(AT)
     hold = BenchHold(shared, BENCH, clock)

@@ -14,26 +14,26 @@ import pytest
 import sqlalchemy as sa
 from typer.testing import CliRunner
 
-from instruments.bench import BenchFile
+from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
 from labctl.api.server import ServeRequest, open_house
 from labctl.cli.app import app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
-from labctl.services import bench_runner, resuming
-from labctl.services.acts import CampaignRequest
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.campaigns import campaign_status, list_campaigns
-from labctl.services.house import House
-from labctl.services.opening import LocalActs
-from labctl.services.planning import load_bench
-from labctl.services.recordings import newest_recording
-from labctl.services.running import StartRequest, prepare, run, run_here
+from labctl.services.app import House
+from labctl.services.campaigns import bench_runner, resume
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
+from labctl.services.campaigns.status import campaign_status, list_campaigns
+from labctl.services.commands.local import LocalActs
+from labctl.services.commands.protocol import CampaignRequest
+from labctl.services.planning.loading import load_bench
+from labctl.services.recordings.transfer import newest_recording
 from labctl.store import Store, open_store
-from labctl.store.database import Database
-from procedures.control import Control
-from procedures.journal import NOT_SAFE, CampaignState, Event
-from procedures.shield import afterwards
+from labctl.store.connection.database import Database
+from procedures.contracts.control import Control
+from procedures.contracts.journal import NOT_SAFE, CampaignState, Event
+from procedures.execution.signals import afterwards
 
 BENCH = load_bench("single-axis-sim")
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -74,7 +74,7 @@ def test_a_bench_that_is_silent_when_its_campaign_is_to_be_taken_up_is_not_held_
     def silent(*_: Any) -> None:
         raise NoReply("table", "no answer")
 
-    monkeypatch.setattr(resuming, "open_bench", silent)
+    monkeypatch.setattr(resume, "open_bench", silent)
     runner = BenchRunner(store, BENCH, VirtualClock)
     runner.take_up_left()
     assert store.campaigns.get(1).state == "failed"
@@ -93,7 +93,7 @@ def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, m
         return ("table to rest: it still moves",)
 
     monkeypatch.setattr(bench_runner, "too_often", lambda _: "taken up 5 times")
-    monkeypatch.setattr(resuming, "make_safe", safe)
+    monkeypatch.setattr(resume, "make_safe", safe)
     BenchRunner(store, BENCH, VirtualClock).take_up_left()
     assert states == ["running"]
     assert store.campaigns.get(1).reason == "taken up 5 times"
@@ -187,13 +187,13 @@ def test_a_bench_is_closed_even_if_what_is_wrong_with_it_cannot_be_written(
     prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
     closed: list[str] = []
     monkeypatch.setattr(type(prepared.bench), "close", lambda bench: closed.append(bench.table.name))
-    monkeypatch.setattr("procedures.engine.make_safe", lambda *_: ("table to rest: no answer",))
+    monkeypatch.setattr("procedures.execution.engine.make_safe", lambda *_: ("table to rest: no answer",))
 
     def full(*_: Any) -> None:
         raise StoreError("the disk is full")
 
     monkeypatch.setattr(store.benches, "mark", full)
-    monkeypatch.setattr("labctl.store.journal.benches.mark", full)
+    monkeypatch.setattr("labctl.store.repositories.journal.benches.mark", full)
     control = Control()
     control.abort("enough")
     with pytest.raises(StoreError):
@@ -323,7 +323,7 @@ def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, complaints: tuple[str, ...], said: str
 ) -> None:
     disk, location = FullDisk(monkeypatch), str(tmp_path / "lab.sqlite")
-    monkeypatch.setattr("procedures.engine.make_safe", lambda *_: complaints)
+    monkeypatch.setattr("procedures.execution.engine.make_safe", lambda *_: complaints)
 
     def fills(answer: Any) -> None:
         disk.full = disk.full or answer.step == 5

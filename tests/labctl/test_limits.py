@@ -15,13 +15,13 @@ from starlette.websockets import WebSocketDisconnect
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.api.door import Access
-from labctl.services.acts import FitRequest
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.house import House
-from labctl.services.planning import load_bench
+from labctl.api.middleware import Access
+from labctl.services.app import House
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.commands.protocol import FitRequest
+from labctl.services.planning.loading import load_bench
 from labctl.store import Store
-from labctl.store.database import Database
+from labctl.store.connection.database import Database
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 BODY, UPLOAD = 2_000, 100_000
@@ -82,7 +82,7 @@ def test_a_full_disk_is_a_problem_document(client: TestClient, monkeypatch: pyte
     def full(*_: Any, **__: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("labctl.services.recordings.shutil.copyfileobj", full)
+    monkeypatch.setattr("labctl.services.recordings.transfer.shutil.copyfileobj", full)
     answer = client.post("/api/recordings", files=[("files", ("recording.toml", b"x"))])
     assert answer.status_code == 507
     assert "the disk is full" in answer.json()["detail"]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from labctl.errors import BadInput
-from labctl.services.moments import check_cron, last_due, moment, next_due, time_zone
+from labctl.services.schedule.times import check_cron, last_due, moment, next_due, time_zone
 
 BERLIN = ZoneInfo("Europe/Berlin")
 SPRING = datetime(2026, 3, 28, 12, tzinfo=UTC)  # the day before 02:00 becomes 03:00

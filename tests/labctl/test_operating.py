@@ -17,13 +17,13 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.errors import Conflict, StoreError
-from labctl.services import running
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.house import House
-from labctl.services.planning import load_bench
+from labctl.services.app import House
+from labctl.services.campaigns import execution
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.planning.loading import load_bench
 from labctl.store import Store, open_store
-from labctl.store.database import Database
-from procedures.operator import PersonOperator
+from labctl.store.connection.database import Database
+from procedures.contracts.operator import PersonOperator
 
 PATIENCE = 2000  #: looks at a campaign before a test gives up
 WAIT_S = 60.0  #: for the next sign of life
@@ -32,7 +32,7 @@ WAIT_S = 60.0  #: for the next sign of life
 @pytest.fixture
 def runner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> BenchRunner:
     """A bench on which a person turns and switches the units."""
-    monkeypatch.setattr(running, "operator_of", lambda _: PersonOperator())
+    monkeypatch.setattr(execution, "operator_of", lambda _: PersonOperator())
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     return BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
 

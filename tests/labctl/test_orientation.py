@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from instruments.bench import open_bench
 from instruments.clock import VirtualClock
-from instruments.open import open_bench
 from labctl.errors import BadInput
 from labctl.orientation import Orientation, StandstillRule
-from labctl.services.planning import load_bench
-from labctl.turns import static_bias
+from labctl.services.planning.loading import load_bench
+from labctl.turn_error import static_bias
 
 HZ = 10.0
 

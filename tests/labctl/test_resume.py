@@ -15,31 +15,31 @@ from instruments.clock import VirtualClock
 from instruments.errors import NoReply
 from labctl.cli.app import app
 from labctl.errors import Conflict
-from labctl.services.acts import ResumeRequest
-from labctl.services.planning import load_bench
-from labctl.services.power import power_failed
-from labctl.services.resuming import MOST_TRIES, prepare_resume, resume_here, too_often
-from labctl.services.running import StartRequest, prepare, run, run_here
+from labctl.services.benches.host import power_failed
+from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
+from labctl.services.campaigns.resume import MOST_TRIES, prepare_resume, resume_here, too_often
+from labctl.services.commands.protocol import ResumeRequest
+from labctl.services.planning.loading import load_bench
 from labctl.store import Store, open_store
-from labctl.store.database import Database
-from procedures.control import Control
-from studies import faults, kills, real_kills
-from studies.mortal import all_readings, complete_data_sets
+from labctl.store.connection.database import Database
+from procedures.contracts.control import Control
+from studies import crash_recovery, faults, process_kill
+from studies.crashable_process import all_readings, complete_data_sets
 
 
 @pytest.fixture(scope="module")
 def whole() -> tuple[int, Any]:
     """How many instants an undisturbed campaign has, and what is fitted to it."""
     with tempfile.TemporaryDirectory() as folder:
-        return kills.undisturbed(Path(folder))
+        return crash_recovery.undisturbed(Path(folder))
 
 
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("number", range(8))
 def test_a_kill_at_any_instant_loses_nothing_and_repeats_nothing(whole: tuple[int, Any], number: int) -> None:
     instants, expected = whole
-    kill = kills.drawn(instants, 8, seed=5)[number]
-    verdict = kills.one((kill, expected))
+    kill = crash_recovery.drawn(instants, 8, seed=5)[number]
+    verdict = crash_recovery.one((kill, expected))
     assert verdict.well, f"{kill}: {verdict}"
 
 
@@ -60,8 +60,8 @@ def test_the_faults_drawn_are_of_every_kind_in_every_instrument() -> None:
 
 @pytest.mark.timeout(300)
 def test_a_real_process_is_killed_over_pty_and_tcp_and_its_heir_finishes(tmp_path: Path) -> None:
-    with real_kills.simulators(tmp_path) as bench:
-        heir = real_kills.kill_once(tmp_path, bench, 8.0)
+    with process_kill.simulators(tmp_path) as bench:
+        heir = process_kill.kill_once(tmp_path, bench, 8.0)
     assert heir.well, heir
 
 

@@ -12,16 +12,16 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull
-from labctl.services.acts import CampaignRequest
-from labctl.services.answers import CampaignAnswer
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.house import House
-from labctl.services.planning import load_bench
-from labctl.services.scheduler import Scheduler
-from labctl.services.scheduling import add_start, cancel_start, is_scheduled, list_starts, start_status
+from labctl.services.app import House
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.commands.protocol import CampaignRequest
+from labctl.services.planning.loading import load_bench
+from labctl.services.schedule.queue import add_start, cancel_start, is_scheduled, list_starts, start_status
+from labctl.services.schedule.scheduler import Scheduler
+from labctl.services.schemas.answers import CampaignAnswer
 from labctl.store import Store, open_store
-from labctl.store.database import Database
-from procedures.errors import PlanRefused
+from labctl.store.connection.database import Database
+from procedures.contracts.errors import PlanRefused
 
 BENCH = load_bench("single-axis-sim")
 START = datetime(2026, 1, 5, 8, tzinfo=UTC)

@@ -19,7 +19,7 @@ import pytest
 
 from instruments.clock import SystemClock
 from labctl.config import os_user
-from labctl.services.keys import KeyRequest, Role, create_key
+from labctl.services.admin.api_keys import KeyRequest, Role, create_key
 from labctl.store import check, holder_of, open_store
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine

@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hn
 
 from labctl.errors import StoreError
 from labctl.recording.spread import white_std
-from labctl.store.blocks import FINAL, LIVE, pack, unpack
+from labctl.store.sample_codec import FINAL, LIVE, pack, unpack
 
 whole = hn.arrays(np.int64, 17, elements=st.integers(-(2**63), 2**63 - 1))
 small = hn.arrays(np.int64, 17, elements=st.integers(-300, 300))

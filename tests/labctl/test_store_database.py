@@ -19,8 +19,9 @@ from sqlalchemy.dialects import postgresql
 
 from labctl.errors import BadInput, Conflict, NotCertified, NotFound, StoreError
 from labctl.recording import Recording, RecordingInfo, to_points
-from labctl.store import NewCalibration, Store, holder_of, migrations, open_store, tables
-from labctl.store.database import Database
+from labctl.store import NewCalibration, Store, holder_of, migrate, open_store
+from labctl.store.connection.database import Database
+from labctl.store.schema import tables
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
@@ -60,21 +61,21 @@ def test_migrations_make_todays_tables(location: str) -> None:
 
 
 def test_the_steps_are_those_that_alembic_finds(location: str) -> None:
-    scripts = ScriptDirectory.from_config(migrations.configuration())
-    assert scripts.get_current_head() == migrations.HEAD
-    assert {script.revision for script in scripts.walk_revisions()} == migrations.KNOWN
+    scripts = ScriptDirectory.from_config(migrate.configuration())
+    assert scripts.get_current_head() == migrate.HEAD
+    assert {script.revision for script in scripts.walk_revisions()} == migrate.KNOWN
     engine = sa.create_engine(f"sqlite:///{location}")
     with engine.connect() as connection:
-        assert migrations.revision_of(connection) is None
+        assert migrate.revision_of(connection) is None
     with open_store(location, write=True), engine.connect() as connection:
-        assert migrations.revision_of(connection) == migrations.HEAD
-        assert MigrationContext.configure(connection).get_current_revision() == migrations.HEAD
+        assert migrate.revision_of(connection) == migrate.HEAD
+        assert MigrationContext.configure(connection).get_current_revision() == migrate.HEAD
     engine.dispose()
 
 
 def test_migrations_can_be_written_for_postgresql() -> None:
     out = io.StringIO()
-    config = migrations.configuration()
+    config = migrate.configuration()
     config.output_buffer = out
     config.set_main_option("sqlalchemy.url", "postgresql+psycopg://nowhere/none")
     command.upgrade(config, "head", sql=True)
@@ -148,7 +149,7 @@ def test_an_import_comes_back_exactly(location: str) -> None:
 
 def test_nothing_is_left_of_an_import_that_fails(location: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_store(location, write=True) as store:
-        monkeypatch.setattr("labctl.store.recordings._add_environment", lambda *_: 1 / 0)
+        monkeypatch.setattr("labctl.store.repositories.recordings._add_environment", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             store.recordings.add_import(samples(), AT)
         assert store.units.all() == []

@@ -14,13 +14,13 @@ from labctl.calibration import build_calibration, read_calibration
 from labctl.compensator import Compensator
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting import fit
-from labctl.fitting.context import context_of
 from labctl.fitting.criticism import criticise
-from labctl.fitting.criticism.compress import compress
-from labctl.fitting.past import past_of
-from labctl.fitting.presets import preset_for
-from labctl.fitting.static import static_record
-from labctl.fitting.thermometer import with_temperature
+from labctl.fitting.criticism.reduction import compress
+from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.data.static_record import static_record
+from labctl.fitting.data.temperature_channel import with_temperature
+from labctl.fitting.data.temperature_history import past_of
+from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording, RecordingInfo, to_points
 from labctl.recording.points import with_pieces
 

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 import tomli_w
 
-from instruments.bench import read_bench
+from instruments.bench_config import read_bench
 
 SPEED = 20.0
 #: The rates tell on the wire which of the two drives: each has its own divisor of the step clock.

@@ -13,7 +13,7 @@ import pytest
 from labctl.calibration import Calibration, build_calibration
 from labctl.errors import BadInput
 from labctl.fitting import FittedModel, fit
-from labctl.fitting.channels import Channels
+from labctl.fitting.data.channels import Channels
 from labctl.recording import Recording
 from labctl.uncertainty import is_inside, rate_uncertainty
 

@@ -19,7 +19,7 @@ from labctl.errors import BadCalibrationFile, BadInput, NotEnoughData
 from labctl.exports import export_calibration
 from labctl.fitting import Channels, fit
 from labctl.recording import Recording
-from labctl.turns import error_per_turn, static_bias
+from labctl.turn_error import error_per_turn, static_bias
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 Grid = tuple[np.ndarray, np.ndarray]

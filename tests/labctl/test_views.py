@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labctl.fitting.context import context_of
 from labctl.fitting.criticism import Criticism, criticise
-from labctl.fitting.criticism.compress import compress
+from labctl.fitting.criticism.diagnostics import VIEWS, draws_of, views_of
+from labctl.fitting.criticism.diagnostics.channels import groups_of, runs_test
+from labctl.fitting.criticism.diagnostics.repeatability import legs_of
+from labctl.fitting.criticism.model_comparison import weigh
+from labctl.fitting.criticism.reduction import compress
 from labctl.fitting.criticism.residuals import residuals_of
-from labctl.fitting.criticism.views import VIEWS, draws_of, views_of
-from labctl.fitting.criticism.views.channels import groups_of, runs_test
-from labctl.fitting.criticism.views.pairs import legs_of
-from labctl.fitting.criticism.weigh import weigh
+from labctl.fitting.data.fit_data import context_of
 from labctl.fitting.effects import CATALOGUE, formulas
-from labctl.fitting.presets import changed, preset_for
+from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording, read_recording
 from labctl.recording.columns import BY_NAME
 from tests.labctl.test_criticism import held, single_axis, three_axes

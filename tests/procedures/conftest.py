@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from instruments.chamber import ChamberLimits, ChamberState
 from instruments.clock import VirtualClock
-from instruments.gyro import Channel, GyroIdentity, GyroLimits, Readings
-from instruments.table import Spin, TableLimits
-from procedures.control import Control
-from procedures.engine import Engine
-from procedures.limits import BenchLimits
-from procedures.operator import HandOperator
-from procedures.plan import Plan, make_plan
-from procedures.recipe import Recipe
-from procedures.takeup import Restart
+from instruments.interfaces.chamber import ChamberLimits, ChamberState
+from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
+from instruments.interfaces.table import Spin, TableLimits
+from procedures.contracts.control import Control
+from procedures.contracts.operator import HandOperator
+from procedures.execution.engine import Engine
+from procedures.execution.resume import Restart
+from procedures.planning.limits import BenchLimits
+from procedures.planning.plan import Plan, make_plan
+from procedures.recipe.recipe import Recipe
 
 TABLE = TableLimits(max_rate_dps=450, max_acceleration_dps2=200, step_deg=0.225)
 CHAMBER = ChamberLimits(min_c=-70, max_c=150, resolution_c=0.1, ramp_c_per_min=10)

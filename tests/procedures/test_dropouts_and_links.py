@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from instruments.errors import LinkError, NoReply
-from procedures.journal import CampaignState
-from procedures.operator import PersonOperator
+from procedures.contracts.journal import CampaignState
+from procedures.contracts.operator import PersonOperator
 
 
 def gyros_of(rig: Any) -> list[tuple[int, tuple[str, ...]]]:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from procedures.journal import CampaignState
-from procedures.limits import BenchLimits
-from procedures.operator import PersonOperator
-from procedures.plan import make_plan
+from procedures.contracts.journal import CampaignState
+from procedures.contracts.operator import PersonOperator
+from procedures.planning.limits import BenchLimits
+from procedures.planning.plan import make_plan
 
 
 def test_a_campaign_runs_through_and_every_step_is_marked_once(rig: Any) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from instruments.errors import Garbled, NoReply, Refused
-from procedures.errors import BadData
-from procedures.journal import CampaignState
-from procedures.operator import Answer, PersonOperator
+from procedures.contracts.errors import BadData
+from procedures.contracts.journal import CampaignState
+from procedures.contracts.operator import Answer, PersonOperator
 
 STEP_KINDS = ["home", "move_chamber", "mount", "power_on", "soak", "acquire", "power_off", "safe_state"]
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from instruments.errors import NoReply, Refused
-from procedures.control import Control
-from procedures.journal import NEXT, CampaignState
-from procedures.takeup import Restart
+from procedures.contracts.control import Control
+from procedures.contracts.journal import NEXT, CampaignState
+from procedures.execution.resume import Restart
 
 from . import conftest
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from procedures.guard import CHECKS, Guards
-from procedures.journal import CampaignState
-from procedures.limits import BenchLimits
-from procedures.recipe import GuardRules
-from procedures.situation import Situation, Tally
+from procedures.contracts.journal import CampaignState
+from procedures.monitoring.bench_snapshot import Situation, Tally
+from procedures.monitoring.guards import CHECKS, Guards
+from procedures.planning.limits import BenchLimits
+from procedures.recipe.recipe import GuardRules
 
 WELL = Situation(
     t_s=100.0,

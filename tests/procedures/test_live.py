@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from instruments.gyro import Channel, Readings
-from procedures.live import Live, Output
-from procedures.progress import Progress
+from instruments.interfaces.gyro import Channel, Readings
+from procedures.monitoring.live_output import Live, Output
+from procedures.monitoring.progress import Progress
 from tests.procedures.conftest import Rig
 
 UNIT: Any = SimpleNamespace(channels=(Channel("gyro_z", "deg/s", 0.5, 1.0), Channel("temperature_c", "deg C", 1.0)))

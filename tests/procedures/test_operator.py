@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from procedures.control import Control
-from procedures.errors import StalePrompt
-from procedures.operator import HandOperator, PersonOperator, Prompt
+from procedures.contracts.control import Control
+from procedures.contracts.errors import StalePrompt
+from procedures.contracts.operator import HandOperator, PersonOperator, Prompt
 
 FIRST = Prompt("1", "mount", "turn x up", "x")
 SECOND = Prompt("2", "mount", "turn y up", "y")

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from instruments.errors import LimitError
-from instruments.gyro import GyroLimits
-from procedures.errors import PlanRefused
-from procedures.limits import BenchLimits
-from procedures.plan import Plan, make_plan
-from procedures.recipe import Recipe, read_recipe, shipped_recipes
-from procedures.schedule import level_rates, schedule, temperature_sequence
-from procedures.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, SafeState, Soak
+from instruments.interfaces.gyro import GyroLimits
+from procedures.contracts.errors import PlanRefused
+from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, SafeState, Soak
+from procedures.planning.limits import BenchLimits
+from procedures.planning.plan import Plan, make_plan
+from procedures.planning.point_order import level_rates, schedule, temperature_sequence
+from procedures.recipe.recipe import Recipe, read_recipe, shipped_recipes
 
 
 def kinds(plan: Plan) -> Counter[str]:
@@ -276,8 +276,8 @@ points = st.builds(
 
 @given(points)
 def test_every_requested_point_is_taken_exactly_as_often_as_asked(wanted: Recipe) -> None:
-    from instruments.chamber import ChamberLimits
-    from instruments.table import TableLimits
+    from instruments.interfaces.chamber import ChamberLimits
+    from instruments.interfaces.table import TableLimits
 
     bench = BenchLimits(TableLimits(450, 200, 0.225), ChamberLimits(-70, 150, 0.1, 10), {})
     plan = make_plan(wanted, bench)

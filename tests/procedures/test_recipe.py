@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from procedures.errors import RecipeError
-from procedures.recipe import parse_recipe, read_recipe, shipped_recipes
+from procedures.contracts.errors import RecipeError
+from procedures.recipe.recipe import parse_recipe, read_recipe, shipped_recipes
 
 GOOD = 'name = "a"\ntemperatures_c = [20]\nrates_dps = [0, 10]\npositions = ["z"]\n'
 

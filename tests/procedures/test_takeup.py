@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from instruments.errors import NoReply
-from procedures.journal import CampaignState
-from procedures.operator import PersonOperator
-from procedures.recipe import ResumeRules
-from procedures.takeup import Restart, soak_matters_after_s
+from procedures.contracts.journal import CampaignState
+from procedures.contracts.operator import PersonOperator
+from procedures.execution.resume import Restart, soak_matters_after_s
+from procedures.recipe.recipe import ResumeRules
 
 
 def at(rig: Any, kind: str, number: int = 0) -> int:

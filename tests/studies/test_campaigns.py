@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.ports import hidden_defaults, open_simulation
+from instruments.transport.factory import hidden_defaults, open_simulation
 from studies import criticism
 from studies.campaigns import PROTOCOLS, campaign, drifting, protocol, spoiled
-from studies.sizes import COMMAND, Z_LEVELS, sizes, sizing_of
+from studies.effect_sizes import COMMAND, Z_LEVELS, sizes, sizing_of
 
 WITHIN = 0.25
 
@@ -30,7 +30,7 @@ def test_sizes_are_kept_for_every_protocol(name: str) -> None:
 
 @pytest.mark.parametrize("effect", ["scale_factor_asymmetry", "rate_hysteresis"])
 def test_a_kept_size_still_gives_its_z(effect: str) -> None:
-    """If this fails the simulator or the model has changed: make the sizes again (`python -m studies.sizes`)."""
+    """If this fails the simulator or the model has changed: make the sizes again (`python -m studies.effect_sizes`)."""
     sizing = sizing_of("O")
     for z in (5.0, 100.0):
         found, _ = sizing.z_of(effect, sizes("O")[effect][f"{z:g}"])

@@ -7,17 +7,18 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from labctl.fitting.context import context_of
-from labctl.fitting.criticism.compress import Compressed, compress
 from labctl.fitting.criticism.evidence import Design
-from labctl.fitting.criticism.weigh import design_of
-from labctl.fitting.presets import changed, preset_for
-from studies import peers
+from labctl.fitting.criticism.model_comparison import design_of
+from labctl.fitting.criticism.reduction import Compressed, compress
+from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.models.presets import changed, preset_for
+from studies import baselines
+from studies.baselines import Table, entries, table_of
 from studies.campaigns import campaign
-from studies.peers import Table, entries, table_of
 
 installed = pytest.mark.skipif(
-    bool(peers.missing()), reason=f"not installed: {', '.join(peers.missing())} (the extra `study`, by `make study`)"
+    bool(baselines.missing()),
+    reason=f"not installed: {', '.join(baselines.missing())} (the extra `study`, by `make study`)",
 )
 HIDDEN = {"scale_factor_asymmetry": 1e-3}
 
@@ -69,7 +70,7 @@ def test_forward_selection_takes_the_greatest_fall_each_time() -> None:
 
 
 @installed
-@pytest.mark.parametrize("tool", peers.TOOLS)
+@pytest.mark.parametrize("tool", baselines.TOOLS)
 def test_each_tool_finds_both_made_up_effects(tool: object) -> None:
     assert callable(tool)
     for picks in tool(made_up()).values():
@@ -79,18 +80,18 @@ def test_each_tool_finds_both_made_up_effects(tool: object) -> None:
 
 @installed
 def test_bic_stops_no_later_than_aic() -> None:
-    found = peers.forward(made_up(1.0))
+    found = baselines.forward(made_up(1.0))
     assert len(found["forward BIC (statsmodels)"]) <= len(found["forward AIC (statsmodels)"])
 
 
 @installed
 def test_every_tool_answers_on_means_and_on_rows() -> None:
     data, design = small()
-    answers = peers.ask(data, {"z": design})
+    answers = baselines.ask(data, {"z": design})
     assert len(answers) == 8
     assert {name.rsplit(", ", 1)[1] for name in answers} == {"means", "rows"}
     for name, answer in answers.items():
         # thresholded least squares loses it among as many columns as there are means
         assert answer["named"] if "STLSQ" in name else "scale_factor_asymmetry" in answer["named"], name
     assert answers["forward BIC (statsmodels), means"]["named"][0] == "scale_factor_asymmetry"
-    assert set(peers.versions()) == set(peers.DISTRIBUTIONS)
+    assert set(baselines.versions()) == set(baselines.DISTRIBUTIONS)

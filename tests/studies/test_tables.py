@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from scipy.stats import binomtest
 
-from studies import tables
-from studies.tables import Cells, Said, wilson
+from studies import report_tables
+from studies.report_tables import Cells, Said, wilson
 
 TOOL = "a tool, means"
 
@@ -31,65 +31,65 @@ def test_an_interval_is_wilsons(hits: int, n: int) -> None:
 
 
 def test_a_share_says_per_cent_and_interval() -> None:
-    assert tables.share([True] * 394 + [False] * 6) == "98.5 (96.8 to 99.3)"
-    assert tables.share([]) == "-"
+    assert report_tables.share([True] * 394 + [False] * 6) == "98.5 (96.8 to 99.3)"
+    assert report_tables.share([]) == "-"
 
 
 def test_a_group_with_the_truth_is_right_and_not_alone() -> None:
     group = answer(verdict="ambiguous", named=["thermal_lag", "bias_drift"], nodes=2)
-    assert tables.right_or_group(group)
-    assert not tables.right_alone(group)
-    assert not tables.wrong_claim(group)
+    assert report_tables.right_or_group(group)
+    assert not report_tables.right_alone(group)
+    assert not report_tables.wrong_claim(group)
 
 
 def test_likes_by_the_catalogue_are_one_name() -> None:
     turning = answer(truth="earth_rate_tilt", named=["earth_rate_tilt", "magnetic_sensitivity", "table_tilt"], nodes=2)
-    assert tables.right_alone(turning)
-    assert tables.wrong_single({**turning, "hidden": {"warm_up": 1.0}})
+    assert report_tables.right_alone(turning)
+    assert report_tables.wrong_single({**turning, "hidden": {"warm_up": 1.0}})
 
 
 def test_another_name_is_wrong_alone_and_in_a_group() -> None:
     single = answer(named=["thermal_lag"])
     group = answer(verdict="ambiguous", named=["thermal_lag", "warm_up"], nodes=2)
-    assert (tables.wrong_single(single), tables.wrong_claim(single)) == (True, True)
-    assert (tables.wrong_single(group), tables.wrong_claim(group)) == (False, True)
+    assert (report_tables.wrong_single(single), report_tables.wrong_claim(single)) == (True, True)
+    assert (report_tables.wrong_single(group), report_tables.wrong_claim(group)) == (False, True)
 
 
 def test_silence_is_neither_right_nor_wrong() -> None:
     silent = answer(verdict="adequate", named=[], nodes=0)
-    assert not tables.right_or_group(silent)
-    assert not tables.wrong_claim(silent)
+    assert not report_tables.right_or_group(silent)
+    assert not report_tables.wrong_claim(silent)
 
 
 def test_what_is_named_first_counts_as_the_other_tools_claims_do() -> None:
     group = answer(verdict="ambiguous", truth="bias_drift", named=["warm_up", "bias_drift"], nodes=2)
-    assert tables.right_or_group(group)
-    assert tables.wrong_first(group)
+    assert report_tables.right_or_group(group)
+    assert report_tables.wrong_first(group)
     like = answer(verdict="ambiguous", truth="misalignment", named=["non_orthogonality", "misalignment"])
-    assert tables.right_first(like)
+    assert report_tables.right_first(like)
 
 
 def test_a_second_name_beside_the_truth_is_one_too_many_but_its_like_is_not() -> None:
-    assert tables.one_too_many(answer(named=["bias_drift", "warm_up"], nodes=2))
+    assert report_tables.one_too_many(answer(named=["bias_drift", "warm_up"], nodes=2))
     like = answer(verdict="ambiguous", truth="misalignment", named=["misalignment", "non_orthogonality"])
-    assert not tables.one_too_many(like)
+    assert not report_tables.one_too_many(like)
 
 
 def test_two_hidden_effects_want_both_names_and_no_other() -> None:
     two = answer("two", hidden={"bias_drift": 1.0, "misalignment": 1.0}, named=["non_orthogonality", "bias_drift"])
-    assert tables.both_named(two)
-    assert tables.both_alone({**two, "verdict": "missing"})
-    assert not tables.both_alone({**two, "verdict": "ambiguous"})
-    assert not tables.another_named(two)
-    assert tables.another_named({**two, "named": ["bias_drift", "warm_up"]})
-    assert not tables.both_named({**two, "named": ["bias_drift", "warm_up"]})
+    assert report_tables.both_named(two)
+    assert report_tables.both_alone({**two, "verdict": "missing"})
+    assert not report_tables.both_alone({**two, "verdict": "ambiguous"})
+    assert not report_tables.another_named(two)
+    assert report_tables.another_named({**two, "named": ["bias_drift", "warm_up"]})
+    assert not report_tables.both_named({**two, "named": ["bias_drift", "warm_up"]})
 
 
 def test_outside_the_catalogue_the_right_channel_must_come_first() -> None:
     outside = answer("outside", truth="outside_etalon", verdict="unexplained", depends_on=["temperature_c", "t_s"])
-    assert tables.right_channel(outside)
-    assert not tables.right_channel({**outside, "depends_on": ["t_s", "temperature_c"]})
-    assert not tables.right_channel({**outside, "verdict": "missing"})
+    assert report_tables.right_channel(outside)
+    assert not report_tables.right_channel({**outside, "depends_on": ["t_s", "temperature_c"]})
+    assert not report_tables.right_channel({**outside, "verdict": "missing"})
 
 
 def test_another_tool_claims_what_it_names_first() -> None:
@@ -109,7 +109,7 @@ def test_the_comparison_counts_each_cell_by_itself() -> None:
         with_tool("warm_up", z=5.0, named=["bias_drift"]),
         with_tool("bias_drift", z=30.0, named=["warm_up"]),
     ]
-    rows = [line.split(" | ") for line in tables.comparison(Cells(answers)).splitlines()]
+    rows = [line.split(" | ") for line in report_tables.comparison(Cells(answers)).splitlines()]
     assert rows[0][2:] == [
         "right name %, z = 5",
         "right name %, z = 30",
@@ -123,10 +123,10 @@ def test_the_comparison_counts_each_cell_by_itself() -> None:
 
 def test_held_out_error_is_a_median_of_those_that_could_be_fitted() -> None:
     answers = [answer(z=30.0, held_out=value) for value in (1.0, 1.1, 3.0, None)]
-    assert "1.1 (2.62), 1 could not be fitted" in tables.extras(Cells(answers))
+    assert "1.1 (2.62), 1 could not be fitted" in report_tables.extras(Cells(answers))
 
 
 def test_a_report_is_made_of_few_answers_too() -> None:
-    text = tables.report([answer("nothing", verdict="adequate", nodes=0), answer(named=["bias_drift"])], {})
+    text = report_tables.report([answer("nothing", verdict="adequate", nodes=0), answer(named=["bias_drift"])], {})
     assert "1 nothing, 1 effect" in text
     assert "false alarm" in text

@@ -17,12 +17,12 @@ import uvicorn
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.api.door import Access
-from labctl.services.bench_runner import BenchRunner
-from labctl.services.house import House
-from labctl.services.planning import load_bench
+from labctl.api.middleware import Access
+from labctl.services.app import House
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.planning.loading import load_bench
 from labctl.store import Store
-from labctl.store.database import Database
+from labctl.store.connection.database import Database
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page

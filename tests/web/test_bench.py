@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from instruments.clock import SystemClock
-from labctl.services import running
-from procedures.operator import PersonOperator
+from labctl.services.campaigns import execution
+from procedures.contracts.operator import PersonOperator
 from tests.web.conftest import Faults, Service
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.timeout(300)
 @pytest.fixture
 def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     """A bench on which a person turns and switches the units."""
-    monkeypatch.setattr(running, "operator_of", lambda _: PersonOperator())
+    monkeypatch.setattr(execution, "operator_of", lambda _: PersonOperator())
     serving = Service(tmp_path)
     serving.start()
     yield serving

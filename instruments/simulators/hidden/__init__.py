@@ -5,7 +5,7 @@ from __future__ import annotations
 from instruments.simulators.hidden.base import HiddenEffect, State
 from instruments.simulators.hidden.environment import EFFECTS as ENVIRONMENT
 from instruments.simulators.hidden.rate import EFFECTS as RATE
-from instruments.simulators.hidden.slow import EFFECTS as SLOW
+from instruments.simulators.hidden.temperature_and_time import EFFECTS as SLOW
 
 EFFECTS: dict[str, type[HiddenEffect]] = {kind.id: kind for kind in (*RATE, *SLOW, *ENVIRONMENT)}
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from labctl.cli.demo.stage import Stage
+from labctl.cli.demo.runner import Stage
 from labctl.cli.output import table
 from labctl.fitting import context_of, fit
-from labctl.turns import LEAST_RATE_DPS, error_per_turn
+from labctl.turn_error import LEAST_RATE_DPS, error_per_turn
 
 SERIAL = "FOG-0001"
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from instruments.clock import VirtualClock
-from labctl.cli.demo import missing, published, served, single_axis, triaxial
-from labctl.cli.demo.stage import Stage, maybe_silent
+from labctl.cli.demo import example_data, find_missing_effect, serve_calibrations, single_axis, triaxial
+from labctl.cli.demo.runner import Stage, maybe_silent
 from labctl.errors import BadInput
-from labctl.services.acts import CertifyRequest
-from labctl.services.calibrations import certify
+from labctl.services.calibrations.fitting import certify
+from labctl.services.commands.protocol import CertifyRequest
 from labctl.store import open_store
 
 DATABASE = "demo.sqlite"
@@ -24,14 +24,14 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
         stage = Stage(store, folder, console, quiet)
         triaxial.play(stage, quick=quick)
         single_axis.play(stage)
-        published.play(stage)
-        missing.play(stage, "OSU-FOG-2024")
+        example_data.play(stage)
+        find_missing_effect.play(stage, "OSU-FOG-2024")
         serials = [triaxial.SERIAL, single_axis.SERIAL, "WEISS-ENV05S", "OSU-FOG-2024"]
         for serial in serials:
             request = CertifyRequest(by="the demo", reason="computed and checked in this run")
             newest = max(row.version for row in store.calibrations.of_unit(serial))
             certify(store, serial, newest, "certify", request, VirtualClock().utc())
-        served.play(stage, serials)
+        serve_calibrations.play(stage, serials)
         stage.title("Where to look")
         stage.say(f"labctl serve --simulate --database {location}     then http://127.0.0.1:8420/api-docs")
         stage.say(f"labctl campaign list --database {location};  labctl calibration FOG-0001 --database {location}")

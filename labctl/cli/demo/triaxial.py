@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from labctl.calibration import read_calibration
-from labctl.cli.demo.stage import Stage
+from labctl.cli.demo.runner import Stage
 from labctl.cli.output import table
 from labctl.fitting import Context, Spread, by_turning_axis, fit_turning, residuals
 

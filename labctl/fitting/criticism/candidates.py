@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.channels import Array
-from labctl.fitting.criticism.compress import Compressed
-from labctl.fitting.earth import turning_size_dps
+from labctl.fitting.criticism.reduction import Compressed
+from labctl.fitting.data.channels import Array
+from labctl.fitting.data.earth import turning_size_dps
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
-from labctl.fitting.model import ErrorModel, expand
+from labctl.fitting.models.error_model import ErrorModel, expand
 
 #: Knots of a smooth function of a channel: a coarse and a fine one compete.
 KNOTS = (5, 9)

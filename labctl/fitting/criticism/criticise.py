@@ -10,13 +10,14 @@ import numpy as np
 from scipy.special import chdtrc
 
 from labctl.errors import LabctlError
-from labctl.fitting.context import Context, context_of
-from labctl.fitting.criticism.asking import ask
 from labctl.fitting.criticism.candidates import untestable_channels
-from labctl.fitting.criticism.compress import Compressed, compress
+from labctl.fitting.criticism.diagnostics import views_of
 from labctl.fitting.criticism.evidence import visible_share
+from labctl.fitting.criticism.model_comparison import Candidate, Weighed, weigh, with_noise_of
+from labctl.fitting.criticism.reduction import Compressed, compress
 from labctl.fitting.criticism.refine import refined
 from labctl.fitting.criticism.residuals import Residuals, maps, residuals_of, where_it_fails, worst_data_sets
+from labctl.fitting.criticism.stepwise_search import ask
 from labctl.fitting.criticism.verdict import (
     ENOUGH,
     Verdict,
@@ -25,15 +26,14 @@ from labctl.fitting.criticism.verdict import (
     probabilities,
     share_removed,
 )
-from labctl.fitting.criticism.views import views_of
-from labctl.fitting.criticism.weigh import Candidate, Weighed, weigh, with_noise_of
+from labctl.fitting.data.fit_data import Context, context_of
+from labctl.fitting.data.static_record import LONG_S, static_record
+from labctl.fitting.data.temperature_channel import with_temperature
 from labctl.fitting.effects import CATALOGUE, Effect
-from labctl.fitting.fit import FitResult, fit_context
-from labctl.fitting.model import ErrorModel
-from labctl.fitting.presets import changed
-from labctl.fitting.static import LONG_S, static_record
-from labctl.fitting.thermometer import with_temperature
-from labctl.fitting.threads import single_threaded
+from labctl.fitting.estimation.fit import FitResult, fit_context
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.presets import changed
+from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.recording import Recording
 
 #: Data sets beyond the base's coefficients that a verdict needs.
@@ -134,7 +134,7 @@ def _shapes(data: Compressed, model: ErrorModel, catalogue: Mapping[str, Effect]
 
 
 def _direct(model: ErrorModel) -> Any:
-    from labctl.fitting.presets import Preset  # noqa: PLC0415
+    from labctl.fitting.models.presets import Preset  # noqa: PLC0415
 
     return Preset(model.name, lambda context: (model, np.ones(len(context), dtype=bool)))
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
-from labctl.fitting.channels import Array
 from labctl.fitting.criticism.candidates import Option
 from labctl.fitting.criticism.noise_grid import Noise, factors, whiten
+from labctl.fitting.data.channels import Array
 
 #: Directions of an option that the base leaves less of than this (squared share) are taken as the base's.
 LEAST_LEFT = 1e-4

@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.evidence import Base, gains_of, others_of
-from labctl.fitting.criticism.weigh import Candidate, Weighed, centred, level_of, weigh
+from labctl.fitting.criticism.model_comparison import Candidate, Weighed, centred, level_of, weigh
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 
 #: A parameter that is a choice between shapes, and no quantity, is not refined.

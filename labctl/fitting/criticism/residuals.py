@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from labctl.fitting.channels import Array
 from labctl.fitting.criticism.candidates import smooth_channels
-from labctl.fitting.criticism.compress import KINDS, Compressed
 from labctl.fitting.criticism.evidence import stack
+from labctl.fitting.criticism.model_comparison import Weighed
 from labctl.fitting.criticism.noise_grid import factors
-from labctl.fitting.criticism.weigh import Weighed
+from labctl.fitting.criticism.reduction import KINDS, Compressed
+from labctl.fitting.data.channels import Array
 
 #: Bins of a channel in which a residual is looked at.
 BINS = 8

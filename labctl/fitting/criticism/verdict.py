@@ -14,7 +14,7 @@ import numpy as np
 
 from labctl.fitting.criticism.candidates import TIMES
 from labctl.fitting.criticism.evidence import reproduced, solve_option
-from labctl.fitting.criticism.weigh import Candidate, Weighed
+from labctl.fitting.criticism.model_comparison import Candidate, Weighed
 from labctl.fitting.effects import Term
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from labctl.fitting.channels import BODY_AXES, Channels
+from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Term
 
 

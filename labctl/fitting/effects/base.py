@@ -13,7 +13,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from labctl.fitting.channels import Array, Carrier, Channels
+from labctl.fitting.data.channels import Array, Carrier, Channels
 
 Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
 #: Which output axes an effect shows on: the one that turns, the others, or all alike.

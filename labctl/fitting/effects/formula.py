@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labctl.errors import BadInput
-from labctl.fitting.channels import Array, Channels
+from labctl.fitting.data.channels import Array, Channels
 from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Span, Term
 
 OPERATORS: Mapping[type, Callable[..., Any]] = {

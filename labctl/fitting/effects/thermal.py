@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from labctl.fitting.channels import Channels
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Rows, Span, Term, by_parameter
 
 

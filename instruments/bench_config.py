@@ -1,0 +1,150 @@
+"""A bench file: which table, chamber and gyros stand together, how to reach them, and their limits.
+
+With real hardware only `port` and `host` change; `sim://...` leads to the simulated instruments of `[simulation]`.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+#: A serial number stands in file names, addresses and C comments.
+SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
+
+
+class Strict(BaseModel):
+    """A settings table in which an unknown key is an error with a name."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class TableSettings(Strict):
+    """How to reach the rate table, and what it can do."""
+
+    driver: Literal["arrick-c4"] = "arrick-c4"
+    port: str
+    baudrate: int = 9600
+    steps_per_turn: int = 1600  #: half steps of the table, after the reduction
+    direction: Literal[1, -1] = 1  #: 1: `f` turns the table counter-clockwise seen from above
+    max_rate_dps: float = Field(gt=0)
+    acceleration_dps2: float = Field(gt=0)
+    step_clock_hz: float = Field(default=2_000_000.0, gt=0)  #: the step rate is this over a whole divisor
+    clock_u_ppm: float = Field(default=50.0, ge=0)  #: standard uncertainty of the step clock
+    #: The C4's speed command is not public. Without the manual's template the driver refuses a constant rate.
+    speed_template: str | None = None
+    ramp_template: str | None = None
+    terminator: str = "\r"
+
+
+class ChamberSettings(Strict):
+    """How to reach the chamber's controller, and its limits."""
+
+    driver: Literal["watlow-f4", "watlow-f4t"]
+    port: str | None = None  #: serial (watlow-f4)
+    host: str | None = None  #: Modbus TCP (watlow-f4t)
+    tcp_port: int = 502
+    baudrate: int = 19200
+    address: int = Field(default=1, ge=1, le=247)
+    min_c: float = -70.0
+    max_c: float = 150.0
+    safe_c: float = 25.0
+    ramp_c_per_min: float = Field(default=1.67, gt=0)
+    word_order: Literal["little", "big"] = "little"  #: of 32-bit floats (watlow-f4t): low word first by default
+    write_function: Literal[6, 16] = 6  #: tried first (watlow-f4); the other is the fall-back
+    alarm_inputs: tuple[Literal[1, 2, 3, 4], ...] = ()  #: digital inputs that carry alarms, if wired (watlow-f4)
+    enable_event: int | None = Field(default=None, ge=1, le=8)  #: event output that switches the chamber, if wired
+
+    @model_validator(mode="after")
+    def _in_order(self) -> ChamberSettings:
+        if not self.min_c < self.max_c:
+            raise ValueError(f"min_c {self.min_c:g} must be below max_c {self.max_c:g}")
+        if not self.min_c <= self.safe_c <= self.max_c:
+            raise ValueError(f"safe_c {self.safe_c:g} must lie between min_c {self.min_c:g} and max_c {self.max_c:g}")
+        return self
+
+
+class GyroSettings(Strict):
+    """One unit on the bench: how to read it, who it is and what it may be exposed to."""
+
+    name: str
+    driver: Literal["kvh-dsp3000", "kvh-rd2100", "stim300", "gyrostar"]
+    port: str | None = None  #: serial devices
+    host: str | None = None  #: Modbus TCP devices
+    tcp_port: int = 502
+    serial: str = Field(pattern=SERIAL)
+    model: str = ""
+    technology: Literal["fog", "mems", "piezo", ""] = ""
+    axes: tuple[Literal["x", "y", "z"], ...] = ("z",)
+    max_rate_dps: float = Field(gt=0)
+    min_c: float = -40.0
+    max_c: float = 85.0
+    sample_rate_hz: float | None = None
+    options: dict[str, Any] = Field(default_factory=dict)  #: the driver's own settings, checked by the driver
+    datasheet: dict[str, float] = Field(default_factory=dict)
+
+
+class SimulationSettings(Strict):
+    """What the simulated instruments behind `sim://` are like. Ignored by a bench of real instruments."""
+
+    seed: int = 1
+    noise_seed: int = 0  #: another one measures the same units on another day
+    latitude_deg: float | None = None  #: of the simulated world; default: the bench's
+    units: dict[str, dict[str, Any]] = Field(default_factory=dict)  #: gyro name -> profile and deviations from it
+    table: dict[str, Any] = Field(default_factory=dict)
+    chamber: dict[str, Any] = Field(default_factory=dict)
+    hidden: dict[str, float | str] = Field(default_factory=dict)  #: effect id -> size, hidden in every unit
+    control: str | None = None  #: address of a simulator in another process, for the hand that turns its units
+    speed: float = Field(default=1.0, gt=0)  #: how fast that other process runs; `labctl simulator` writes both
+
+
+class BenchFile(Strict):
+    """A whole bench."""
+
+    name: str
+    latitude_deg: float | None = Field(default=None, ge=-90, le=90)
+    table: TableSettings
+    chamber: ChamberSettings
+    gyros: tuple[GyroSettings, ...] = Field(min_length=1)
+    simulation: SimulationSettings | None = None
+
+    @model_validator(mode="after")
+    def _every_unit_is_one(self) -> BenchFile:
+        """Two units under one name or number would be taken for one, and their readings for its."""
+        for what in ("name", "serial", "port"):
+            given = [value for unit in self.gyros if (value := getattr(unit, what)) is not None]
+            if twice := next((value for value in given if given.count(value) > 1), None):
+                raise ValueError(f"two gyros have the {what} {twice!r}; each needs its own")
+        return self
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether every instrument is reached by sim://."""
+        return all(link.startswith("sim://") for link in self._links())
+
+    @property
+    def has_simulated(self) -> bool:
+        """Whether any instrument is reached by sim://."""
+        return any(link.startswith("sim://") for link in self._links())
+
+    def _links(self) -> list[str]:
+        links = [self.table.port, self.chamber.port, self.chamber.host, *(g.port or g.host for g in self.gyros)]
+        return [link for link in links if link is not None]
+
+
+def shipped_benches() -> dict[str, Path]:
+    """Return the bench files that come with labctl, by name."""
+    folder = Path(str(resources.files("instruments"))) / "benches"
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def read_bench(source: str | Path) -> BenchFile:
+    """Read a bench file by path, or a shipped one by name.
+
+    Raises FileNotFoundError, tomllib.TOMLDecodeError, pydantic.ValidationError.
+    """
+    path = shipped_benches().get(str(source), Path(source))
+    return BenchFile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))

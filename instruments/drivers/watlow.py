@@ -1,0 +1,148 @@
+"""What the two Watlow controllers share: a set point that is limited, rounded, written on change and read back."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from instruments.bench_config import ChamberSettings
+from instruments.clock import Clock
+from instruments.errors import LimitError, Refused, WrongInstrument
+from instruments.interfaces.chamber import ChamberLimits, ChamberState
+from instruments.transport.modbus import Registers
+
+REPLY_S = 1.0
+#: Rounding of counts and floats; far below any set point's resolution.
+TINY_C = 1e-6
+
+
+class Watlow(ABC):
+    """A chamber on a Watlow controller.
+
+    Limits are asked of the controller once, and the narrower of both counts. A profile that runs on the controller is
+    somebody's work: the driver does not end it to make its own set point count. Only the way to the safe state ends
+    one, and only on a chamber that this driver has controlled before.
+    """
+
+    name = "chamber"
+
+    def __init__(self, settings: ChamberSettings, registers: Registers, clock: Clock) -> None:
+        self.settings = settings
+        self.safe_c = settings.safe_c
+        self._registers, self._clock = registers, clock
+        self._limits: ChamberLimits | None = None
+        self._in_charge = False
+
+    @property
+    def limits(self) -> ChamberLimits:
+        """Get the narrower of the controller's limits and the bench file's; asks the controller at first use."""
+        if self._limits is None:
+            low, high = self._controller_limits()
+            settings = self.settings
+            self._limits = ChamberLimits(
+                max(low, settings.min_c), min(high, settings.max_c), self._resolution_c(), settings.ramp_c_per_min
+            )
+        return self._limits
+
+    @abstractmethod
+    def identify(self) -> str:
+        """Get what the controller says it is; raises WrongInstrument when it is another or speaks Fahrenheit."""
+
+    @abstractmethod
+    def _controller_limits(self) -> tuple[float, float]:
+        """Return the controller's own set-point limits, deg C."""
+
+    @abstractmethod
+    def _resolution_c(self) -> float:
+        """Return the step of a set point, deg C."""
+
+    @abstractmethod
+    def _write_setpoint(self, temperature_c: float) -> None:
+        """Write a rounded set point."""
+
+    @abstractmethod
+    def _read_setpoint(self) -> float:
+        """Return the set point, deg C."""
+
+    @abstractmethod
+    def _read_air(self) -> float:
+        """Return the air temperature, deg C; raises Garbled when the controller marks it invalid."""
+
+    @abstractmethod
+    def _alarms(self) -> tuple[str, ...]:
+        """Return what the controller complains of."""
+
+    @abstractmethod
+    def _profile_runs(self) -> bool:
+        """Return whether a profile runs or is held, so that a static set point has no effect."""
+
+    @abstractmethod
+    def _end_profile(self) -> None:
+        """Terminate the profile."""
+
+    @abstractmethod
+    def _switch_on(self) -> None:
+        """Make the controller control; raises Refused where only a person may do that."""
+
+    def set_temperature_c(self, temperature_c: float) -> float:
+        """Control the set point, deg C: limited, rounded, written on change only (EEPROM wear), read back.
+
+        Raises LimitError (nothing was sent), Refused while a profile runs or when another value is read back.
+        """
+        rounded = self._checked(temperature_c)
+        self._refuse_while_a_profile_runs()
+        self._switch_on()
+        self._in_charge = True
+        return self._set(rounded)
+
+    def make_safe(self) -> float:
+        """Control the chamber to its safe set point, deg C; returns what was read back. Switches nothing on."""
+        rounded = self._checked(self.safe_c)
+        if self._in_charge and self._profile_runs():
+            self._end_profile()
+        self._refuse_while_a_profile_runs()
+        return self._set(rounded)
+
+    def read(self) -> ChamberState:
+        """Get air temperature, set point (deg C) and alarms."""
+        return ChamberState(self._clock.now_s(), self._read_air(), self._read_setpoint(), self._alarms())
+
+    def close(self) -> None:
+        """Control the link: close it. The controller keeps its set point."""
+        self._registers.close()
+
+    def _checked(self, temperature_c: float) -> float:
+        limits = self.limits
+        low, high = limits.min_c - TINY_C, limits.max_c + TINY_C
+        # the last rounding takes away what multiplying left behind: 85.1, not 85.10000000000001
+        step = limits.resolution_c
+        rounded = round(round(temperature_c / step) * step, 6) + 0.0 if low <= temperature_c <= high else temperature_c
+        if not low <= rounded <= high:
+            raise LimitError(
+                self.name,
+                f"set point {temperature_c:g} deg C lies outside {limits.min_c:g} to {limits.max_c:g} deg C "
+                "(the narrower of controller and bench file); nothing was written",
+            )
+        return rounded
+
+    def _refuse_while_a_profile_runs(self) -> None:
+        if self._profile_runs():
+            raise Refused(
+                self.name,
+                "a profile runs or is held on the controller, a set point would have no effect; "
+                "end it at the front panel",
+            )
+
+    def _set(self, rounded_c: float) -> float:
+        if abs(self._read_setpoint() - rounded_c) > TINY_C:
+            self._write_setpoint(rounded_c)
+        found = self._read_setpoint()
+        if abs(found - rounded_c) > self.limits.resolution_c / 2:
+            raise Refused(
+                self.name,
+                f"set point {rounded_c:g} deg C was written but {found:g} deg C read back; "
+                "the controller must show its run page",
+            )
+        return found
+
+    def _wrong(self, text: str) -> WrongInstrument:
+        return WrongInstrument(self.name, f"{text}; check address and driver in the bench file")

@@ -1,0 +1,1 @@
+"""What is on the wire, as data and pure functions. Opens nothing."""

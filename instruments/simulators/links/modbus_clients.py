@@ -1,0 +1,121 @@
+"""pymodbus clients whose far end is a simulated instrument, served in the calling thread.
+
+Everything above the socket or port is pymodbus's own. Waiting is done by the Clock, up to the time-out, so that in
+virtual time a silent instrument costs no real second and the same bytes come at the same instants every time.
+"""
+
+from __future__ import annotations
+
+import socket
+from typing import Any
+
+from pymodbus import FramerType
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+from pymodbus.exceptions import ConnectionException
+
+from instruments.clock import Clock
+from instruments.simulators.device import SimulatedDevice
+from instruments.simulators.links.serial_port import SimSerial
+
+#: Time passes in steps no smaller than this while a reply is awaited.
+LEAST_WAIT_S = 1e-3
+RECEIVE_BYTES = 65536
+
+
+class PairedTcpClient(ModbusTcpClient):
+    """A Modbus TCP client on one end of a socket pair; the instrument's bytes are put in at the other."""
+
+    def __init__(self, device: SimulatedDevice, clock: Clock, timeout_s: float, **settings: Any) -> None:
+        super().__init__("simulated", **settings)
+        self._device, self._clock, self._timeout_s = device, clock, timeout_s
+        self._far: socket.socket | None = None
+        self._ready = 0
+
+    def connect(self) -> bool:
+        """Open the pair; False when the instrument cannot be reached. What it said to an earlier link is gone."""
+        if self.socket is None:
+            try:
+                self._device.skip(self._clock.now_s())
+            except OSError:
+                return False
+            self.socket, self._far = socket.socketpair()
+            self._ready = 0
+        return True
+
+    def close(self) -> None:
+        """Close both ends."""
+        super().close()  # type: ignore[no-untyped-call]  # pymodbus left this one untyped
+        if self._far is not None:
+            self._far.close()
+            self._far = None
+
+    def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
+        """Send a request and hand it to the instrument."""
+        sent = int(super().send(request, addr))
+        assert self._far is not None
+        try:
+            self._device.receive(self._far.recv(RECEIVE_BYTES), self._clock.now_s())
+        except OSError as error:
+            self.close()
+            raise ConnectionException(f"{self}: {error}") from error
+        return sent
+
+    def recv(self, size: int | None) -> bytes:
+        """Read what the instrument sends before the time-out; nothing when it stays silent."""
+        if not self._ready:
+            self._await_bytes()
+        if not self._ready:
+            return b""
+        found = super().recv(size)
+        self._ready -= len(found)
+        return found
+
+    def _await_bytes(self) -> None:
+        deadline_s = self._clock.now_s() + self._timeout_s
+        try:
+            while not (data := self._device.transmit(now_s := self._clock.now_s())):
+                if now_s >= deadline_s - 1e-9:
+                    return
+                next_s = self._device.next_byte_s(now_s)
+                until_s = deadline_s if next_s is None else min(max(next_s, now_s + LEAST_WAIT_S), deadline_s)
+                self._clock.sleep(until_s - now_s)
+        except OSError as error:
+            self.close()
+            raise ConnectionException(f"{self}: {error}") from error
+        if self._far is not None:
+            self._far.sendall(data)
+            self._ready += len(data)
+
+
+class SimulatedRtuClient(ModbusSerialClient):
+    """A Modbus RTU client on a simulated serial port.
+
+    pymodbus waits for RTU replies by sleeping a real millisecond and looking again; the simulated port waits by the
+    Clock instead. Dropping stale bytes before a request, framing and checksums stay pymodbus's.
+    """
+
+    def __init__(self, device: SimulatedDevice, clock: Clock, timeout_s: float, **settings: Any) -> None:
+        super().__init__("simulated", framer=FramerType.RTU, **settings)
+        self._device, self._clock, self._timeout_s = device, clock, timeout_s
+
+    def connect(self) -> bool:
+        """Open the port; False when the instrument cannot be reached."""
+        if self.socket is None:
+            port = SimSerial(self._device, self._clock, timeout=self._timeout_s)
+            try:
+                port.reset_input_buffer()
+            except OSError:
+                return False
+            self.socket = port
+        return True
+
+    def recv(self, size: int | None) -> bytes:  # noqa: ARG002  a simulated reply comes whole, or is waited for again
+        """Read what has come by the time-out: the first bytes and all that came with them."""
+        if self.socket is None:
+            raise ConnectionException(str(self))
+        try:
+            first: bytes = self.socket.read(1)
+            return first + self.socket.read(self.socket.in_waiting) if first else b""
+        except OSError as error:
+            self.close()  # type: ignore[no-untyped-call]  # pymodbus left this one untyped
+            raise ConnectionException(f"{self}: {error}") from error

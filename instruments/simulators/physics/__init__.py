@@ -1,0 +1,1 @@
+"""The simulated physics that all instruments of a bench share."""

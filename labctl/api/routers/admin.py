@@ -1,0 +1,51 @@
+"""API keys, the audit trail, and notes of backups: what an approver looks after."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from labctl.api.dependencies import HouseOf
+from labctl.api.middleware import NEEDS_APPROVER
+from labctl.services.admin.api_keys import KeyAnswer, KeyRequest, NewKeyAnswer, list_keys
+from labctl.services.admin.audit import AuditAnswer, list_audit
+from labctl.services.commands.protocol import BackupNote, ReasonRequest
+
+router = APIRouter(prefix="/api", tags=["keys and audit"])
+
+
+@router.get("/keys", summary="All keys", dependencies=[NEEDS_APPROVER])
+def keys(house: HouseOf) -> list[KeyAnswer]:
+    """Every key that was made, with its role; the keys themselves are kept nowhere. Asks for an approver."""
+    return list_keys(house.store)
+
+
+@router.post("/keys", summary="Make a key", status_code=201, dependencies=[NEEDS_APPROVER])
+def create_key(request: KeyRequest, house: HouseOf) -> NewKeyAnswer:
+    """Make a key. The answer is the only place where it is ever shown. Asks for an approver."""
+    return house.acts().create_key(request)
+
+
+@router.post("/keys/{name}/revoke", summary="Revoke a key", dependencies=[NEEDS_APPROVER])
+def revoke_key(name: str, request: ReasonRequest, house: HouseOf) -> KeyAnswer:
+    """Take a key's power away, at once. Asks for an approver."""
+    return house.acts().revoke_key(name, request.reason)
+
+
+@router.get("/audit", summary="The audit trail")
+def audit(
+    house: HouseOf,
+    since: Annotated[datetime | None, Query(description="From this instant on; without a zone: UTC.")] = None,
+    after: Annotated[int, Query(ge=0, le=2**63 - 1, description="Rows with a number above this one.")] = 0,
+    limit: Annotated[int, Query(ge=1, le=10_000, description="At most this many rows.")] = 1000,
+) -> list[AuditAnswer]:
+    """Who did what, when and why, in order; each row's hash covers it and the row before."""
+    return list_audit(house.store, since, after, limit)
+
+
+@router.post("/backups", summary="Note a backup", status_code=204)
+def note_backup(note: BackupNote, house: HouseOf) -> None:
+    """Write down in the audit trail that a backup was made; `labctl backup` sends it."""
+    house.acts().note_backup(note)

@@ -1,0 +1,33 @@
+"""The schedule: look, cancel. `POST /api/campaigns` with `at` or `cron` makes an entry."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from labctl.api.dependencies import HouseOf
+from labctl.services.schedule import queue
+from labctl.services.schemas.answers import ScheduledAnswer
+
+router = APIRouter(prefix="/api/schedule", tags=["campaigns"])
+
+
+@router.get("", summary="What begins when")
+def schedule(
+    house: HouseOf, ended: Annotated[bool, Query(description="Also entries that are over.")] = False
+) -> list[ScheduledAnswer]:
+    """Every entry that waits, next first, with what became of its starts."""
+    return queue.list_starts(house.store, ended=ended)
+
+
+@router.get("/{start}", summary="One entry")
+def start(start: int, house: HouseOf) -> ScheduledAnswer:
+    """When it begins next, and what became of each start that fell due."""
+    return queue.start_status(house.store, start)
+
+
+@router.delete("/{start}", summary="Cancel an entry")
+def cancel(start: int, house: HouseOf) -> ScheduledAnswer:
+    """Take an entry out of the schedule. A campaign that it has begun runs on."""
+    return house.acts().cancel_start(start)

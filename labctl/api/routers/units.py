@@ -1,0 +1,52 @@
+"""Units, benches and the catalogue: what there is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter
+
+from labctl.api.dependencies import HouseOf
+from labctl.services.benches.check import bench_statuses
+from labctl.services.commands.protocol import ClearRequest
+from labctl.services.effects import catalogue
+from labctl.services.recordings.units import list_units, unit
+from labctl.services.schemas.answers import BenchStatus, UnitAnswer
+
+router = APIRouter(prefix="/api", tags=["what there is"])
+
+
+@router.get("/units", summary="All units")
+def units(house: HouseOf) -> list[UnitAnswer]:
+    """Every unit that was measured or imported, by serial number."""
+    return list_units(house.store)
+
+
+@router.get("/units/{serial}", summary="One unit")
+def one_unit(serial: str, house: HouseOf) -> UnitAnswer:
+    """Who the unit is, its recordings and calibrations, and which version is in force."""
+    return unit(house.store, serial)
+
+
+@router.get("/benches", summary="This service's bench")
+def benches(house: HouseOf) -> list[dict[str, Any]]:
+    """The bench that this service runs: its instruments, limits and what it is doing."""
+    return house.benches()
+
+
+@router.get("/benches/status", summary="What could not be confirmed safe")
+def bench_states(house: HouseOf) -> list[BenchStatus]:
+    """Every bench of this database, with what its last safe state could not confirm."""
+    return bench_statuses(house.store)
+
+
+@router.post("/benches/{bench}/clear", summary="Say that a bench was looked at")
+def clear(bench: str, request: ClearRequest, house: HouseOf) -> BenchStatus:
+    """Take in that a person has looked at a bench whose safe state was not confirmed; campaigns may start again."""
+    return house.acts().clear_bench(bench, request)
+
+
+@router.get("/effects", summary="The catalogue of physical effects")
+def effects() -> dict[str, Any]:
+    """Every effect a model can be made of: its standard term, sentence, origin, channels, coefficients and ranges."""
+    return catalogue()

@@ -1,0 +1,141 @@
+"""`labctl campaign` watch, pause, resume, abort, confirm: a campaign that runs, or was interrupted."""
+
+from __future__ import annotations
+
+import getpass
+from typing import Annotated
+
+import typer
+
+from labctl.cli.campaign import CampaignId, look, print_campaign, print_end
+from labctl.cli.error_reporting import ending_is_an_interrupt, one_clear_line
+from labctl.cli.options import BenchName, Database, Json
+from labctl.cli.output import console, print_json
+
+Id = Annotated[int, typer.Argument(metavar="ID", help="Campaign.")]
+By = Annotated[str | None, typer.Option("--by", metavar="NAME", help="Who says so; default: the user logged in.")]
+
+
+def person(by: str | None) -> str:
+    """Return who acts: as said, or whoever is logged in."""
+    try:
+        return by or getpass.getuser()
+    except (KeyError, OSError):
+        return "a person"
+
+
+def watch(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
+    """Follow a campaign until it ends: from a running service live, else what the database tells."""
+    from instruments.clock import SystemClock
+    from labctl.cli.progress_bar import CampaignProgress
+
+    clock, asked, fault = SystemClock(), "", ""
+    with one_clear_line(), CampaignProgress(quiet=as_json) as progress:
+        while True:
+            answer = look(database, campaign)
+            progress.update(answer)
+            if not as_json and answer.prompt is not None and answer.prompt.id != asked:
+                asked = answer.prompt.id
+                console.print(f"question {asked}: {answer.prompt.text}", style="yellow", markup=False)
+            if not as_json and answer.last_error and answer.last_error != fault:
+                fault = answer.last_error
+                console.print(f"fault: {fault}", style="red", markup=False)
+            if answer.abandoned or answer.state not in {"planned", "running", "paused", "waiting"}:
+                break
+            clock.sleep(1.0)
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+def pause(
+    campaign: Id,
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")] = "paused from the command line",
+    by: By = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Hold a running campaign after the present data set; the bench is still watched."""
+    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.protocol import ReasonRequest
+
+    with one_clear_line(), open_acts(database) as acts:
+        answer = acts.pause_campaign(campaign, ReasonRequest(reason=reason, by=person(by)))
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+def resume(
+    campaign: Annotated[
+        int | None, typer.Argument(metavar="ID", help="Campaign; default: the newest that was interrupted.")
+    ] = None,
+    bench: BenchName = None,
+    power: Annotated[
+        str | None,
+        typer.Option("--power", metavar="lost|kept", help="Were the units off meanwhile? Default: if the host."),
+    ] = None,
+    speed: Annotated[float | None, typer.Option("--speed", metavar="X", help="Of a simulated bench.")] = None,
+    by: By = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Let a paused campaign go on, or take up one that was interrupted, failed or aborted; safe state first."""
+    from labctl.cli.progress_bar import CampaignProgress
+    from labctl.cli.terminal_operator import Attendant
+    from labctl.services.campaigns.resume import resume_here
+    from labctl.services.commands.local import service_url
+    from labctl.services.commands.protocol import ResumeRequest
+
+    with one_clear_line():
+        request = ResumeRequest.model_validate({"by": person(by), "power": power})
+        if url := service_url(database):
+            from labctl.services.commands.remote import RemoteActs
+
+            wanted = look(database, campaign).id
+            answer = RemoteActs(url).resume_campaign(wanted, request)
+            print_json(answer) if as_json else print_campaign(answer)
+            return
+        with ending_is_an_interrupt(), CampaignProgress(quiet=as_json) as progress:
+            answer = resume_here(database, campaign, bench, speed, request, progress.update, Attendant().attend)
+    print_end(answer, as_json=as_json)
+
+
+def abort(
+    campaign: Id,
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")] = "aborted from the command line",
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """End a running campaign now, in the safe state. What was measured is kept."""
+    from labctl.services.commands.local import open_acts
+
+    with one_clear_line(), open_acts(database) as acts:
+        answer = acts.abort_campaign(campaign, reason)
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+def confirm(
+    prompt: Annotated[str, typer.Argument(metavar="QUESTION", help="Id of the question, as status or watch shows it.")],
+    campaign: Annotated[
+        int | None, typer.Option("--campaign", metavar="ID", help="Campaign; default: the newest.")
+    ] = None,
+    decline: Annotated[
+        str | None, typer.Option("--decline", metavar="WHY", help="It cannot be done; the campaign ends.")
+    ] = None,
+    by: By = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Answer a campaign's question: it is done, or cannot be. An answer to an older question is refused."""
+    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.protocol import ConfirmRequest
+
+    with one_clear_line():
+        wanted = campaign if campaign is not None else look(database, None).id
+        request = ConfirmRequest(prompt=prompt, by=person(by), confirmed=decline is None, reason=decline or "")
+        with open_acts(database) as acts:
+            answer = acts.confirm(wanted, request)
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+def add_to(app: typer.Typer) -> None:
+    """Put these commands beside the others of `labctl campaign`."""
+    for command in (watch, pause, resume, abort, confirm):
+        app.command(command.__name__)(command)

@@ -1,0 +1,48 @@
+"""(e) What is missing? An effect hidden in a simulated gyro, then the real gyro: criticise, improve, see it fall."""
+
+from __future__ import annotations
+
+from instruments.clock import VirtualClock
+from labctl.cli.criticism import ladder_lines
+from labctl.cli.demo.runner import Stage
+from labctl.services.calibrations.revision import improve_unit
+from labctl.services.commands.protocol import ImproveRequest
+from labctl.services.criticism.criticise import criticise_unit, ladder
+from labctl.services.schemas.answers import CriticismAnswer
+
+SERIAL = "FOG-0002"
+HIDDEN = {"scale_factor_asymmetry": 2e-4}
+
+
+def play(stage: Stage, real_serial: str) -> None:
+    """Tell both walks; what is said comes from the criticism alone."""
+    stage.title("(e) What is missing? A gyro with something hidden in it")
+    campaign = stage.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
+    stage.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])
+    answer = _walk(stage, SERIAL)
+    stage.say(f"(hidden in it was: {', '.join(HIDDEN)})")
+    stage.figures["hidden"] = {"hidden": list(HIDDEN), "named": answer.named, "verdict": answer.verdict}
+    stage.title("The same walk through the real gyro's recording, from a plain model")
+    stage.fit(real_serial, "bias_scale", stage.store.recordings.of_unit(real_serial)[0].id)
+    answer = _walk(stage, real_serial)
+    stage.figures["real_walk"] = {"named": answer.named, "verdict": answer.verdict}
+
+
+def _walk(stage: Stage, serial: str) -> CriticismAnswer:
+    answer = criticise_unit(stage.store, serial, None, None, [])
+    for sentence in answer.text:
+        stage.say(sentence)
+    if answer.named:
+        added = answer.named[0]
+        better = improve_unit(stage.store, serial, ImproveRequest(add=[added]), VirtualClock().utc())
+        before, after = (better.model_extra or {})["before"], better.error
+        if answer.verdict == "ambiguous":
+            stage.say(f"adding the first of them, to see how far it leads (not that it is the cause): {added}")
+        stage.say(
+            f"added {added}: RMS {before['rms_dps']:.4f} -> {after.rms_dps:.4f} deg/s, held-out temperatures "
+            f"{before['heldout_rms_dps']:.4f} -> {after.heldout_rms_dps:.4f}, noise floor {after.noise_floor_dps:.4f}"
+        )
+        stage.say(f"and then: {criticise_unit(stage.store, serial, None, None, []).text[0]}")
+    for line in ladder_lines(ladder(stage.store, serial)):
+        stage.say(line)
+    return answer

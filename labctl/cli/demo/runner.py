@@ -1,0 +1,101 @@
+"""What every part of the demo needs: a database, a folder, and a voice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from instruments.bench_config import SimulationSettings
+from instruments.clock import VirtualClock
+from labctl.cli.progress_bar import CampaignProgress
+from labctl.fitting import Context, context_of
+from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.campaigns.execution import prepare, run
+from labctl.services.campaigns.status import answer_of
+from labctl.services.commands.protocol import FitRequest
+from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.answers import CampaignAnswer, FitAnswer
+from labctl.store import Store
+from procedures.monitoring.progress import Progress
+
+
+@dataclass
+class Stage:
+    """Where the demo plays, and what it has found so far."""
+
+    store: Store
+    folder: Path
+    console: Console
+    quiet: bool
+    figures: dict[str, Any] = field(default_factory=dict)
+
+    def title(self, text: str) -> None:
+        """Begin a part."""
+        self.console.print(f"\n[bold]{text}[/]")
+
+    def say(self, text: str) -> None:
+        """Tell something."""
+        self.console.print(text, markup=False)
+
+    def campaign(
+        self,
+        recipe: str,
+        bench: str,
+        *,
+        noise_seed: int = 0,
+        hidden: dict[str, float] | None = None,
+        serial: str | None = None,
+    ) -> CampaignAnswer:
+        """Run a recipe on a simulated bench in virtual time, with progress and time left."""
+        settings = load_bench(bench)
+        simulation = (settings.simulation or SimulationSettings()).model_copy(
+            update={"noise_seed": noise_seed, "hidden": hidden or {}}
+        )
+        gyros = settings.gyros if serial is None else (settings.gyros[0].model_copy(update={"serial": serial}),)
+        settings = settings.model_copy(update={"simulation": simulation, "gyros": gyros})
+        prepared = prepare(self.store, recipe, settings, VirtualClock(), clip=False)
+        row = self.store.campaigns.get(prepared.id)
+        with CampaignProgress(quiet=self.quiet, title=f"campaign {prepared.id}") as bar:
+
+            def seen(progress: Progress) -> None:
+                bar.update(answer_of(row, progress))
+
+            answer = run(self.store, prepared, observe=seen)
+        if answer.state != "done":
+            raise RuntimeError(f"the demo's campaign {answer.id} ended {answer.state}: {answer.reason}")
+        assert answer.started_at is not None
+        assert answer.ended_at is not None
+        hours = (answer.ended_at - answer.started_at).total_seconds() / 3600
+        recording = self.store.recordings.get(next(iter(answer.recordings.values())))
+        self.say(
+            f"campaign {answer.id}: {recording.datasets} data sets, {recording.readings:,} readings, "
+            f"{hours:.1f} h of bench"
+        )
+        return answer
+
+    def fit(self, serial: str, model: str, recording: int) -> FitAnswer:
+        """Fit a model and say how well it does."""
+        answer = fit_unit(self.store, serial, FitRequest(recording=recording, model=model), VirtualClock().utc())
+        e = answer.error
+        floor = "–" if e.noise_floor_dps is None else f"{e.noise_floor_dps:.4f}"
+        held = "–" if e.heldout_rms_dps is None else f"{e.heldout_rms_dps:.4f}"
+        self.say(
+            f"{model}: version {answer.version}; RMS error {e.raw_rms_dps:.4f} -> {e.rms_dps:.4f} deg/s "
+            f"(held-out temperatures {held}, noise floor {floor})"
+        )
+        return answer
+
+    def context(self, recording: int) -> Context:
+        """Return the data sets of a recording."""
+        return context_of(self.store.recordings.points(recording))
+
+
+@contextmanager
+def maybe_silent(quiet: bool) -> Iterator[Console]:
+    """Give a console that prints, or one that does not."""
+    yield Console(highlight=False, quiet=quiet)

@@ -1,0 +1,61 @@
+"""Puts a campaign's questions to whoever sits at the terminal that runs it."""
+
+from __future__ import annotations
+
+import sys
+import termios
+import threading
+from collections.abc import Callable
+from contextvars import copy_context
+from typing import TYPE_CHECKING
+
+from instruments.clock import SystemClock
+from labctl.cli.output import complaints
+from labctl.config import os_user
+from labctl.errors import StoreError
+from procedures.contracts.errors import StalePrompt
+from procedures.contracts.operator import PersonOperator
+
+if TYPE_CHECKING:
+    from procedures.contracts.operator import Operator, Prompt
+
+LOOK_S = 0.5
+
+
+class Attendant:
+    """Prints each question and takes the next line for its answer: empty for done, anything else says why not."""
+
+    def attend(self, operator: Operator, note: Callable[[str], None]) -> None:
+        """Answer for an operator from now on, in the background; `note` is told of each answer.
+
+        A bench that helps itself asks nobody.
+        """
+        if isinstance(operator, PersonOperator):
+            here = copy_context()  # in the name of whoever gave the command
+            threading.Thread(target=here.run, args=(self._serve, operator, note), daemon=True).start()
+
+    def _serve(self, operator: PersonOperator, note: Callable[[str], None]) -> None:
+        clock, asked = SystemClock(), ""
+        while True:
+            prompt = operator.pending
+            if prompt is not None and prompt.id != asked:
+                asked = prompt.id
+                self._put(operator, prompt, note)
+            clock.sleep(LOOK_S)
+
+    @staticmethod
+    def _put(operator: PersonOperator, prompt: Prompt, note: Callable[[str], None]) -> None:
+        if sys.stdin.isatty():  # an Enter from before the question is no answer to it
+            termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
+        complaints.print(f"{prompt.text}. Press Enter when it is done, or type why it cannot be.", markup=False)
+        line = sys.stdin.readline()
+        if not line:  # nobody sits there
+            return
+        try:
+            if why := line.strip():
+                operator.decline(prompt.id, os_user(), why)
+            else:
+                operator.confirm(prompt.id, os_user())
+            note(f"{prompt.id}: {f'cannot be done; {why}' if why else 'done'}; {prompt.text}")
+        except (StalePrompt, StoreError) as error:
+            complaints.print(f"labctl: {error}", markup=False)

@@ -1,0 +1,65 @@
+"""Where and how a model fails, as numbers for pictures: one list for each view, compact enough to leave as JSON.
+
+A view says nothing about a cause; `draws` names, for each view, the effects of the catalogue that would draw a picture
+there, as the effects themselves say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from labctl.fitting.criticism.diagnostics.angle_spectra import angle_lines, frequency_lines, start_profile
+from labctl.fitting.criticism.diagnostics.axis import AxisView, axis_view
+from labctl.fitting.criticism.diagnostics.channels import channel_lines, data_sets, previous_rate, time_line
+from labctl.fitting.criticism.diagnostics.periodogram import between_sets
+from labctl.fitting.criticism.diagnostics.repeatability import legs, repeats
+from labctl.fitting.criticism.diagnostics.within_dataset import within_of
+from labctl.fitting.criticism.model_comparison import Weighed
+from labctl.fitting.criticism.residuals import Residuals
+from labctl.fitting.effects import Effect
+from labctl.recording import Recording
+
+#: What there is to see beside the residual against each channel, which goes by the channel's name.
+VIEWS = ("map", "time", "angle", "frequency", "time_in_set", "legs", "previous_rate", "worst", "repeats")
+
+__all__ = ["VIEWS", "draws_of", "views_of"]
+
+
+def views_of(
+    weighed: Weighed, left: Mapping[str, Residuals], recording: Recording, catalogue: Mapping[str, Effect]
+) -> dict[str, Any]:
+    """Return all views of a criticism: lists of records, one or more for each axis, of plain numbers without NaN."""
+    axes = [axis_view(weighed, axis, residuals) for axis, residuals in left.items()]
+    channels = [line for view in axes for line in channel_lines(view)]
+    found: dict[str, Any] = {
+        "sets": data_sets(weighed.data, axes),
+        "channels": channels,
+        "time": [time_line(view) for view in axes],
+        "frequency": [line for view in axes if (line := between_sets(view)) is not None],
+        "legs": [line for view in axes for line in legs(view)],
+        "previous_rate": [line for view in axes if (line := previous_rate(view)) is not None],
+        "repeats": [line for view in axes if (line := repeats(view)) is not None],
+        **_within(axes, recording),
+    }
+    found["draws"] = draws_of(catalogue, {line["channel"] for line in channels})
+    return found
+
+
+def _within(axes: list[AxisView], recording: Recording) -> dict[str, Any]:
+    found: dict[str, Any] = {"angle": [], "frequency_within": [], "time_in_set": []}
+    readings = within_of(recording)
+    if readings is None:
+        return found
+    for view in axes:
+        residual = readings.axis(view.axis)
+        found["angle"] += angle_lines(readings, residual, view.axis)
+        found["frequency_within"] += frequency_lines(readings, residual, view.axis)
+        found["time_in_set"] += start_profile(readings, residual, view.axis)
+    return found
+
+
+def draws_of(catalogue: Mapping[str, Effect], channels: set[str]) -> dict[str, list[str]]:
+    """Return view or channel -> ids of the effects that would draw a picture there."""
+    names = (*VIEWS, *sorted(channels))
+    return {name: [kind.id for kind in catalogue.values() if name in kind.draws] for name in names}

@@ -1,0 +1,115 @@
+"""Data sets that should agree: the same temperature from below and from above, and the same point measured again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
+from labctl.fitting.criticism.diagnostics.channels import groups_of
+from labctl.fitting.data.channels import Array
+from labctl.fitting.estimation.error_metrics import REPEAT_RATE, REPEAT_TEMPERATURE_C
+from labctl.fitting.numeric.json_numbers import plain, plain_list
+
+#: A temperature that went back by this much has turned.
+TURN_K = 2.0
+#: An up leg and a down leg meet at temperatures as close as this.
+SAME_TEMPERATURE_K = 2.0
+MOST_PAIRS = 200
+
+
+def legs_of(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return from where the temperature came to each data set, (m,): 1 from below, -1 from above, 0 not known."""
+    leg = np.zeros(len(temperature_c), dtype=np.int64)
+    state, low, high = 0, 0.0, 0.0
+    for i, now in enumerate(temperature_c.tolist()):
+        if i == 0 or run[i] != run[i - 1]:
+            state, low, high = 0, now, now
+        low, high = min(low, now), max(high, now)
+        if state >= 0 and high - now > TURN_K:
+            state, low = -1, now
+        elif state <= 0 and now - low > TURN_K:
+            state, high = 1, now
+        leg[i] = state
+    return leg
+
+
+def legs(view: AxisView) -> Iterator[dict[str, Any]]:
+    """Yield the up leg minus the down leg at equal rate and temperature, by temperature and by rate."""
+    warm, rate = view.temperature_c(), view.channel("table_rate_dps")
+    leg = legs_of(warm, view.run)
+    ups, downs = _matched(view, leg, warm, rate)
+    if not len(ups):
+        return
+    for name, values in (("temperature_c", (warm[ups] + warm[downs]) / 2), ("table_rate_dps", rate[ups])):
+        groups = groups_of(values)
+        weights = np.zeros((len(groups), len(view)))
+        for k, group in enumerate(groups):
+            np.add.at(weights[k], ups[group], 1.0 / len(group))
+            np.add.at(weights[k], downs[group], -1.0 / len(group))
+        difference, u = weights @ view.residual_dps, view.u_dps(weights)
+        yield {
+            "axis": view.axis,
+            "channel": name,
+            "pairs": len(ups),
+            "at": plain_list([values[group].mean() for group in groups]),
+            "mean_dps": plain_list(difference),
+            "low_dps": plain_list(difference - BAND * u),
+            "high_dps": plain_list(difference + BAND * u),
+            "z": plain(np.max(np.abs(difference) / np.maximum(u, 1e-300))),
+        }
+
+
+def _matched(
+    view: AxisView, leg: NDArray[np.int64], warm: Array, rate: Array
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return data sets of the up leg, each with the one of the down leg that is nearest at its rate and position."""
+    position, near = view.position(), REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
+    ups, downs = [], []
+    down = np.flatnonzero(leg < 0)
+    for i in np.flatnonzero(leg > 0) if len(down) else ():
+        same = down[(position[down] == position[i]) & (np.abs(rate[down] - rate[i]) <= near)]
+        if len(same):
+            nearest = same[np.argmin(np.abs(warm[same] - warm[i]))]
+            if abs(warm[nearest] - warm[i]) <= SAME_TEMPERATURE_K:
+                ups.append(i)
+                downs.append(nearest)
+    return np.array(ups, dtype=np.int64), np.array(downs, dtype=np.int64)
+
+
+def repeats(view: AxisView) -> dict[str, Any] | None:
+    """Return how far data sets at one rate, temperature and position scatter; None without any.
+
+    The floor is what noise gives two data sets that far apart in time: drift moves neighbours alike.
+    """
+    warm, rate, position = view.temperature_c(), view.channel("table_rate_dps"), view.position()
+    near = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
+    order = np.lexsort((warm, np.round(rate / near), position))
+    first, second = order[:-1], order[1:]
+    close = (
+        (position[first] == position[second])
+        & (np.abs(rate[first] - rate[second]) <= near)
+        & (np.abs(warm[first] - warm[second]) <= REPEAT_TEMPERATURE_C)
+    )
+    first, second = first[close], second[close]
+    if not len(first):
+        return None
+    difference = view.residual_dps[second] - view.residual_dps[first]
+    variance = np.diag(view.covariance)
+    expected = variance[first] + variance[second] - 2 * view.covariance[first, second]
+    floor = float(np.sqrt(np.mean(expected) / 2))
+    scatter = float(np.sqrt(np.mean(difference**2) / 2))
+    shown = np.unique(np.linspace(0, len(first) - 1, min(len(first), MOST_PAIRS)).round().astype(np.int64))
+    return {
+        "axis": view.axis,
+        "pairs": len(first),
+        "scatter_dps": plain(scatter),
+        "floor_dps": plain(floor),
+        "over_floor": plain(scatter / floor),
+        "datasets": [[int(a), int(b)] for a, b in view.data.dataset[np.stack([first, second], axis=1)[shown]]],
+        "apart_s": plain_list(np.abs(view.t_s[second] - view.t_s[first])[shown]),
+        "difference_dps": plain_list(difference[shown]),
+    }

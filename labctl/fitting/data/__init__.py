@@ -1,0 +1,1 @@
+"""What a fit works on: channels, temperature history, static records, data-set means."""

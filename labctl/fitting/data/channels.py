@@ -1,0 +1,124 @@
+"""What a regressor can see: named arrays of equal length, means of data sets or single readings alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.data.temperature_history import Past, past_of
+from labctl.recording import Recording
+
+Array = NDArray[np.float64]
+BODY_AXES = ("x", "y", "z")
+#: A wave, "cos" or "sin", and how often it comes per turn of the table.
+Carrier = tuple[str, int]
+#: How long a data set is taken to be where nobody says.
+USUAL_DURATION_S = 60.0
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Logged channels under the recording's column names, (n,) each, and the rate along each body axis.
+
+    `rates` is what a rate regressor sees: the true rate for a forward law, the gyro's output for a direct one.
+    """
+
+    columns: Mapping[str, NDArray[Any]]
+    rates: Mapping[str, Array]  #: body axis -> (n,) deg/s
+    past: Past = field(default_factory=Past)  #: what was before each row
+    harmonics: Mapping[Carrier, Array] = field(default_factory=dict)  #: means over each row of waves in the table angle
+
+    def __len__(self) -> int:
+        return len(next(iter(self.rates.values())))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.columns[name]
+
+    def rate_dps(self, axis: str) -> Array:
+        """Return the rate along a body axis, (n,) deg/s; zero along an axis of which nothing is known."""
+        return self.rates[axis] if axis in self.rates else np.zeros(len(self))
+
+    def temperature_c(self, axis: str) -> Array:
+        """Return the thermometer of an axis, (n,) deg C, or the unit's own where there is one for all."""
+        name = f"temperature_{axis}_c"
+        return np.asarray(self.columns[name if name in self.columns else "temperature_c"], dtype=np.float64)
+
+    def with_rates(self, rates: Mapping[str, Array]) -> Channels:
+        """Return the same channels with other rates along the body axes."""
+        return replace(self, rates=rates)
+
+    def take(self, rows: NDArray[Any]) -> Channels:
+        """Return the channels of some rows, by index or mask."""
+        return Channels(
+            {name: values[rows] for name, values in self.columns.items()},
+            {axis: values[rows] for axis, values in self.rates.items()},
+            self.past,
+            {carrier: values[rows] for carrier, values in self.harmonics.items()},
+        )
+
+    def table_rate_dps(self) -> Array:
+        """Return the table's rate, (n,) deg/s."""
+        return np.asarray(self.columns["table_rate_dps"], dtype=np.float64)
+
+    def up(self, axis: str) -> Array:
+        """Return how much of a body axis points up along the table axis, (n,): 1, -1 or 0."""
+        position = np.asarray(self.columns["position"]).astype(np.str_)
+        return (position == axis).astype(np.float64) - (position == f"-{axis}").astype(np.float64)
+
+    def positions(self) -> list[tuple[str, NDArray[np.bool_]]]:
+        """Return every position that occurs and which rows are in it, (n,)."""
+        position = np.asarray(self.columns["position"]).astype(np.str_)
+        return [(str(there), position == there) for there in np.unique(position)]
+
+    def harmonic(self, carrier: Carrier) -> Array:
+        """Return the mean of a wave in the table angle over each row, (n,)."""
+        if carrier in self.harmonics:
+            return self.harmonics[carrier]
+        wave, n = carrier
+        begin = np.deg2rad(np.asarray(self.columns["table_angle_deg"], dtype=np.float64))
+        turned = np.deg2rad(self.table_rate_dps() * self.durations_s())
+        at = n * (begin + turned / 2)
+        return np.asarray((np.cos(at) if wave == "cos" else np.sin(at)) * np.sinc(n * turned / 2 / np.pi))
+
+    def durations_s(self) -> Array:
+        """Return how long each row lasted, (n,) s."""
+        if "duration_s" in self.columns:
+            return np.asarray(self.columns["duration_s"], dtype=np.float64)
+        return np.full(len(self), USUAL_DURATION_S)
+
+    def decayed(self, tau_s: float) -> Array:
+        """Return the mean over each row of exp(-time since its data set's begin / tau), (n,)."""
+        begin = np.asarray(self.columns["since_begin_s"]) if "since_begin_s" in self.columns else np.zeros(len(self))
+        length = np.maximum(self.durations_s(), 1e-9)
+        return np.asarray(np.exp(-begin / tau_s) * -np.expm1(-length / tau_s) * tau_s / length)
+
+    def missing(self, names: Iterable[str]) -> list[str]:
+        """Return which of the names are not logged."""
+        return [name for name in names if name not in self.columns and name not in {"table_rate_dps", "temperature_c"}]
+
+
+def body_rates(table_rate_dps: Array, position: NDArray[Any]) -> dict[str, Array]:
+    """Return the table's rate along each body axis, axis -> (n,), for positions like "x" or "-z", (n,)."""
+    signs = np.where(np.char.startswith(position.astype(np.str_), "-"), -1.0, 1.0)
+    names = np.char.lstrip(position.astype(np.str_), "-")
+    return {axis: np.where(names == axis, signs * table_rate_dps, 0.0) for axis in BODY_AXES}
+
+
+def channels_of(points: Recording, up_rate_dps: float = 0.0) -> Channels:
+    """Return the channels of a recording, with the true rate along each body axis.
+
+    `up_rate_dps` is a rate that the table axis has besides the table's own: the Earth's, upwards.
+    """
+    columns = dict(points.columns)
+    columns.setdefault("position", np.full(len(points), points.info.axes[0]))
+    true = np.asarray(columns["table_rate_dps"], dtype=np.float64) + up_rate_dps
+    if "previous_rate_dps" not in columns and points.info.kind == "points":
+        columns["previous_rate_dps"] = np.concatenate([[0.0], np.asarray(columns["table_rate_dps"])[:-1]])
+    return Channels(columns, body_rates(true, np.asarray(columns["position"])), past_of(points))

@@ -1,0 +1,75 @@
+"""The Earth turns the table too: a constant part along the table axis, and a part that goes round with the table."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from labctl.fitting.data.channels import Array, Channels
+from labctl.fitting.numeric.drift_noise import Scatter
+from labctl.recording import RecordingInfo
+
+EARTH_RATE_DPS = 15.041067 / 3600.0  #: sidereal
+
+
+def up_rate_dps(info: RecordingInfo) -> float:
+    """Return the Earth's rate along the table axis, deg/s; 0 where the latitude is not known."""
+    if info.latitude_deg is None:
+        return 0.0
+    latitude = math.radians(info.latitude_deg)
+    tilt, azimuth = math.radians(info.tilt_deg or 0.0), math.radians(info.tilt_azimuth_deg or 0.0)
+    up = math.sin(latitude) * math.cos(tilt) + math.cos(latitude) * math.sin(tilt) * math.cos(azimuth)
+    return EARTH_RATE_DPS * up
+
+
+def turning_size_dps(info: RecordingInfo) -> float:
+    """Return the size of the Earth's rate that goes round with the table, deg/s; 0 where the latitude is not known."""
+    return 0.0 if info.latitude_deg is None else EARTH_RATE_DPS * math.cos(math.radians(info.latitude_deg))
+
+
+def with_known_size(
+    columns: Array, turning: Array, y: Array, scatter: Scatter, size_dps: float
+) -> tuple[Array, Array, Scatter]:
+    """Return design, y and scatter with the turning columns beside the model's, and what is known of their size.
+
+    Only the direction of north is unknown: each of cosine and sine is 0 with the standard deviation that a vector of
+    the known size has along a random direction, said by one more row for each.
+    """
+    extra = turning.shape[1]
+    if extra == 0 or scatter.white_var is None:
+        return columns, y, scatter
+    upper = np.column_stack([columns, turning])
+    lower = np.column_stack([np.zeros((extra, columns.shape[1])), np.eye(extra)])
+    more = replace(
+        scatter,
+        t_s=np.concatenate([scatter.t_s, np.zeros(extra)]),
+        run=np.concatenate([scatter.run, -1 - np.arange(extra)]),
+        rate_dps=np.concatenate([scatter.rate_dps, np.zeros(extra)]),
+        white_var=np.concatenate([scatter.white_var, np.full(extra, size_dps**2 / 2)]),
+    )
+    return np.vstack([upper, lower]), np.concatenate([y, np.zeros(extra)]), more
+
+
+def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array:
+    """Return the once-per-turn Earth rate's regressors of an output axis, (n, k): a cosine and a sine per position.
+
+    Its size is known (the Earth's rate times the cosine of the latitude) but not where north lies from the table's
+    zero, so both are fitted and belong to the environment. An axis along the table axis has none. Needs the table angle
+    and the length of the data sets; k is 0 without them.
+    """
+    if info.latitude_deg is None or "table_angle_deg" not in channels or "duration_s" not in channels:
+        return np.zeros((len(channels), 0))
+    start = np.deg2rad(np.asarray(channels["table_angle_deg"], dtype=np.float64))
+    turned = np.deg2rad(np.asarray(channels["table_rate_dps"]) * np.asarray(channels["duration_s"]))
+    middle, half = start + turned / 2, turned / 2
+    shrink = np.sinc(half / np.pi)  # the mean of a cosine over what was turned
+    cosine, sine = np.cos(middle) * shrink, np.sin(middle) * shrink
+    position = np.asarray(channels["position"]).astype(np.str_)
+    found = []
+    for there in np.unique(position):
+        if there.lstrip("-") != axis:
+            here = position == there
+            found += [np.where(here, cosine, 0.0), np.where(here, sine, 0.0)]
+    return np.column_stack(found) if found else np.zeros((len(channels), 0))

@@ -1,0 +1,120 @@
+"""What a fit works on: data-set means, their noise and their temperature levels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadInput, NotEnoughData
+from labctl.fitting.data.channels import Array, Channels, channels_of
+from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.temperature_channel import with_temperature
+from labctl.fitting.data.temperature_levels import temperature_levels
+from labctl.fitting.numeric.drift_noise import Scatter
+from labctl.recording import Recording, RecordingInfo, to_points
+
+
+@dataclass(frozen=True)
+class Context:
+    """The m data sets of a recording as a fit sees them."""
+
+    info: RecordingInfo
+    channels: Channels  #: true rates along the body axes, Earth included where it is known
+    outputs: Mapping[str, Array]  #: axis -> (m,) gyro output, deg/s
+    white_var: Mapping[str, Array] | None  #: axis -> (m,) variance of the mean from white noise, (deg/s)^2
+
+    def __len__(self) -> int:
+        return len(self.channels)
+
+    @cached_property
+    def temperature_c(self) -> Array:
+        """The temperature of each data set, (m,)."""
+        return np.asarray(self.channels["temperature_c"], dtype=np.float64)
+
+    @cached_property
+    def levels(self) -> NDArray[np.int64] | None:
+        """The temperature level of each data set, (m,); None where there are no discrete levels."""
+        return temperature_levels(self.temperature_c)
+
+    def true_rate_dps(self, axis: str) -> Array:
+        """Return the true rate along an axis, (m,) deg/s."""
+        return self.channels.rate_dps(axis)
+
+    def take(self, rows: NDArray[np.bool_]) -> Context:
+        """Return the context of some data sets, by mask (m,)."""
+        white = None if self.white_var is None else {a: v[rows] for a, v in self.white_var.items()}
+        return replace(
+            self,
+            channels=self.channels.take(rows),
+            outputs={axis: values[rows] for axis, values in self.outputs.items()},
+            white_var=white,
+        )
+
+    def white_dps(self, axis: str) -> float | None:
+        """Return the white noise of a data-set mean, root mean square, deg/s; None when it is not known."""
+        return None if self.white_var is None else float(np.sqrt(self.white_var[axis].mean()))
+
+    def scatter(self, axis: str) -> Scatter:
+        """Return what is known of the noise of one axis before the fit."""
+        m = len(self)
+        t_s = np.asarray(self.channels["t_s"], dtype=np.float64) if "t_s" in self.channels else np.arange(float(m))
+        return Scatter(
+            t_s,
+            np.asarray(self.channels["run"]) if "run" in self.channels else np.ones(m, dtype=np.int64),
+            np.asarray(self.channels["table_rate_dps"], dtype=np.float64),
+            None if self.white_var is None else self.white_var[axis],
+            self.info.datasheet.get("bias_stability_dps"),
+        )
+
+    def distinct_rates(self, axis: str) -> int:
+        """Return how many different rates an axis was turned at, to a thousandth of the fastest."""
+        rates = self.true_rate_dps(axis)
+        step = max(float(np.max(np.abs(rates), initial=0.0)) * 1e-3, 1e-9)
+        return len(np.unique(np.round(rates / step)))
+
+    def distinct_temperatures(self) -> int:
+        """Return how many different temperatures there are; without discrete levels, how many whole degrees."""
+        if self.levels is not None:
+            return int(self.levels.max()) + 1
+        return len(np.unique(np.round(self.temperature_c)))
+
+
+def context_of(recording: Recording) -> Context:
+    """Return what a fit of this recording works on.
+
+    Raises BadInput for coefficients, NotEnoughData when empty or where nothing says how warm the unit was.
+    """
+    if recording.info.kind == "coefficients":
+        raise BadInput(
+            f"{recording.info.serial}: the recording is a table of coefficients; only model weiss1995 takes one"
+        )
+    points = to_points(recording)
+    if len(points) == 0:
+        raise NotEnoughData(f"{recording.info.serial}: the recording has no complete data set with valid readings")
+    points = with_temperature(points)
+    info = points.info
+    outputs: dict[str, Array] = {axis: points.gyro_dps(axis) for axis in info.axes}
+    return Context(info, channels_of(points, up_rate_dps(info)), outputs, _white(points))
+
+
+def _white(points: Recording) -> dict[str, Array] | None:
+    """Return the variance of each mean from white noise, or None where the spread of the readings is not known.
+
+    `gyro_*_white_std` is taken where it is there: the white level alone, without lines from the table's steps, which
+    average out over a data set and are no noise of the mean.
+    """
+    found: dict[str, Array] = {}
+    n = points.columns.get("n")
+    for axis in points.info.axes:
+        spread = points.columns.get(f"gyro_{axis}_white_std", points.columns.get(f"gyro_{axis}_std"))
+        if spread is None or n is None or not np.all(np.isfinite(spread)) or not np.any(spread > 0):
+            return None
+        output = points.info.output.get(axis)
+        scale = abs(output.scale) if output else 1.0
+        variance = (np.asarray(spread, dtype=np.float64) / scale) ** 2 / np.maximum(np.asarray(n), 1)
+        found[axis] = np.maximum(variance, 1e-6 * float(np.median(variance[variance > 0])))
+    return found

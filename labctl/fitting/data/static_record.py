@@ -1,0 +1,141 @@
+"""The static record in a recording: the longest stretch at rest, at one temperature, without a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, allan
+from labctl.fitting.numeric.json_numbers import plain, plain_list
+from labctl.recording import Recording
+from labctl.recording.points import temperature_of
+
+#: A temperature that stays within this counts as one.
+ONE_TEMPERATURE_K = 1.0
+#: Readings further apart than this many of their usual spacings have a gap between them.
+GAP = 1.5
+#: From this length on a static record knows the drift better than a data sheet does.
+LONG_S = 1200.0
+#: Temperatures are looked at in this many pieces of a stretch.
+PIECES = 2000
+
+
+@dataclass(frozen=True)
+class StaticRecord:
+    """One stretch at rest: where, at which temperature, and the noise of each axis."""
+
+    first_dataset: int
+    last_dataset: int
+    temperature_c: float
+    duration_s: float
+    axes: Mapping[str, Allan]
+
+    def instability_dps(self, axis: str) -> float | None:
+        """Return the bias instability of an axis, deg/s; None where the record is too short for it, or hides it."""
+        if self.duration_s < LONG_S or axis not in self.axes:
+            return None
+        return self.axes[axis].instability_dps
+
+    def to_json(self) -> dict[str, Any]:
+        """Return this as JSON: where it is, and the deviation and the figures by axis."""
+        return {
+            "datasets": [self.first_dataset, self.last_dataset],
+            "temperature_c": plain(self.temperature_c),
+            "duration_s": plain(self.duration_s),
+            "axes": {
+                axis: _axis_json(noise, self.instability_dps(axis) is not None) for axis, noise in self.axes.items()
+            },
+        }
+
+
+def _axis_json(noise: Allan, is_prior: bool) -> dict[str, Any]:
+    return {
+        "tau_s": plain_list(noise.tau_s),
+        "deviation_dps": plain_list(noise.deviation_dps),
+        "low_dps": plain_list(noise.low_dps),
+        "high_dps": plain_list(noise.high_dps),
+        "model_dps": plain_list(noise.model_dps),
+        **{letter: asdict(figure) for letter, figure in noise.figures.items()},
+        "replaces_datasheet": is_prior,
+    }
+
+
+def static_record(recording: Recording, least_s: float = 0.0) -> StaticRecord | None:
+    """Return the longest static stretch of a recording's readings with its noise; None where it is below `least_s`."""
+    rows = longest_stretch(recording)
+    if rows is None:
+        return None
+    t_s = np.asarray(recording.columns["t_s"], dtype=np.float64)[rows]
+    period_s = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
+    if len(t_s) * period_s < least_s:
+        return None
+    axes = {str(axis): allan(recording.gyro_dps(axis)[rows], period_s) for axis in recording.info.axes}
+    known = {axis: noise for axis, noise in axes.items() if noise is not None}
+    if not known:
+        return None
+    dataset = np.asarray(recording.columns["dataset"])[rows]
+    warm = temperature_of(recording.columns)
+    mean_c = float(warm[rows].mean()) if warm is not None else np.nan
+    return StaticRecord(int(dataset[0]), int(dataset[-1]), mean_c, float(len(t_s) * period_s), known)
+
+
+def longest_stretch(recording: Recording) -> slice | None:
+    """Return the rows of the longest static stretch; None where none has readings enough."""
+    columns = recording.columns
+    if recording.info.kind != "samples" or len(recording) < LEAST_READINGS or "t_s" not in columns:
+        return None
+    t_s = np.asarray(columns["t_s"], dtype=np.float64)
+    steps = np.diff(t_s)
+    spacing = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    together = (steps > 0) & (steps < GAP * spacing)
+    for name in ("run", "mounting", "position"):
+        if name in columns:
+            values = np.asarray(columns[name])
+            together &= values[1:] == values[:-1]
+    still = np.asarray(columns["table_rate_dps"], dtype=np.float64) == 0
+    if "valid" in columns:
+        still &= np.asarray(columns["valid"]) != 0
+    begins = np.flatnonzero(still & np.concatenate([[True], ~(together & still[:-1])]))
+    ends = np.flatnonzero(still & np.concatenate([~(together & still[1:]), [True]])) + 1
+    warm = temperature_of(columns)
+    if warm is None:  # noise can be looked at all the same
+        warm = np.zeros(len(recording))
+    best = slice(0, 0)
+    for begin, end in sorted(zip(begins, ends, strict=True), key=lambda pair: pair[0] - pair[1]):
+        if end - begin <= best.stop - best.start:
+            break
+        first, last = _steady(warm[begin:end])
+        if last - first > best.stop - best.start:
+            best = slice(int(begin + first), int(begin + last))
+    return best if best.stop - best.start >= LEAST_READINGS else None
+
+
+def _steady(temperature_c: Array) -> tuple[int, int]:
+    """Return the longest part, from and until, of temperatures (n,) that stays at one."""
+    size = max(len(temperature_c) // PIECES, 1)
+    starts = np.arange(0, len(temperature_c), size)
+    means: NDArray[np.float64] = np.add.reduceat(temperature_c, starts) / np.diff(np.append(starts, len(temperature_c)))
+    best, begin = (0, 0), 0
+    low: list[int] = []  # pieces of the window whose temperatures rise, so that the lowest is the first; and fall
+    high: list[int] = []
+    for end, now in enumerate(means.tolist()):
+        while low and means[low[-1]] >= now:
+            low.pop()
+        while high and means[high[-1]] <= now:
+            high.pop()
+        low.append(end)
+        high.append(end)
+        while means[high[0]] - means[low[0]] > ONE_TEMPERATURE_K:
+            begin = min(low[0], high[0]) + 1
+            if low[0] < begin:
+                low.pop(0)
+            if high[0] < begin:
+                high.pop(0)
+        if end + 1 - begin > best[1] - best[0]:
+            best = (begin, end + 1)
+    return best[0] * size, min(best[1] * size, len(temperature_c))

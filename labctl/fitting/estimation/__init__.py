@@ -1,0 +1,1 @@
+"""Fitting an error model and its errors."""

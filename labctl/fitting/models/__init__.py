@@ -1,0 +1,1 @@
+"""Error models: sets of effects over temperature, presets, and published coefficients."""

@@ -1,0 +1,68 @@
+"""The direct polynomial in rate and temperature on long arrays: Horner's scheme in pieces that fit the cache."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.data.channels import Array
+from labctl.fitting.models.error_model import FittedModel
+
+#: Samples that are worked on together: every array of the scheme stays in the first- and second-level cache.
+PIECE = 16_384
+
+
+@dataclass(frozen=True)
+class Surface:
+    """w - sum c[i, j] w^i (T - T0)^j for each axis."""
+
+    coefficients: NDArray[np.float64]  #: (axes, rate powers, temperature powers)
+    reference_c: float
+
+    def correct(self, raw: Array, temperature_c: Array) -> Array:
+        """Return corrected rates, (n, axes), from outputs (n, axes) and temperatures (n,), (n, axes) or one for all."""
+        out = np.empty_like(raw)
+        warm = np.asarray(temperature_c, dtype=np.float64)
+        for axis, c in enumerate(self.coefficients):
+            of_axis = warm[:, axis] if warm.ndim == 2 else warm
+            self._correct_axis(c, raw[:, axis], of_axis, out[:, axis])
+        return out
+
+    def _correct_axis(self, c: NDArray[np.float64], raw: Array, warm: Array, out: Array) -> None:
+        rate_powers, temperature_powers = c.shape
+        centred, row, sum_ = np.empty(PIECE), np.empty(PIECE), np.empty(PIECE)
+        for start in range(0, len(raw), PIECE):
+            w = raw[start : start + PIECE]
+            m = len(w)
+            u, a, e = centred[:m], row[:m], sum_[:m]
+            np.subtract(warm[start : start + PIECE] if warm.ndim else warm, self.reference_c, out=u)
+            for i in range(rate_powers - 1, -1, -1):
+                target = e if i == rate_powers - 1 else a
+                np.multiply(u, c[i, -1], out=target)
+                for j in range(temperature_powers - 2, 0, -1):
+                    target += c[i, j]
+                    target *= u
+                target += c[i, 0]
+                if i < rate_powers - 1:
+                    e *= w
+                    e += a
+            np.subtract(w, e, out=out[start : start + PIECE])
+
+
+def surface_of(fitted: FittedModel, axes: tuple[str, ...]) -> Surface | None:
+    """Return the polynomial of a direct model that is nothing but one; None for any other."""
+    if fitted.model.argument != "output" or fitted.model.effect_ids != ["rate_temperature_surface"]:
+        return None
+    found = []
+    for axis in axes:
+        powers = {
+            tuple(int(part) for part in name.removeprefix("c_r").split("_t")): float(values[0])
+            for name, values in zip(fitted.axes[axis].names, fitted.axes[axis].values, strict=True)
+        }
+        c = np.zeros((1 + max(i for i, _ in powers), 1 + max(j for _, j in powers)))
+        for (i, j), value in powers.items():
+            c[i, j] = value
+        found.append(c)
+    return Surface(np.stack(found), fitted.model.reference.temperature_c)

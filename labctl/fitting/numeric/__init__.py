@@ -1,0 +1,1 @@
+"""Numerical methods: least squares, drift noise, Allan deviation."""

@@ -1,0 +1,9 @@
+"""Pictures of a criticism, from its numbers: Plotly figures for pages and for the report, and the report itself.
+
+Everything here takes the answers as JSON, so it draws the same whoever asks: the command line, a page, a saved file.
+"""
+
+from labctl.plots.registry import Picture, pictures_of
+from labctl.plots.report import report_html
+
+__all__ = ["Picture", "pictures_of", "report_html"]

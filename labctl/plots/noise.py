@@ -1,0 +1,106 @@
+"""Noise and error: the Allan deviation of a static record, points measured again, the ladder of versions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import plotly.graph_objects as go
+
+from labctl.plots.theme import ACCENT, INK, WARM, colour_of, grid_of, place
+
+
+def allan(answer: Mapping[str, Any]) -> go.Figure | None:
+    """Return the Allan deviation with its 95 % interval and the fitted terms; None without a static record."""
+    static = (answer.get("noise") or {}).get("static")
+    if not static:
+        return None
+    axes: Mapping[str, Any] = static["axes"]
+    figure = grid_of([_figures_text(axis, line) for axis, line in axes.items()], min(len(axes), 3))
+    for panel, (axis, line) in enumerate(axes.items()):
+        where, colour = place(panel, min(len(axes), 3)), colour_of(axis)
+        sigma = line["deviation_dps"]
+        figure.add_trace(
+            go.Scatter(
+                x=line["tau_s"], y=sigma, mode="markers", marker={"color": colour}, name=axis,
+                error_y={
+                    "type": "data", "symmetric": False, "color": colour,
+                    "array": [h - s for h, s in zip(line["high_dps"], sigma, strict=True)],
+                    "arrayminus": [s - low for s, low in zip(sigma, line["low_dps"], strict=True)],
+                },
+            ),
+            **where,
+        )  # fmt: skip
+        figure.add_trace(
+            go.Scatter(
+                x=line["tau_s"], y=line["model_dps"], mode="lines", line={"color": INK, "dash": "dash"}, name="terms"
+            ),
+            **where,
+        )
+    figure.update_xaxes(type="log", title="averaging time, s")
+    figure.update_yaxes(type="log", title="Allan deviation, deg/s", col=1)
+    figure.update_yaxes(type="log")
+    return figure
+
+
+def _figures_text(axis: str, line: Mapping[str, Any]) -> str:
+    said = [
+        f"{letter} = {line[letter]['value']:.3g} {line[letter]['unit']}"
+        for letter in ("N", "B", "K")
+        if line[letter]["value"] is not None
+    ]
+    return f"{axis}: {', '.join(said) or 'no slope shows'}"
+
+
+def repeats(answer: Mapping[str, Any]) -> go.Figure | None:
+    """Return the differences of points measured again against the time between; None where nothing was repeated."""
+    views = answer.get("views") or {}
+    lines = views.get("repeats") or []
+    if not lines:
+        return None
+    figure = grid_of([f"{line['axis']}: {line['over_floor']:.2f} of the floor" for line in lines], min(len(lines), 3))
+    for panel, line in enumerate(lines):
+        where = place(panel, min(len(lines), 3))
+        figure.add_trace(
+            go.Scatter(
+                x=[t / 60 for t in line["apart_s"]], y=line["difference_dps"], mode="markers",
+                marker={"color": colour_of(line["axis"]), "size": 5}, name=line["axis"],
+                text=[f"data sets {a} and {b}" for a, b in line["datasets"]],
+                hovertemplate="%{text}<br>%{y:.3g} deg/s<extra></extra>",
+            ),
+            **where,
+        )  # fmt: skip
+        for level in (-2, 2):
+            figure.add_hline(
+                y=level * 2**0.5 * line["floor_dps"], line={"color": INK, "dash": "dash", "width": 1}, **where
+            )
+    figure.update_xaxes(title="apart, min" if views["sets"]["timed"] else "apart, min (by the order of rows)")
+    figure.update_yaxes(title="difference, deg/s", col=1)
+    return figure
+
+
+def ladder(answer: Mapping[str, Any]) -> go.Figure | None:
+    """Return the errors of every version down to the noise floor; None without any error."""
+    steps = [step for step in answer.get("steps", ()) if step["rms_dps"] is not None]
+    if not steps:
+        return None
+    figure = grid_of([""], 1)
+    names = [f"{step['version']}: {step['model']}" for step in steps]
+    for key, word, colour in (("rms_dps", "on its own data", ACCENT), ("heldout_rms_dps", "held out", WARM)):
+        figure.add_trace(
+            go.Scatter(
+                x=names, y=[step[key] for step in steps], mode="lines+markers", line={"color": colour, "shape": "hv"},
+                name=word, text=[", ".join(step["effects"]) for step in steps],
+                hovertemplate="%{y:.4g} deg/s<br>%{text}<extra></extra>",
+            )
+        )  # fmt: skip
+    floor = answer.get("noise_floor_dps")
+    if floor:
+        line = {"color": INK, "dash": "dash"}
+        figure.add_trace(
+            go.Scatter(x=names, y=[floor] * len(names), mode="lines+markers", line=line, name="noise floor")
+        )
+    figure.update_layout(showlegend=True)
+    figure.update_xaxes(type="category")
+    figure.update_yaxes(type="log", title="RMS error, deg/s")
+    return figure

@@ -1,0 +1,130 @@
+"""Which pictures there are, in which order, and how to read each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import plotly.graph_objects as go
+
+from labctl.plots import noise, residual_lines, residual_maps, spectra
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One figure, with what it is called, how to read it, and which effects would draw something there."""
+
+    id: str
+    title: str
+    caption: str
+    figure: go.Figure
+    effects: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Kind:
+    id: str
+    title: str
+    caption: str
+    draw: Callable[[Mapping[str, Any]], go.Figure | None]
+
+
+KINDS = (
+    _Kind(
+        "map", "Where the model fails, in rate and temperature",
+        "Each cell is the mean residual of its data sets over the noise floor; red is too much, blue too little, the "
+        "same scale in all maps. Dimmed cells are less than two floors from zero: by themselves they mean nothing. A "
+        "column that is coloured from top to bottom depends on the rate, a row on the temperature, one corner on both.",
+        residual_maps.maps,
+    ),
+    _Kind(
+        "channels", "Residual against every logged channel",
+        "Dots are data sets, the line is their running mean (or the mean at each level), the band its 95 % interval, "
+        "with the drift between data sets taken into account. Where the band leaves zero, something hangs on this "
+        "channel - or on another that changes together with it, as time and temperature do on one rising leg.",
+        residual_lines.channels,
+    ),
+    _Kind(
+        "time", "Residual against time",
+        "Dotted lines are power-ons; the temperature is below. A slope is drift, a step at a power-on or a re-mounting "
+        "is a shift, a decay after a power-on is warm-up. Lag-1 and the runs test are of the residuals after the drift "
+        "that the noise model knows is taken out: a small p says that neighbours still hang together.",
+        residual_lines.time,
+    ),
+    _Kind(
+        "angle", "Waves in the table angle, within data sets",
+        "Mean power over white noise by cycles per turn; a bar above the dashed limit is a line (about 5 % chance of "
+        "one anywhere in a panel with nothing there). Once per turn: Earth's rate, a magnetic field or a tilt; four "
+        "per turn: the gear. The stepper's own lines (50 and 200 per turn) and, where the latitude is known, the "
+        "Earth's are taken out: bars well below 1 are where sampling had folded them to. A line here that is none in "
+        "time follows the table.",
+        spectra.angle,
+    ),
+    _Kind(
+        "frequency", "Waves in time",
+        "Left: the data sets' residuals as waves, dashed what noise alone gives on average. Right: readings within "
+        "data sets over white noise, dashed the limit. A line here that is none in the angle follows a clock, not the "
+        "table: mains, a fan, the chamber's cycling.",
+        spectra.frequency,
+    ),
+    _Kind(
+        "time_in_set", "The first seconds of a data set",
+        "The mean course of all data sets, and the same by the step in rate that went before; bands are 95 % about "
+        "zero. A course that decays in the right panel is the gyro or the table still settling: wait longer.",
+        residual_lines.time_in_set,
+    ),
+    _Kind(
+        "legs", "From below minus from above",
+        "Pairs of data sets at one rate and temperature, once reached from a lower temperature and once from a higher. "
+        "Off zero: hysteresis, or something that lags behind the thermometer; hysteresis closes towards both ends of "
+        "the range. A slope against rate says that the scale factor does it too.",
+        residual_lines.legs,
+    ),
+    _Kind(
+        "previous_rate", "Residual against the rate before",
+        "A slope or a step at zero says that the gyro remembers the rate it came from. With rates in rising order this "
+        "picture is the one against the rate itself, moved by one.",
+        residual_lines.previous_rate,
+    ),
+    _Kind(
+        "repeats", "Points measured again",
+        "Differences of data sets at one rate and temperature; dashed are two standard deviations of what the noise "
+        "model gives neighbours like these. Far outside: something that is not in rate and temperature at all, or "
+        "noise that is larger than thought.",
+        noise.repeats,
+    ),
+    _Kind(
+        "allan", "Allan deviation of the static record",
+        "The longest stretch at rest and at one temperature. Slope -1/2 is angle random walk N, the flat part bias "
+        "instability B, slope +1/2 rate random walk K; bars are 95 % intervals, dashed the fitted sum of the terms.",
+        noise.allan,
+    ),
+)  # fmt: skip
+LADDER = _Kind(
+    "ladder", "The fall of the error",
+    "Each version's RMS error on its own data and on temperatures that its fit has not seen; dashed the noise floor. "
+    "An error that falls on its own data alone was bought with coefficients.",
+    noise.ladder,
+)  # fmt: skip
+
+
+def pictures_of(criticism: Mapping[str, Any], ladder: Mapping[str, Any] | None = None) -> list[Picture]:
+    """Return the pictures of a criticism, and of a ladder, as far as there is something to draw. Both as JSON."""
+    found = [_picture(kind, criticism, _effects(kind.id, criticism)) for kind in KINDS]
+    found.append(_picture(LADDER, ladder or {}, ()))
+    return [picture for picture in found if picture is not None]
+
+
+def _picture(kind: _Kind, answer: Mapping[str, Any], effects: tuple[str, ...]) -> Picture | None:
+    figure = kind.draw(answer)
+    return Picture(kind.id, kind.title, kind.caption, figure, effects) if figure is not None else None
+
+
+def _effects(view: str, criticism: Mapping[str, Any]) -> tuple[str, ...]:
+    views = criticism.get("views") or {}
+    draws: Mapping[str, list[str]] = views.get("draws") or {}
+    if view != "channels":
+        return tuple(draws.get(view, ()))
+    names = [line["channel"] for line in views.get("channels", ())]
+    return tuple(dict.fromkeys(effect for name in names for effect in draws.get(name, ())))

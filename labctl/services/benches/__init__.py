@@ -1,0 +1,1 @@
+"""Benches: lease, host, check."""

@@ -1,0 +1,64 @@
+"""Benches: which there are, whether their instruments answer, and simulated ones on real ports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from instruments.bench import check
+from instruments.bench_config import shipped_benches
+from instruments.clock import ScaledClock, SystemClock, VirtualClock
+from instruments.transport.factory import serve_simulation
+from labctl.errors import BadInput
+from labctl.services.campaigns.status import cut_short, left_behind, outlives_its_process
+from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.answers import BenchStatus, DeviceCheck
+from labctl.store import BenchRow, Store
+
+
+def check_bench(source: str) -> list[DeviceCheck]:
+    """Talk to every instrument of a bench and say what answered; nothing moves."""
+    bench = load_bench(source)
+    clock = VirtualClock() if bench.is_simulated else SystemClock()
+    return [DeviceCheck(device=device, ok=ok, text=text) for device, ok, text in check(bench, clock)]
+
+
+def shipped() -> list[dict[str, Any]]:
+    """Return the benches that come with labctl: name, and what stands on them."""
+    found = []
+    for name, path in shipped_benches().items():
+        bench = load_bench(str(path))
+        units = ", ".join(f"{gyro.serial} ({gyro.driver})" for gyro in bench.gyros)
+        found.append({"name": name, "text": f"{bench.table.driver}, {bench.chamber.driver}, {units}"})
+    return found
+
+
+def bench_status(row: BenchRow) -> BenchStatus:
+    """Return a bench as it leaves the house."""
+    return BenchStatus(**asdict(row))
+
+
+def bench_statuses(store: Store) -> list[BenchStatus]:
+    """Return every bench that was used, with the campaigns that were left on it by a process that is gone.
+
+    Those of simulated benches are left out: such a bench ended with its process.
+    """
+    left: dict[str, list[str]] = {}
+    for answer in left_behind(store):
+        if outlives_its_process(store.campaigns.get(answer.id)):
+            left.setdefault(answer.bench, []).append(cut_short(answer))
+    return [bench_status(row).model_copy(update={"left": left.get(row.name, [])}) for row in store.benches.all()]
+
+
+def serve_simulator(
+    source: str, out: Path | None, speed: float, ready: Callable[[dict[str, str]], None], log: Path | None = None
+) -> None:
+    """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until interrupted.
+
+    `log` gets one JSON document per line: when which instrument heard what, and whether the table turned.
+    """
+    if not 0 < speed < float("inf"):
+        raise BadInput(f"--speed {speed}: a positive number, 1 for the wall's own pace")
+    serve_simulation(load_bench(source), ScaledClock(speed), out, ready, log)

@@ -1,0 +1,222 @@
+"""The lease on a bench: one bench, one campaign. Between processes only the wall's time counts, never a campaign's.
+
+A holder renews every `RENEW_S`. When it could not for `STOP_S`, or somebody else has the bench by now, the wish to
+interrupt is in every campaign's control: the engine looks there before each step and once a second, so the table is at
+rest before the lease ends after `TERM_S` and another may take the bench. The campaign is left to be taken up.
+
+Clocks of two computers differ and may jump. A lease that looks over is therefore taken only after a whole term in which
+its beat did not change, measured by the own monotonic time; the written expiry only spares that wait.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import timedelta
+from pathlib import Path
+from uuid import uuid4
+
+from instruments.bench_config import BenchFile
+from instruments.clock import Clock, WallClock
+from labctl.errors import BenchBusy, Conflict, LabctlError
+from labctl.services.benches.host import boot_id
+from labctl.store import LeaseRow, Store, open_store
+from labctl.store.connection.database import Database
+from procedures.contracts.control import Control, Wish
+
+TERM_S = 120.0
+RENEW_S = 10.0
+STOP_S = 60.0
+
+#: Leases that this process holds.
+_HELD_HERE: set[str] = set()
+
+
+class BenchHold:
+    """This process's hold on one bench. `take` and `renew` are for one thread at a time, `held` is for any."""
+
+    def __init__(self, store: Store, bench_name: str, clock: Clock) -> None:
+        self._store, self._bench, self._clock = store, bench_name, clock
+        self._owner = uuid4().hex
+        self._renewed_s: float | None = None
+        self._why_lost = ""
+        self._over = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def held(self) -> bool:
+        """Whether the bench may be driven now."""
+        renewed_s = self._renewed_s
+        return renewed_s is not None and self._clock.now_s() - renewed_s < STOP_S
+
+    @property
+    def why_not(self) -> str:
+        """Why the bench may not be driven."""
+        return self._why_lost or f"its lease could not be renewed for {STOP_S:g} s"
+
+    def check(self) -> None:
+        """Raise BenchBusy when the bench may not be driven."""
+        if not self.held:
+            raise BenchBusy(f"bench {self._bench} may not be driven from here: {self.why_not}")
+
+    def take(self) -> None:
+        """Take the bench. Raises Conflict naming the holder; waits a term for one that may be dead."""
+        found = self._store.leases.holder(self._bench)
+        if found is not None and not self._gone(found):
+            raise Conflict(f"{described(found)}; wait for its end, or stop it")
+        begun_s, now = self._clock.now_s(), self._clock.utc()
+        mine = LeaseRow(
+            self._bench, self._owner, socket.gethostname(), this_machine(), os.getpid(), since=now,
+            beat=1 if found is None else found.beat + 1, beat_at=now, expires_at=now + timedelta(seconds=TERM_S),
+        )  # fmt: skip
+        if not self._store.leases.claim(mine, replacing=found):
+            raise Conflict(f"bench {self._bench}: somebody else took it this moment; try again")
+        _HELD_HERE.add(self._owner)
+        self._renewed_s, self._why_lost = begun_s, ""
+
+    def _gone(self, found: LeaseRow) -> bool:
+        """Return whether a holder can no longer drive the bench."""
+        if found.owner in _HELD_HERE:
+            return False
+        if self._store.is_sole_writer or _is_dead(found):
+            return True
+        now = self._clock.utc()
+        # An expiry further ahead than a lease lasts was written by a clock that is wrong.
+        if now < found.expires_at <= now + timedelta(seconds=2 * TERM_S):
+            return False
+        return self._is_silent(found)
+
+    def _is_silent(self, found: LeaseRow) -> bool:
+        """Watch a lease for a term; returns whether it stayed as it was."""
+        until_s = self._clock.now_s() + TERM_S
+        while self._clock.now_s() < until_s:
+            self._clock.sleep(RENEW_S)
+            if self._over.is_set():
+                return False
+            seen = self._store.leases.holder(self._bench)
+            if seen is not None and (seen.owner, seen.beat) != (found.owner, found.beat):
+                return False
+        return True
+
+    def renew(self) -> None:
+        """Prolong the lease; a lease that is lost, or never was, is tried for again. Raises nothing."""
+        begun_s, now = self._clock.now_s(), self._clock.utc()
+        try:
+            if self._renewed_s is None:
+                self.take()
+            elif self._store.leases.renew(self._bench, self._owner, now, now + timedelta(seconds=TERM_S)):
+                self._renewed_s = begun_s
+            else:
+                self._renewed_s = None
+                found = self._store.leases.holder(self._bench)
+                self._why_lost = described(found) if found else "its lease was taken away"
+        except Exception as error:  # noqa: BLE001  the next try may do better; until then `held` counts the time
+            self._why_lost = str(error) or type(error).__name__
+
+    def control(self) -> Control:
+        """Return the control of a campaign that is interrupted when the bench may no longer be driven."""
+        return _FencedControl(self)
+
+    def keep(self) -> None:
+        """Renew from now on, in a thread, until `close`."""
+        self._thread = threading.Thread(target=self._keep, name=f"lease-{self._bench}", daemon=True)
+        self._thread.start()
+
+    def _keep(self) -> None:
+        while not self._over.wait(self._clock.wall_s(RENEW_S)):
+            self.renew()
+
+    def close(self) -> None:
+        """Let the bench go."""
+        self._over.set()
+        if self._thread is not None:
+            self._thread.join()
+        if self._renewed_s is not None:
+            self._renewed_s = None
+            with suppress(LabctlError):  # the row stays and ends by itself
+                self._store.leases.release(self._bench, self._owner)
+        _HELD_HERE.discard(self._owner)
+
+
+class _FencedControl(Control):
+    """A control in which the wish to interrupt appears by itself once the bench may no longer be driven."""
+
+    def __init__(self, hold: BenchHold) -> None:
+        super().__init__()
+        self._hold = hold
+
+    @property
+    def wish(self) -> Wish:
+        """The present wish."""
+        if not self._hold.held:
+            self.interrupt(f"the bench may no longer be driven from here: {self._hold.why_not}")
+        return super().wish
+
+
+def hold_bench(store: Store, bench: BenchFile, clock: Clock | None = None) -> BenchHold | None:
+    """Take the lease on a bench and keep it; None for one that exists in this process only. Raises Conflict."""
+    if bench.is_simulated:
+        return None
+    hold = BenchHold(store, bench.name, clock or WallClock())
+    hold.take()
+    hold.keep()
+    return hold
+
+
+@contextmanager
+def holding(store: Store, bench: BenchFile) -> Iterator[Control]:
+    """Hold a bench for one campaign; gives the campaign's control. Raises Conflict naming who has it."""
+    hold = hold_bench(store, bench)
+    try:
+        yield Control() if hold is None else hold.control()
+    finally:
+        if hold is not None:
+            hold.close()
+
+
+@contextmanager
+def open_for(bench: BenchFile, location: str) -> Iterator[Store]:
+    """Open a database to run a campaign on a bench. Raises Conflict naming who holds the database, and the bench."""
+    try:
+        opened = Store(Database(location, write=True))
+    except Conflict as taken:
+        with open_store(location, write=False) as store:
+            holder = store.leases.holder(bench.name)
+        if holder is None:
+            raise
+        raise Conflict(f"{described(holder)}. {taken}") from taken
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+def described(lease: LeaseRow) -> str:
+    """Say who holds a bench."""
+    who = f"process {lease.pid} on {lease.host} since {lease.since:%Y-%m-%d %H:%M:%S} UTC"
+    return f"bench {lease.bench_name} is held by {who}, last heard of at {lease.beat_at:%H:%M:%S}"
+
+
+def this_machine() -> str:
+    """Return what names the start of this computer and the space of its process numbers; empty when not known."""
+    try:
+        boot = boot_id()
+        return f"{boot} {Path('/proc/self/ns/pid').readlink()}" if boot else ""
+    except OSError:
+        return ""
+
+
+def _is_dead(found: LeaseRow) -> bool:
+    """Return whether a holder is known to have ended: a process of this very machine that is no more."""
+    if not found.machine or found.machine != this_machine():
+        return False
+    try:
+        os.kill(found.pid, 0)
+    except ProcessLookupError:
+        return True
+    except OSError:
+        return False
+    return False

@@ -1,0 +1,1 @@
+"""Calibrations: fit, revise, certify, apply."""

@@ -1,0 +1,139 @@
+"""Calibrations: fitted, kept, certified, handed out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any, Literal
+
+from labctl.actor import actor
+from labctl.calibration import build_calibration
+from labctl.exports import export_calibration
+from labctl.fitting import fit
+from labctl.services.commands.protocol import CertifyRequest, FitRequest
+from labctl.services.recordings.transfer import newest_recording, points_of
+from labctl.services.schemas.answers import CalibrationRow, Certified, FitAnswer, VersionAnswer
+from labctl.store import CertificationRow, NewCalibration, Store
+
+
+@dataclass(frozen=True)
+class CalibrationFile:
+    """A calibration as a consumer gets it: immutable bytes and their tag."""
+
+    content: bytes
+    media_type: str
+    etag: str
+
+
+def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> FitAnswer:
+    """Fit a model to a unit's recording and keep it as the next version.
+
+    Raises NotFound, BadInput for an unknown model or effect, NotEnoughData.
+    """
+    recording = newest_recording(store, serial, request.recording)
+    source = points_of(store, recording)
+    result = fit(source, request.model, request.effects)
+    campaign = store.recordings.get(recording).campaign
+    made = {
+        "recording": recording,
+        "campaign": campaign,
+        "recipe": store.campaigns.get(campaign).recipe_name if campaign is not None else None,
+        "bench": store.campaigns.get(campaign).bench_name if campaign is not None else None,
+    }
+
+    def build(version: int) -> NewCalibration:
+        calibration = build_calibration(
+            source.info, result, version=version, parent=None, issued_at=at, provenance=made
+        )
+        answer = {"serial": serial, "version": version, **result.to_json(), **made, "hash": calibration.hash}
+        return NewCalibration(
+            None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
+        )
+
+    kept = store.calibrations.add(serial, at, build)
+    return FitAnswer.model_validate(dict(kept.answer))
+
+
+def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
+    """Return a unit's versions, newest first. Raises NotFound."""
+    in_force = _in_force(store, serial)
+    return [
+        CalibrationRow(
+            serial=row.serial,
+            version=row.version,
+            parent=row.parent,
+            model=row.model,
+            created_at=row.created_at,
+            hash=row.hash,
+            certified=row.version == in_force,
+            rms_dps=_error(row.answer, "rms_dps"),
+            heldout_rms_dps=_error(row.answer, "heldout_rms_dps"),
+        )
+        for row in store.calibrations.of_unit(store.units.get(serial).serial)
+    ]
+
+
+def one_version(store: Store, serial: str, version: int) -> VersionAnswer:
+    """Return a version as it was made, and whether it is in force. Raises NotFound."""
+    row = store.calibrations.get(store.units.get(serial).serial, version)
+    history = store.calibrations.history(serial)
+    in_force = bool(history) and history[0].act == "certify" and history[0].version == version
+    last = next((_certified(act) for act in history if act.version == version), None)
+    beside = {
+        "parent": row.parent, "recording": row.recording, "created_at": row.created_at, "hash": row.hash,
+        "in_force": in_force, "due": last.due if last is not None and in_force else None, "certification": last,
+    }  # fmt: skip
+    return VersionAnswer.model_validate({**row.answer, **beside})
+
+
+def list_certifications(store: Store, serial: str) -> list[Certified]:
+    """Return every act of certifying and revoking, newest first. Raises NotFound."""
+    return [_certified(row) for row in store.calibrations.history(store.units.get(serial).serial)]
+
+
+def _certified(row: CertificationRow) -> Certified:
+    act: Literal["certify", "revoke"] = "certify" if row.act == "certify" else "revoke"
+    return Certified(
+        serial=row.serial, version=row.version, act=act, by=row.by, reason=row.reason, at=row.at, due=row.due_at
+    )
+
+
+def _error(answer: Any, key: str) -> float | None:
+    value = answer["error"][key]
+    return None if value is None else float(value)
+
+
+def _in_force(store: Store, serial: str) -> int | None:
+    history = store.calibrations.history(serial)
+    return history[0].version if history and history[0].act == "certify" else None
+
+
+def calibration_file(store: Store, serial: str, version: int | None, format_name: str) -> CalibrationFile:
+    """Return a calibration in a consumer's format; without a version the certified one.
+
+    Raises NotFound, NotCertified, BadInput for an unknown format.
+    """
+    document, hash_ = store.calibrations.document(serial, version)
+    if format_name == "json":
+        return CalibrationFile(document, "application/json", hash_)
+    content, media_type = export_calibration(document, format_name)
+    return CalibrationFile(content, media_type, f"{hash_}-{format_name}")
+
+
+def certify(
+    store: Store,
+    serial: str,
+    version: int,
+    act: Literal["certify", "revoke"],
+    request: CertifyRequest,
+    at: datetime,
+) -> Certified:
+    """Put a version in force, or take it out of force. Raises NotFound, Conflict."""
+    store.units.get(serial)
+    due = at + timedelta(days=request.due_days) if request.due_days and act == "certify" else None
+    door = actor()
+    row = store.calibrations.certify(
+        serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due,
+        who=door.name if door.via == "key" else request.by,
+    )  # fmt: skip
+    return Certified(serial=serial, version=version, act=act, by=row.by, reason=row.reason, at=at, due=due)

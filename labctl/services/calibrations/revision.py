@@ -1,0 +1,211 @@
+"""A version's model changed: effects added or taken out, fitted again; looked at first, or kept as the next version."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from labctl.calibration import build_calibration
+from labctl.errors import BadInput
+from labctl.fitting import FitResult
+from labctl.fitting.criticism import criticise
+from labctl.fitting.criticism.model_comparison import weigh, with_noise_of
+from labctl.fitting.criticism.residuals import residuals_of
+from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formula
+from labctl.fitting.estimation.fit import fit_context
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.presets import changed
+from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.recording import Recording
+from labctl.services.cache import kept
+from labctl.services.commands.protocol import ImproveRequest
+from labctl.services.criticism.criticise import version_of
+from labctl.services.criticism.evaluation import model_of, readings_of
+from labctl.services.criticism.residuals import residual_columns
+from labctl.services.recordings.transfer import newest_recording, points_of
+from labctl.services.schemas.answers import Answer, ErrorFigures, FitAnswer, ModelAnswer, ResidualColumns, Validity
+from labctl.store import CalibrationRecord, NewCalibration, Store
+
+
+class PreviewAnswer(Answer):
+    """What a changed model would be; nothing was kept, so it has no version of its own."""
+
+    serial: str
+    improved_from: int
+    recording: int
+    model: ModelAnswer
+    axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
+    error: ErrorFigures
+    before: ErrorFigures
+    validity: Validity
+    plausible: dict[str, dict[str, Any]] = Field(description="Effect -> the usual range, and whether it is inside.")
+    left_out: list[dict[str, Any]] = Field(description="Effects that would not leave the house with a calibration.")
+    residuals: ResidualColumns = Field(description="What the changed model leaves, data set by data set.")
+
+
+#: Changes whose fits are at hand, by what was asked.
+_RECENT: dict[str, _Change] = {}
+MOST_RECENT = 4
+
+
+@dataclass(frozen=True)
+class _Change:
+    """A changed model beside the one that it was made from, both fitted in the forward form."""
+
+    row: CalibrationRecord
+    recording: int
+    points: Recording
+    before: FitResult
+    after: FitResult
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """What is said of the change, whether it is kept or not."""
+        technology = self.points.info.technology or ""
+        return {
+            **self.after.to_json(), "recording": self.recording, "improved_from": self.row.version,
+            "before": self.before.error.to_dict(), "plausible": plausible(self.after, technology),
+        }  # fmt: skip
+
+
+def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> FitAnswer:
+    """Change a version's effects, fit again, keep it as the next. Raises NotFound, BadInput, NotEnoughData."""
+    return _keep(store, serial, _change(store, serial, request), at)
+
+
+def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewAnswer:
+    """Say what `improve_unit` would make, and what it would leave of the recording; nothing is changed.
+
+    Raises NotFound, BadInput, NotEnoughData.
+    """
+    row = version_of(store, serial, request.version)
+    number = newest_recording(store, serial, request.recording)
+
+    def work() -> PreviewAnswer:
+        change = _change(store, serial, request)
+        _, left_out = change.after.fitted.exported()
+        return PreviewAnswer(
+            serial=serial, **change.figures, left_out=left_out, residuals=_residuals(store, change)
+        )  # fmt: skip
+
+    return kept(PreviewAnswer, _question(store, row, number, request), work)
+
+
+def _question(store: Store, row: CalibrationRecord, recording: int, request: ImproveRequest) -> dict[str, Any]:
+    """Return all that a change depends on."""
+    return {
+        "serial": row.serial, "version": row.version, "hash": row.hash, "recording": recording,
+        "readings": store.recordings.fingerprint(recording),
+        "change": request.model_dump(include={"add", "remove", "formula"}),
+    }  # fmt: skip
+
+
+@single_threaded
+def _residuals(store: Store, change: _Change) -> ResidualColumns:
+    """Return what a criticism of the changed model would leave, without all else that it says."""
+    model = change.after.fitted.model
+    found = criticise(readings_of(store, change.recording), model, CATALOGUE, points=change.points, full=False)
+    seen = found.weighed
+    if seen is None:
+        return residual_columns(found.data, {}, change.points, change.after)
+    if found.verdict.terms:  # the floor is the noise beside all that is still missing
+        missing = tuple(replace(term, steady=True) for term in found.verdict.terms.values())
+        whole = seen.model.with_terms((*seen.model.terms, *missing))
+        seen = with_noise_of(seen, weigh(found.data, whole, CATALOGUE))
+    return residual_columns(found.data, residuals_of(seen), change.points)
+
+
+def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
+    """Fit a changed model, or take the fit of a moment ago: who has looked at a preview often keeps it next."""
+    row = version_of(store, serial, request.version)
+    number = newest_recording(store, serial, request.recording)
+    asked = json.dumps(_question(store, row, number, request), sort_keys=True)
+    change = _RECENT.get(asked) or _fitted(store, row, number, request)
+    _RECENT[asked] = change
+    for old in list(_RECENT)[:-MOST_RECENT]:
+        _RECENT.pop(old, None)
+    return change
+
+
+def _refuse_what_changes_nothing(
+    wanted: Sequence[Term], model: ErrorModel, request: ImproveRequest, version: int
+) -> None:
+    """Raise BadInput for an effect that is there already. One with a shape may be added again: it gets another."""
+    fixed = {term.effect for term in model.terms if not term.parameters}
+    for term in wanted:
+        if term.effect in request.remove:
+            raise BadInput(f"effect {term.effect!r} is both added and taken out; say one of the two")
+        if term.effect in fixed and term == Term(term.effect):
+            raise BadInput(f"effect {term.effect!r} is in version {version} already ({', '.join(model.effect_ids)})")
+
+
+def _fitted(store: Store, row: CalibrationRecord, number: int, request: ImproveRequest) -> _Change:
+    model = model_of(row)
+    points = points_of(store, number)
+    context = context_of(points)
+    for effect_id in request.remove:
+        if effect_id not in model.effect_ids:
+            raise BadInput(f"effect {effect_id!r} is not in version {row.version} ({', '.join(model.effect_ids)})")
+    written = [read_formula(line) for line in request.formula]
+    wanted = [*(parse_term(text) for text in request.add), *(Term(f.id, formula=f.text) for f in written)]
+    if not wanted and not request.remove:
+        raise BadInput("say what to change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
+    _refuse_what_changes_nothing(wanted, model, request, row.version)
+    base, _ = changed(model, (), tuple(request.remove)).build(context)
+    add = tuple(_shaped(store, number, points, base, term) for term in wanted)
+    before = fit_context(context, changed(model))
+    after = fit_context(context, changed(model, add, tuple(request.remove)))
+    return _Change(row, number, points, before, after)
+
+
+def _shaped(store: Store, recording: int, points: Recording, base: ErrorModel, term: Term) -> Term:
+    """Return a term with the order and the nonlinear parameters that fit the recording best."""
+    kind = kind_of(term)
+    if term.order is not None or not (kind.parameters or kind.max_order):
+        return term
+    found = criticise(readings_of(store, recording), base, {kind.id: kind}, points=points, shape_only=True)
+    shape = found.verdict.terms.get(kind.id)
+    return replace(shape, steady=True) if shape is not None else term
+
+
+def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitAnswer:
+    parent, after = change.row.version, change.after
+    made = {"recording": change.recording, "improved_from": parent}
+
+    def build(version: int) -> NewCalibration:
+        calibration = build_calibration(
+            change.points.info, after, version=version, parent=parent, issued_at=at, provenance=made
+        )
+        answer = {
+            "serial": serial, "version": version, "parent": parent, **change.figures,
+            "left_out": list(calibration.document["left_out"]), "hash": calibration.hash,
+        }  # fmt: skip
+        return NewCalibration(
+            parent, change.recording, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
+        )
+
+    return FitAnswer.model_validate(dict(store.calibrations.add(serial, at, build).answer))
+
+
+def plausible(result: FitResult, technology: str) -> dict[str, dict[str, Any]]:
+    """Return effect -> the range its first coefficient usually lies in, and whether it does on every axis."""
+    found: dict[str, dict[str, Any]] = {}
+    for term in result.fitted.model.terms:
+        span = kind_of(term).ranges.get(technology)
+        if span is None:
+            continue
+        sizes = [
+            float(np.max(np.abs(fit.values[fit.effects.index(term.effect)])))
+            for fit in result.fitted.axes.values()
+            if term.effect in fit.effects
+        ]
+        limit = max(abs(span[0]), abs(span[1]))
+        found[term.effect] = {"from": span[0], "to": span[1], "inside": all(size <= limit for size in sizes)}
+    return found

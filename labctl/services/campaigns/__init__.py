@@ -1,0 +1,1 @@
+"""Campaigns: prepare, execute, resume, status, events."""

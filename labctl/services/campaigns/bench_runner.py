@@ -1,0 +1,306 @@
+"""Runs campaigns on one bench, one at a time, in a thread of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from instruments.bench_config import BenchFile
+from instruments.clock import Clock
+from instruments.errors import InstrumentError
+from labctl.errors import BenchBusy, Conflict, LabctlError, StoreError
+from labctl.services.benches.lease import BenchHold
+from labctl.services.campaigns.execution import Prepared, prepare, run
+from labctl.services.campaigns.resume import as_it_was, leave_safe, prepare_resume, too_often
+from labctl.services.campaigns.status import ENDED, answer_of, campaign_status
+from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
+from labctl.services.schemas.answers import CampaignAnswer
+from labctl.services.simulation.recordings import hiding
+from labctl.store import CampaignRow, Store
+from procedures.contracts.control import Control
+from procedures.contracts.errors import StalePrompt
+from procedures.contracts.journal import CampaignState
+from procedures.contracts.operator import Operator, PersonOperator
+from procedures.execution.signals import uninterrupted
+from procedures.monitoring.progress import Progress
+
+#: How long a request to abort waits for the safe state before it says how far the campaign is.
+SAFE_WITHIN_S = 120.0
+STOPS = "the service stops"
+
+
+@dataclass
+class _Job:
+    """A campaign that runs now."""
+
+    row: CampaignRow
+    operator: Operator
+    control: Control
+    progress: Progress | None = None
+    thread: threading.Thread | None = None
+
+
+@dataclass(frozen=True)
+class _Unsaid:
+    """A campaign that ended when the database could not be written: its rows do not say so yet."""
+
+    campaign: int
+    why: str
+
+
+class BenchRunner:
+    """The one that drives this service's bench."""
+
+    def __init__(
+        self, store: Store, bench: BenchFile, make_clock: Callable[[], Clock], hold: BenchHold | None = None
+    ) -> None:
+        self._store = store
+        self._hold = hold
+        self._bench = bench
+        self._make_clock = make_clock
+        self._guard = threading.Lock()
+        self._job: _Job | None = None
+        self._left = False  #: a campaign was left half done here, and nobody has taken it up yet
+        self._unsaid: _Unsaid | None = None
+        self._stops = False
+        self.used = False  #: whether anything was asked of the bench here
+        self._listeners: list[Callable[[], None]] = []
+
+    @property
+    def bench(self) -> BenchFile:
+        """The bench that is driven."""
+        return self._bench
+
+    @property
+    def busy(self) -> bool:
+        """Whether a campaign runs now."""
+        return self._job is not None
+
+    @property
+    def free(self) -> bool:
+        """Whether a campaign may begin now: nothing runs, or waits to be taken up, and the bench may be driven."""
+        nothing_open = self._job is None and not self._left and self._unsaid is None
+        return nothing_open and not self._stops and self._may_drive
+
+    @property
+    def _may_drive(self) -> bool:
+        return self._hold is None or self._hold.held
+
+    def runs(self, campaign: int) -> bool:
+        """Whether this campaign runs here now."""
+        job = self._job
+        return job is not None and job.row.id == campaign
+
+    def start(self, request: CampaignRequest) -> CampaignAnswer:
+        """Plan, write down and begin a campaign.
+
+        Raises BenchBusy while another runs or without the lease on the bench, and whatever planning raises.
+        """
+        with self._guard:
+            self._refuse_unless_free()
+            bench = hiding(self._bench, request.hide)
+            prepared = prepare(self._store, request.recipe, bench, self._make_clock(), clip=request.clip)
+            self._begin(prepared)
+        return campaign_status(self._store, prepared.id)
+
+    def _refuse_unless_free(self) -> None:
+        if self._stops:
+            raise BenchBusy(f"bench {self._bench.name}: {STOPS}; nothing is begun any more")
+        if self._job is not None:
+            raise BenchBusy(
+                f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
+            )
+        self._say_end()
+        if self._hold is not None:
+            self._hold.check()
+
+    def _begin(self, prepared: Prepared) -> None:
+        control = Control() if self._hold is None else self._hold.control()
+        job = _Job(self._store.campaigns.get(prepared.id), prepared.operator, control)
+        job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
+        self._job = job
+        self.used = True
+        if self._stops:  # while the bench was being opened
+            control.abort(STOPS)
+        job.thread.start()
+
+    def resume(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+        """Let a paused campaign go on, or take up one that was interrupted, failed or aborted.
+
+        Raises BenchBusy while another runs or without the lease on the bench, Conflict when it is done, or when the
+        bench waits to be looked at.
+        """
+        with self._guard:
+            job = self._job
+            if job is not None and job.row.id == campaign:
+                if not job.control.wish.pause:
+                    raise Conflict(f"campaign {campaign} runs and is not paused")
+                job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
+            else:
+                self._refuse_unless_free()
+                make_clock = self._make_clock
+                bench = as_it_was(self._store.campaigns.get(campaign), self._bench)
+                self._begin(prepare_resume(self._store, campaign, bench, lambda _: make_clock(), request))
+        return self.status(campaign) or campaign_status(self._store, campaign)
+
+    def take_up_left(self) -> None:
+        """Take up the campaign that was left half done on this bench; what hinders it becomes its reason.
+
+        Without the lease nothing is touched: whoever has it by now may be taking it up.
+        """
+        self._left = True
+        if not self._may_drive:
+            return
+        taken_up = None
+        for row in self._store.campaigns.unfinished():  # newest first
+            if row.bench_name != self._bench.name:
+                continue
+            if taken_up is not None:
+                text = f"not taken up: campaign {taken_up} goes on here; then `labctl campaign resume {row.id}`"
+                self._store.campaigns.close_unfinished(row.id, text, self._make_clock().utc())
+                continue
+            why_not = too_often(self._store.interruptions.standing(row.id))
+            try:
+                if why_not is None:
+                    self.resume(row.id, ResumeRequest(by="the service"))
+                    taken_up = row.id
+                    continue
+            except BenchBusy:  # somebody was quicker, or the lease went just now
+                return
+            except (LabctlError, InstrumentError) as error:
+                why_not = f"not taken up: {error}"
+            with self._guard:  # whatever hinders the campaign, its last process may have left the bench as it was
+                self.used = True
+                leave_safe(self._store, self._bench, self._make_clock())
+            self._store.campaigns.close_unfinished(row.id, why_not, self._make_clock().utc())
+        self._left = False
+
+    def take_up_cut_short(self) -> None:
+        """Once the bench may be driven again, take up the campaign that was cut short when it was lost."""
+        self._say_end()
+        if self._left and self._job is None and self._may_drive:
+            self.take_up_left()
+
+    def _say_end(self) -> None:
+        """Write down the end of a campaign that could not be written when it came. Raises StoreError."""
+        if (unsaid := self._unsaid) is None:
+            return
+        at = self._make_clock().utc()
+        text = (
+            f"campaign {unsaid.campaign} ended while nothing could be written; whether the bench is safe is not known"
+        )
+        self._store.benches.mark(self._bench.name, text, at)
+        if self._store.campaigns.get(unsaid.campaign).state not in ENDED:
+            self._store.campaigns.close_unfinished(unsaid.campaign, unsaid.why, at)
+        self._unsaid = None
+
+    def pause(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+        """Ask the running campaign to hold after the present data set. Raises Conflict when it does not run here."""
+        self._running(campaign).control.pause(request.text)
+        answer = self.status(campaign)
+        return answer or campaign_status(self._store, campaign)
+
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+        """Answer the open question. Raises StalePrompt for any other one, Conflict when nothing is asked here."""
+        operator = self._running(campaign).operator
+        if not isinstance(operator, PersonOperator):
+            raise StalePrompt(
+                f"question {request.prompt!r} is not asked: this bench turns and switches units by itself"
+            )
+        if request.confirmed:
+            operator.confirm(request.prompt, request.by)
+        else:
+            operator.decline(request.prompt, request.by, request.reason or "no reason given")
+        return self.status(campaign) or campaign_status(self._store, campaign)
+
+    def _running(self, campaign: int) -> _Job:
+        job = self._job
+        over = job is not None and job.progress is not None and job.progress.state.value in ENDED
+        if job is None or job.row.id != campaign or over:
+            state = self._store.campaigns.get(campaign).state
+            raise Conflict(f"campaign {campaign} does not run on bench {self._bench.name} now; it is {state}")
+        return job
+
+    def _run(self, job: _Job, prepared: Prepared) -> None:
+        def seen(progress: Progress) -> None:
+            job.progress = progress
+            self._ring()
+
+        try:
+            answer = run(self._store, prepared, job.control, seen)
+            self._left = self._left or answer.state == CampaignState.INTERRUPTED
+        except StoreError as error:
+            self._unsaid = _Unsaid(job.row.id, str(error))
+            raise
+        finally:
+            self._job = None
+            self._ring()
+
+    def _ring(self) -> None:
+        for listener in tuple(self._listeners):
+            try:
+                listener()
+            except RuntimeError:  # its loop has ended: nobody listens there any more
+                with contextlib.suppress(ValueError):
+                    self._listeners.remove(listener)
+
+    def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        self._listeners.append(listener)
+
+        def stop() -> None:
+            with contextlib.suppress(ValueError):
+                self._listeners.remove(listener)
+
+        return stop
+
+    def status(self, campaign: int) -> CampaignAnswer | None:
+        """Return the live picture of a campaign that runs here."""
+        job = self._job
+        if job is None or job.row.id != campaign or job.progress is None:
+            return None
+        return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.wish)
+
+    def abort(self, campaign: int, reason: str) -> CampaignAnswer:
+        """End the running campaign in the safe state; returns once it is there."""
+        job = self._job
+        if job is not None and job.row.id == campaign and job.thread is not None:
+            job.control.abort(reason)
+            job.thread.join(SAFE_WITHIN_S)
+        return campaign_status(self._store, campaign)
+
+    def describe(self) -> dict[str, Any]:
+        """Return the bench and what it is doing."""
+        job = self._job
+        return {
+            "name": self._bench.name,
+            "simulated": self._bench.is_simulated,
+            "latitude_deg": self._bench.latitude_deg,
+            "units": [{"name": g.name, "serial": g.serial, "driver": g.driver} for g in self._bench.gyros],
+            "campaign": job.row.id if job is not None else None,
+            "unconfirmed": self._store.benches.unconfirmed(self._bench.name),
+        }
+
+    def end_soon(self) -> None:
+        """Begin nothing more, and let what runs go to its end in the safe state; returns at once."""
+        self._stops = True
+        if (job := self._job) is not None:
+            job.control.abort(STOPS)
+
+    def close(self) -> None:
+        """End what runs, in the safe state, and let the bench go.
+
+        Waits as long as that takes, and every part of the safe state has an end of its own: whoever had the bench or
+        the database before the table stands could drive it too.
+        """
+        with uninterrupted():  # an impatient Ctrl-C must not leave the bench as it is
+            self.end_soon()
+            with self._guard:  # what is being begun is begun, and ended
+                job = self._job
+            if job is not None and job.thread is not None:
+                job.thread.join()
+            if self._hold is not None:
+                self._hold.close()

@@ -1,0 +1,127 @@
+"""Following a campaign: any number of onlookers, and the bench is looked at once for all of them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Hashable
+from typing import Any, TypeVar, cast
+
+from labctl.services.campaigns.status import ENDED, event_answer
+from labctl.services.schemas.answers import CampaignAnswer, EventAnswer
+from labctl.store import Store
+
+#: An open event stream says that it is alive after this long without an event.
+HEARTBEAT_S = 10.0
+#: What changes all the time, as a unit's output does, is looked at this often.
+LIVE_S = 1.0
+#: What one onlooker was told counts for the others this long, unless the bench rings.
+FRESH_S = 0.5
+
+Listen = Callable[[Callable[[], None]], Callable[[], None]]
+T = TypeVar("T")
+
+
+class Glances:
+    """What many ask at the same moment is looked up once. A moment ends when the bench rings, and after FRESH_S."""
+
+    def __init__(self) -> None:
+        self._rung = 0
+        self._moment: tuple[Any, ...] = ()
+        self._found: dict[Hashable, asyncio.Future[Any]] = {}
+
+    def ring(self) -> None:
+        """Take in that something has changed; called by the bench's thread."""
+        self._rung += 1
+
+    async def at(self, what: Hashable, look: Callable[[], T]) -> T:
+        """Return what `look` finds now, in a thread of its own; `what` names it among all that is looked up."""
+        loop = asyncio.get_running_loop()
+        moment = (loop, self._rung, int(loop.time() / FRESH_S))
+        if moment != self._moment:
+            self._moment, self._found = moment, {}
+        found = self._found.get(what)
+        if found is None:
+            found = self._found[what] = asyncio.ensure_future(asyncio.to_thread(look))
+        return cast(T, await asyncio.shield(found))  # one who leaves does not end it for the others
+
+
+class Followers:
+    """Tells onlookers where campaigns are."""
+
+    def __init__(self, store: Store, status: Callable[[int], CampaignAnswer], listen: Listen | None) -> None:
+        self._store = store
+        self._status = status
+        self._listen = listen
+        self._glances = Glances()
+        if listen is not None:
+            listen(self._glances.ring)  # the first to hear: who is woken by the bell looks anew
+
+    async def follow(
+        self, campaign: int, after: int, over: Callable[[], bool]
+    ) -> AsyncIterator[EventAnswer | CampaignAnswer | None]:
+        """Yield a campaign's events after number `after`, where it stands whenever that has changed, and None to show
+        that the stream lives, until the campaign ends or it is `over` for another reason.
+
+        Whoever reads slowly gets the newest picture next, never a queue of old ones; the bench only rings a bell.
+        """
+        bell = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        shown: CampaignAnswer | None = None
+
+        def ring() -> None:
+            if not bell.is_set():
+                loop.call_soon_threadsafe(bell.set)
+
+        stop = self._listen(ring) if self._listen is not None else None
+        try:
+            while True:
+                bell.clear()
+                state, told = await self._told(campaign, after)
+                for event in told:
+                    after = event.id
+                    yield event
+                now = await self._now(campaign)
+                if now != shown:
+                    shown = now
+                    yield now
+                if state in ENDED or over():
+                    return
+                async for live in self._meanwhile(campaign, bell):
+                    if live is None or live != shown:
+                        shown = live or shown
+                        yield live
+        finally:
+            if stop is not None:
+                stop()
+
+    async def _told(self, campaign: int, after: int) -> tuple[str, list[EventAnswer]]:
+        """Return the state in the database, not that of the live picture, and the events that came before it.
+
+        The last event is written before the state there ends, so that whoever sees the end has seen every event.
+        """
+
+        def look() -> tuple[str, list[EventAnswer]]:
+            state = self._store.campaigns.get(campaign).state
+            return state, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
+
+        return await self._glances.at(("told", campaign, after), look)
+
+    async def _now(self, campaign: int) -> CampaignAnswer:
+        return await self._glances.at(("now", campaign), lambda: self._status(campaign))
+
+    async def _meanwhile(self, campaign: int, bell: asyncio.Event) -> AsyncIterator[CampaignAnswer | None]:
+        """Yield where a campaign stands until the bell rings, or until it is time to show that the stream lives."""
+        for _ in range(round(HEARTBEAT_S / LIVE_S)):
+            if await _rings(bell):
+                return
+            yield await self._now(campaign)
+        yield None
+
+
+async def _rings(bell: asyncio.Event) -> bool:
+    """Wait a moment for the bell; returns whether it rang."""
+    try:
+        await asyncio.wait_for(bell.wait(), LIVE_S)
+    except TimeoutError:
+        return False
+    return True

@@ -1,0 +1,191 @@
+"""Taking up an interrupted campaign: by itself after a crash or a power cut, by a person's word after a fault."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+
+from pydantic import ValidationError
+
+from instruments.bench import Bench, open_bench
+from instruments.bench_config import BenchFile, SimulationSettings
+from instruments.clock import Clock, VirtualClock
+from instruments.errors import InstrumentError
+from labctl.config import default_database
+from labctl.errors import Conflict
+from labctl.services.benches.host import boot_id, power_failed
+from labctl.services.benches.lease import holding, open_for
+from labctl.services.campaigns.execution import (
+    Attend,
+    Observe,
+    Prepared,
+    clock_for,
+    operator_of,
+    refuse_unconfirmed,
+    run_attended,
+)
+from labctl.services.campaigns.status import from_rows, how_far
+from labctl.services.commands.protocol import ResumeRequest
+from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.answers import CampaignAnswer
+from labctl.store import CampaignRow, Standing, Store, TakeUp, open_store
+from procedures.execution.resume import Restart
+from procedures.execution.safe_state import make_safe
+from procedures.planning.plan import Plan
+from procedures.recipe.recipe import Recipe
+
+#: A campaign that was taken up so often without finishing a step needs a person.
+MOST_TRIES = 5
+
+
+def plan_of(store: Store, row: CampaignRow) -> Plan:
+    """Return the plan of a campaign as it was written down."""
+    return Plan.model_validate(
+        {
+            "recipe": Recipe.model_validate(dict(row.recipe)),
+            "steps": [step.body for step in store.campaigns.steps(row.id)],
+        }
+    )
+
+
+def as_it_was(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
+    """Return a simulated bench with the simulation that a campaign was begun in: the same units, on the same day.
+
+    A real bench is what it is. Raises Conflict for a simulation that this labctl does not know any more.
+    """
+    was = row.bench.get("simulation")
+    if not bench_file.is_simulated or was is None:
+        return bench_file
+    try:
+        return bench_file.model_copy(update={"simulation": SimulationSettings.model_validate(was)})
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise Conflict(
+            f"campaign {row.id} was simulated by another labctl: simulation.{'.'.join(map(str, first['loc']))}: "
+            f"{first['msg']}; abort it, and start it anew"
+        ) from error
+
+
+def prepare_resume(
+    store: Store,
+    campaign: int,
+    bench_file: BenchFile,
+    make_clock: Callable[[Standing], Clock],
+    request: ResumeRequest,
+    opened: Bench | None = None,
+) -> Prepared:
+    """Mark a campaign as taken up, and return it ready to run; nothing has moved when this returns.
+
+    `opened` is the bench where it is open already. Raises Conflict when the campaign is done, when the bench carries
+    other units, or when it waits to be looked at.
+    """
+    row = store.campaigns.get(campaign)
+    if row.state == "done":
+        raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
+    _refuse_other_units(row, bench_file)
+    refuse_unconfirmed(store, bench_file.name)
+    standing, plan = store.interruptions.standing(campaign), plan_of(store, row)
+    clock = make_clock(standing)
+    new_world = bench_file.is_simulated and opened is None  # a simulated bench ends with its process
+    lost = request.power == "lost" or (
+        request.power is None and (new_world or power_failed(standing.boot_id, boot_id()))
+    )
+    new_session = lost and plan.run_at(standing.start_at, standing.skipped) > 0
+    since_s = (clock.utc() - row.started_at).total_seconds() if row.started_at else 0.0
+    t_s = max(standing.last_t_s, since_s)
+    gap_s = t_s - standing.last_t_s
+    added = standing.added_runs + int(new_session)
+    power = "the power failed meanwhile" if lost else "the units stayed on"
+    reason = f"taken up by {request.by} after {gap_s:.0f} s unwatched; {power}"
+    bench = opened or open_bench(bench_file, clock)
+    try:
+        store.interruptions.take_up(campaign, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
+        if new_world and (position := plan.mounted_at(standing.start_at)):
+            bench.hand.mount(position)
+    except BaseException:
+        bench.close()
+        raise
+    restart = Restart(
+        gap_s=float("inf") if standing.soak_owed else gap_s,
+        power_lost=lost,
+        added_runs=added,
+        dropped=standing.dropped,
+        skipped=standing.skipped,
+    )
+    return Prepared(campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, clock.now_s() - t_s)
+
+
+def _refuse_other_units(row: CampaignRow, bench_file: BenchFile) -> None:
+    here = {gyro.serial for gyro in bench_file.gyros}
+    if set(row.recordings) != here:
+        raise Conflict(
+            f"campaign {row.id} measures {', '.join(sorted(row.recordings))}, bench {bench_file.name} carries "
+            f"{', '.join(sorted(here))}; name the campaign's own bench with --bench"
+        )
+
+
+def too_often(standing: Standing) -> str | None:
+    """Return why a campaign is not taken up by itself any more, or None."""
+    if standing.tries < MOST_TRIES:
+        return None
+    return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
+
+
+def to_be_taken_up(store: Store, bench: str) -> str:
+    """Say which campaign a service finds left on its bench when it starts, and what becomes of it; empty for none."""
+    row = next((row for row in store.campaigns.unfinished() if row.bench_name == bench), None)
+    if row is None:
+        return ""
+    text = how_far(from_rows(store, row))
+    if store.benches.unconfirmed(bench):
+        return f"{text} and is not taken up: bench {bench} was not confirmed safe"
+    if why_not := too_often(store.interruptions.standing(row.id)):
+        return f"{text} and is not taken up: {why_not}"
+    return f"{text} and is taken up now, safe state first"
+
+
+def leave_safe(store: Store, bench_file: BenchFile, clock: Clock) -> None:
+    """Make a bench safe whose campaign is not taken up; what cannot be confirmed stays on its status."""
+    if bench_file.is_simulated:  # it ended with its process
+        return
+    complaints: tuple[str, ...] = ()
+    try:
+        with closing(open_bench(bench_file, clock)) as bench:
+            complaints = make_safe(bench, clock)
+    except (InstrumentError, OSError) as error:
+        complaints = (*complaints, str(error))
+    if complaints:
+        store.benches.mark(bench_file.name, "; ".join(complaints), clock.utc())
+
+
+def resume_here(
+    database: str | None,
+    campaign: int | None,
+    bench: str | None,
+    speed: float | None,
+    request: ResumeRequest,
+    observe: Observe | None = None,
+    attend: Attend | None = None,
+) -> CampaignAnswer:
+    """Take up a campaign in this process and run it to its end; without a number the newest that is not over."""
+    location = database or default_database()
+    with open_store(location, write=False) as store:
+        row = store.campaigns.get(campaign) if campaign is not None else _newest_unfinished(store)
+    bench_file = load_bench(bench) if bench else BenchFile.model_validate(dict(row.bench))
+    with open_for(bench_file, location) as store, holding(store, bench_file) as control:
+
+        def make_clock(standing: Standing) -> Clock:
+            clock = clock_for(bench_file, speed)
+            return VirtualClock(standing.last_at) if isinstance(clock, VirtualClock) else clock
+
+        prepared = prepare_resume(store, row.id, bench_file, make_clock, request)
+        return run_attended(store, prepared, control, observe, attend)
+
+
+def _newest_unfinished(store: Store) -> CampaignRow:
+    rows = store.campaigns.unfinished()
+    if not rows:
+        raise Conflict(
+            "no campaign was interrupted; `labctl campaign resume ID` takes up one that failed or was aborted"
+        )
+    return rows[0]

@@ -1,0 +1,1 @@
+"""A calibration version held against a recording."""

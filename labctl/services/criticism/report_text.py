@@ -1,0 +1,151 @@
+"""A criticism as the answer that leaves the house: figures under the contract's keys, and sentences for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtrc
+
+from labctl.fitting.criticism import Criticism
+from labctl.fitting.criticism.criticise import LARGE_DRIFT, Suspect, failing, pictures, worst
+from labctl.fitting.criticism.verdict import Verdict
+from labctl.fitting.effects import CATALOGUE, kind_of
+from labctl.services.schemas.answers import CriticismAnswer
+
+
+def answer_of(
+    serial: str, version: int, recording: int, found: Criticism, experiments: list[dict[str, Any]]
+) -> CriticismAnswer:
+    """Return the answer of a criticism."""
+    verdict, base = found.verdict, found.base
+    return CriticismAnswer(
+        serial=serial,
+        version=version,
+        recording=recording,
+        verdict=verdict.form,
+        text=sentences(found),
+        error={
+            "rms_dps": base.error.rms_dps if base else None,
+            "heldout_rms_dps": base.error.heldout_rms_dps if base else None,
+            "noise_floor_dps": _floor(found),
+            "noise_floor_source": base.error.noise_floor_source if base else "none",
+            "explained": found.explained,
+            "direct_form_rms_dps": found.direct_rms_dps,
+        },
+        noise=_noise(found),
+        lack_of_fit=_lack_of_fit(found),
+        where=failing(found) if found.weighed else [],
+        suspects=[_suspect(suspect, found) for suspect in found.suspects],
+        named=list(verdict.named),
+        depends_on=list(verdict.depends_on),
+        not_testable=[dict(line) for line in found.not_testable],
+        experiments=experiments,
+        worst=worst(found) if found.weighed else [],
+        maps=pictures(found) if found.weighed else [],
+        readings_left_out=found.data.left_out,
+        views=dict(found.views),
+    )
+
+
+def _floor(found: Criticism) -> float | None:
+    """Return the root of the mean variance of a data-set mean, deg/s, beside all that was found missing.
+
+    The fit's own figure counts what it misses as drift.
+    """
+    if found.residuals:
+        return float(np.sqrt(np.mean([np.mean(left.floor_dps**2) for left in found.residuals.values()])))
+    return found.base.error.noise_floor_dps if found.base else None
+
+
+def _noise(found: Criticism) -> dict[str, Any]:
+    parts = list(found.residuals.values())
+    static = found.data.static.to_json() if found.data.static is not None else None
+    if not parts:
+        return {"white_dps": None, "drift_dps": None, "drift_tau_s": None, "vs_datasheet": None, "static": static}
+    largest = max(parts, key=lambda r: r.drift_dps)
+    return {
+        "white_dps": float(np.sqrt(np.mean([r.white_dps**2 for r in parts]))),
+        "drift_dps": largest.drift_dps,
+        "drift_tau_s": largest.drift_tau_s,
+        "vs_datasheet": found.drift_over_datasheet,
+        "static": static,
+    }
+
+
+def _lack_of_fit(found: Criticism) -> dict[str, float | None]:
+    """Chi2 of the whitened residual over its degrees of freedom, and its p-value."""
+    if not found.residuals:
+        return {"statistic": None, "p_value": None}
+    total = sum(left.chi2 for left in found.residuals.values())
+    freedom = sum(left.freedom for left in found.residuals.values())
+    return {"statistic": float(total / max(freedom, 1)), "p_value": float(chdtrc(max(freedom, 1), total))}
+
+
+def _suspect(suspect: Suspect, found: Criticism) -> dict[str, Any]:
+    candidate = suspect.candidate
+    kind = kind_of(candidate.term) if candidate.term is not None else CATALOGUE[candidate.id]
+    after = suspect.after.error if suspect.after else None
+    technology = found.data.info.technology or ""
+    return {
+        "effect": candidate.id,
+        "probability": suspect.probability,
+        "p_value": suspect.p_value,
+        "log_bayes_factor": candidate.log_bf,
+        "share_removed": suspect.share_removed,
+        "coefficients": {axis: dict(values) for axis, values in suspect.coefficients.items()},
+        "parameters": dict(candidate.term.parameters) if candidate.term else {},
+        "plausible": list(kind.ranges[technology]) if technology in kind.ranges else None,
+        "rms_after_dps": after.rms_dps if after else None,
+        "heldout_rms_after_dps": after.heldout_rms_dps if after else None,
+        "alias_group": list(suspect.group),
+        "origin": kind.origin,
+        "explanation": kind.sentence,
+        "experiment": kind.experiment,
+    }
+
+
+def sentences(found: Criticism) -> list[str]:
+    """Return the verdict in words, one sentence each, the answer first."""
+    verdict = found.verdict
+    said = [_first(found)]
+    if verdict.form == "ambiguous":
+        wanted = dict.fromkeys(CATALOGUE[e].experiment for e in verdict.untold[:3] if e in CATALOGUE)
+        said += [f"To tell: {experiment}." for experiment in wanted]
+    factor = found.drift_over_datasheet
+    if verdict.form == "adequate" and factor is not None and factor >= LARGE_DRIFT:
+        said.append(f"The drift is larger than specified: {factor:.1f} times what the data sheet lets expect.")
+    if found.data.left_out:
+        said.append(f"{found.data.left_out} readings far outside their data set were left out.")
+    return said
+
+
+def _first(found: Criticism) -> str:
+    verdict = found.verdict
+    words = [" or ".join(map(_word, group)) for group in verdict.groups]
+    match verdict.form:
+        case "adequate":
+            return "Nothing is missing: what is left is noise."
+        case "missing":
+            return f"Missing: {' and '.join(words)}."
+        case "ambiguous":
+            return _ambiguous(verdict, words)
+        case "unexplained":
+            channel = verdict.depends_on[0] if verdict.depends_on else "an unknown channel"
+            return f"Something that no effect of the catalogue describes hangs on {channel}."
+        case _:
+            return f"Too little data for a verdict: {verdict.reason}."
+
+
+def _ambiguous(verdict: Verdict, words: list[str]) -> str:
+    if len(words) > 1:
+        return f"Missing: {'; and '.join(words)}; this recording cannot tell which of those joined by or."
+    if not verdict.untold:
+        return f"Something like {words[0]} is missing, but it explains only a part of what is left."
+    names = "; ".join(map(_word, verdict.untold))
+    return f"Missing is one of these, and this recording cannot tell which: {names}."
+
+
+def _word(effect_id: str) -> str:
+    kind = CATALOGUE.get(effect_id)
+    return f"{effect_id} ({kind.term})" if kind else effect_id

@@ -1,0 +1,95 @@
+"""What a model leaves, data set by data set: the rows behind the map, with what was measured and what was modelled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from labctl.fitting import FitResult
+from labctl.fitting.criticism.reduction import Compressed
+from labctl.fitting.criticism.residuals import Residuals
+from labctl.fitting.data.channels import Array, Channels
+from labctl.fitting.data.fit_data import context_of
+from labctl.recording import Recording
+from labctl.services.schemas.answers import ResidualColumns
+
+
+def residual_columns(
+    data: Compressed, left: Mapping[str, Residuals], points: Recording, base: FitResult | None = None
+) -> ResidualColumns:
+    """Return the rows of what a criticism left, axis by axis.
+
+    Where there was too little for a verdict nothing was weighed: then `base`, a fit to the points, says what is left.
+    """
+    if not left:
+        return _of_fit(points, base) if base is not None else ResidualColumns()
+    nodes, first = data.nodes, np.arange(len(data)) * (len(data.nodes) // len(data))
+    shared = _shared(nodes.take(first), data.dataset, points) | {
+        "table_rate_dps": data.at_sets(nodes.table_rate_dps()).tolist(),
+        "t_s": data.at_sets(np.asarray(nodes["t_s"], dtype=np.float64)).tolist() if "t_s" in nodes else None,
+    }
+    found = []
+    for axis, residuals in left.items():
+        true = data.rows_of(nodes.rate_dps(axis)[:, None])[0, :, 0]
+        warm = data.at_sets(nodes.temperature_c(axis))
+        measured = data.output[axis][0] - true
+        found.append(_axis(axis, shared, true, warm, measured, residuals.means, residuals.floor_dps))
+    return _joined(found)
+
+
+def _of_fit(points: Recording, base: FitResult) -> ResidualColumns:
+    context = context_of(points)
+    floor = base.error.noise_floor_dps
+    channels = context.channels
+    dataset = np.asarray(channels["dataset"], dtype=np.int64)
+    shared = _shared(channels, dataset, points) | {
+        "table_rate_dps": channels.table_rate_dps().tolist(),
+        "t_s": np.asarray(channels["t_s"]).tolist() if "t_s" in channels else None,
+    }
+    found = []
+    for axis, residual in base.residual_dps.items():
+        true = context.true_rate_dps(axis)
+        floors = np.full(len(context), floor) if floor else None
+        warm, measured = channels.temperature_c(axis), context.outputs[axis] - true
+        found.append(_axis(axis, shared, true, warm, measured, residual, floors))
+    return _joined(found)
+
+
+def _shared(sets: Channels, dataset: np.ndarray, points: Recording) -> dict[str, Any]:
+    """Return what the rows of all axes have in common; `sets` has one row per data set."""
+    known: dict[int, int] = {}
+    if "n" in points.columns:
+        known = dict(
+            zip(np.asarray(points.columns["dataset"]).tolist(), np.asarray(points.columns["n"]).tolist(), strict=True)
+        )
+    return {
+        "dataset": dataset.tolist(),
+        "position": [str(there) for there in sets["position"]],
+        "run": np.rint(sets["run"]).astype(int).tolist() if "run" in sets else [1] * len(dataset),
+        "n": [known.get(number) for number in dataset.tolist()],
+    }
+
+
+def _axis(
+    axis: str, shared: Mapping[str, Any], true: Array, warm: Array, measured: Array, residual: Array,
+    floor: Array | None,
+) -> dict[str, list[Any]]:  # fmt: skip
+    m = len(residual)
+    unknown: list[Any] = [None] * m
+    return {
+        **{name: values if values is not None else unknown for name, values in shared.items()},
+        "axis": [axis] * m,
+        "own_rate_dps": true.tolist(),
+        "temperature_c": warm.tolist(),
+        "measured_error_dps": measured.tolist(),
+        "modelled_error_dps": (measured - residual).tolist(),
+        "residual_dps": residual.tolist(),
+        "floor_dps": unknown if floor is None else floor.tolist(),
+        "over_floor": unknown if floor is None else (residual / floor).tolist(),
+    }
+
+
+def _joined(parts: list[dict[str, list[Any]]]) -> ResidualColumns:
+    return ResidualColumns(**{name: [value for part in parts for value in part[name]] for name in parts[0]})

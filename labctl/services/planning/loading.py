@@ -1,0 +1,140 @@
+"""From a recipe and a bench to a plan; nothing is opened and nothing moves."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from instruments.bench import check_options
+from instruments.bench_config import BenchFile, read_bench, shipped_benches
+from instruments.interfaces.chamber import ChamberLimits
+from instruments.interfaces.gyro import GyroLimits
+from instruments.interfaces.table import TableLimits
+from labctl.errors import BadBench
+from labctl.services.schemas.answers import PlanAnswer, Visibility
+from procedures.contracts.errors import PlanRefused
+from procedures.planning.limits import BenchLimits
+from procedures.planning.plan import Plan, make_plan
+from procedures.recipe.recipe import Recipe, parse_recipe, read_recipe, shipped_recipes
+
+#: Of a chamber's set point, until its controller has been asked.
+USUAL_RESOLUTION_C = 0.1
+
+
+Look = Callable[[Plan, BenchFile], list[Visibility]]
+
+
+def load_recipe(source: str) -> Recipe:
+    """Return a recipe by shipped name, by path, or from its own TOML text. Raises RecipeError."""
+    if "\n" in source:
+        return parse_recipe(source)
+    return read_recipe(source)
+
+
+def own_text(source: str) -> str:
+    """Return the text of a recipe file, for somebody who does not read it himself or later; a name stays as it is.
+
+    Raises RecipeError.
+    """
+    load_recipe(source)
+    if "\n" in source or source in shipped_recipes():
+        return source
+    return Path(source).read_text(encoding="utf-8")
+
+
+def recipe_document(recipe: Recipe) -> dict[str, Any]:
+    """Return a recipe as a recipe file says it: what it leaves as usual is left out."""
+    document = recipe.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    return {"format": "labctl-recipe/1", "name": recipe.name, **document}
+
+
+def load_bench(source: str) -> BenchFile:
+    """Return a bench by shipped name or path; raises BadBench naming the file and the key."""
+    try:
+        bench = read_bench(source)
+        check_options(bench)
+        return bench
+    except FileNotFoundError:
+        known = ", ".join(shipped_benches())
+        raise BadBench(f"bench {source!r} is neither a file nor a bench that ships with labctl ({known})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
+        raise BadBench(f"bench file {source}: not TOML: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise BadBench(f"bench file {source}: {place}: {first['msg']} (is {first['input']!r})") from error
+
+
+def limits_of(bench: BenchFile) -> BenchLimits:
+    """Return what a bench's instruments may be asked for, from its file alone."""
+    table, chamber = bench.table, bench.chamber
+    return BenchLimits(
+        TableLimits(table.max_rate_dps, table.acceleration_dps2, 360.0 / table.steps_per_turn),
+        ChamberLimits(chamber.min_c, chamber.max_c, USUAL_RESOLUTION_C, chamber.ramp_c_per_min),
+        {gyro.name: GyroLimits(gyro.max_rate_dps, gyro.min_c, gyro.max_c) for gyro in bench.gyros},
+    )
+
+
+def bench_for(recipe: Recipe) -> str:
+    """Return the shipped simulated bench that fits a recipe best.
+
+    One that is named after it; else the one with the fewest axes that can do it whole, the fastest of these first.
+    """
+    if f"{recipe.name}-sim" in shipped_benches():
+        return f"{recipe.name}-sim"
+    axes = {position.lstrip("-") for position in recipe.positions}
+    fitting: list[tuple[bool, int, float, str]] = []
+    for name, path in shipped_benches().items():
+        bench = load_bench(str(path))
+        recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
+        if bench.is_simulated and axes <= recorded:
+            fitting.append((not _can_do(recipe, bench), len(recorded), -bench.gyros[0].max_rate_dps, name))
+    if not fitting:
+        raise BadBench(
+            f"recipe {recipe.name}: no shipped bench records axes {sorted(axes)}; name one with --bench FILE"
+        )
+    return min(fitting)[-1]
+
+
+def _can_do(recipe: Recipe, bench: BenchFile) -> bool:
+    try:
+        make_plan(recipe, limits_of(bench))
+    except PlanRefused:
+        return False
+    return True
+
+
+def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tuple[Plan, BenchFile]:
+    """Return the plan of a recipe on a bench. Raises RecipeError, BadBench, PlanRefused."""
+    recipe = load_recipe(recipe_source)
+    bench = load_bench(bench_source or bench_for(recipe))
+    return make_plan(recipe, limits_of(bench), clip=clip), bench
+
+
+def describe_plan(recipe: str, bench: str | None, *, clip: bool, look: Look | None = None) -> PlanAnswer:
+    """Say what a campaign would do and how long it takes; `look` also says what it could find."""
+    plan, bench_file = plan_for(recipe, bench, clip=clip)
+    return plan_answer(plan, bench_file, look)
+
+
+def plan_answer(plan: Plan, bench_file: BenchFile, look: Look | None = None) -> PlanAnswer:
+    """Return a plan's figures; `look` also says what it could find."""
+    return PlanAnswer(
+        recipe=plan.recipe.name,
+        bench=bench_file.name,
+        steps=len(plan.steps),
+        datasets=plan.datasets,
+        expected_s=plan.expected_s,
+        clipped=list(plan.clipped),
+        schedule_hash=plan.schedule_hash,
+        visibility=look(plan, bench_file) if look else None,
+    )
+
+
+def shipped_recipe_names() -> dict[str, Path]:
+    """Return the recipes that come with labctl."""
+    return shipped_recipes()

@@ -1,0 +1,1 @@
+"""Recordings: import, export, catalogue, traces, Allan deviation."""

@@ -1,0 +1,91 @@
+"""The Allan deviation of a recording: of its static record, or of one data set."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from labctl.errors import BadInput, NotEnoughData
+from labctl.fitting.data.static_record import StaticRecord, static_record
+from labctl.fitting.numeric.allan import LEAST_READINGS, allan
+from labctl.recording import Recording, RecordingInfo
+from labctl.recording.points import temperature_of
+from labctl.services.cache import kept
+from labctl.services.schemas.answers import Answer
+from labctl.store import Store
+
+#: What a static record is looked for in, beside the outputs.
+NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "temperature_c", "chamber_c", "valid")
+
+
+class AllanAnswer(Answer):
+    """An overlapping Allan deviation, axis by axis, and the figures of IEEE Std 952 that it shows."""
+
+    recording: int
+    datasets: list[int] = Field(description="First and last data set of the stretch.")
+    temperature_c: float | None
+    duration_s: float | None
+    axes: dict[str, dict[str, Any]] = Field(
+        description="tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K."
+    )
+
+
+def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanAnswer:
+    """Return the Allan deviation of a data set, or of the longest stretch at rest and at one temperature.
+
+    Raises NotFound, BadInput for a recording without readings, NotEnoughData.
+    """
+    head = store.recordings.get(recording)
+    if head.kind != "samples":
+        raise BadInput(f"recording {recording} holds {head.kind}: an Allan deviation needs the readings themselves")
+    info = RecordingInfo.model_validate(head.info)
+
+    def work() -> AllanAnswer:
+        if dataset is None:
+            return AllanAnswer(recording=recording, **_at_rest(store, recording, info).to_json())
+        columns = store.recordings.dataset(recording, dataset)
+        return AllanAnswer(recording=recording, **_of_set(Recording(info, columns), dataset).to_json())
+
+    question = {"recording": recording, "readings": store.recordings.fingerprint(recording), "dataset": dataset}
+    return kept(AllanAnswer, question, work)
+
+
+def _of_set(recording: Recording, dataset: int) -> StaticRecord:
+    columns = recording.columns
+    n = len(recording)
+    valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(n, dtype=bool)
+    t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]
+    if len(t_s) < LEAST_READINGS:
+        raise NotEnoughData(
+            f"data set {dataset} has {len(t_s)} valid readings; an Allan deviation needs {LEAST_READINGS} or more"
+        )
+    period_s = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
+    found = {str(axis): allan(recording.gyro_dps(axis)[valid], period_s) for axis in recording.info.axes}
+    axes = {axis: noise for axis, noise in found.items() if noise is not None}
+    if not axes:
+        raise NotEnoughData(f"data set {dataset}: its readings do not scatter, so they say nothing about noise")
+    warm = temperature_of(columns)
+    mean_c = float(warm[valid].mean()) if warm is not None else np.nan
+    return StaticRecord(dataset, dataset, mean_c, len(t_s) * period_s, axes)
+
+
+def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
+    """Return the static record, looked for only in what was measured at rest: the rest of the readings stay unread."""
+    rows = store.recordings.data_sets(recording)
+    still = [row.number for row in rows if row.state == "complete" and row.n and row.table_rate_dps == 0]
+    names = (*NEEDED, *(f"gyro_{axis}" for axis in info.axes))
+    parts: list[dict[str, NDArray[Any]]] = []
+    for number in still:
+        columns = store.recordings.dataset(recording, number)
+        parts.append({name: columns[name] for name in names if name in columns})
+    if parts:
+        together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        if (found := static_record(Recording(info, together))) is not None:
+            return found
+    raise NotEnoughData(
+        f"recording {recording} has no stretch of {LEAST_READINGS} readings at rest and at one temperature; "
+        "name a data set, or record the unit at rest"
+    )

@@ -1,0 +1,124 @@
+"""Recordings to look at: which there are, and their data sets as columns."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from labctl.recording import Recording
+from labctl.services.schemas.answers import Answer
+from labctl.store import MeanRow, RecordingRow, Store
+
+
+class RecordingAnswer(Answer):
+    """One line of the list of recordings."""
+
+    id: int
+    serial: str
+    kind: str = Field(description="samples, points or coefficients.")
+    campaign: int | None = Field(description="The campaign that made it; null: it was imported.")
+    datasets: int
+    readings: int
+    created_at: datetime
+    notes: str = ""
+
+
+class ChannelColumns(Answer):
+    """A channel's figures by data set, in the channel's unit; null: none."""
+
+    mean: list[float | None]
+    std: list[float | None]
+
+
+class DataSetsAnswer(Answer):
+    """The data sets of a recording, as lists of equal length."""
+
+    recording: int
+    number: list[int]
+    state: list[str]
+    reason: list[str] = Field(description="Why it is not complete; empty where it is.")
+    position: list[str]
+    run: list[int]
+    mounting: list[int]
+    table_rate_dps: list[float]
+    t_from_s: list[float | None]
+    t_until_s: list[float | None]
+    n: list[int]
+    lost: list[int]
+    damaged: list[int]
+    chamber_setpoint_c: list[float | None]
+    channels: dict[str, ChannelColumns]
+
+
+def list_recordings(store: Store) -> list[RecordingAnswer]:
+    """Return every recording, newest first."""
+    return [_line(row) for row in store.recordings.all()]
+
+
+def _line(row: RecordingRow) -> RecordingAnswer:
+    return RecordingAnswer(
+        id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
+        readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
+    )  # fmt: skip
+
+
+def data_sets(store: Store, recording: int) -> DataSetsAnswer:
+    """Return the data sets of a recording as columns; none for a table of coefficients. Raises NotFound."""
+    head = store.recordings.get(recording)
+    rows = store.recordings.data_sets(recording)
+    numbers = [row.number for row in rows]
+    if head.kind == "samples":
+        channels = _of_rows(numbers, store.recordings.means(recording))
+    else:
+        channels = _of_table(numbers, store.recordings.points(recording)) if rows else {}
+    return DataSetsAnswer(
+        recording=recording,
+        number=numbers,
+        state=[row.state for row in rows],
+        reason=[row.reason for row in rows],
+        position=[row.position for row in rows],
+        run=[row.run for row in rows],
+        mounting=[row.mounting for row in rows],
+        table_rate_dps=[row.table_rate_dps for row in rows],
+        t_from_s=[row.t_from_s for row in rows],
+        t_until_s=[row.t_until_s for row in rows],
+        n=[row.n for row in rows],
+        lost=[row.lost for row in rows],
+        damaged=[row.damaged for row in rows],
+        chamber_setpoint_c=[row.chamber_setpoint_c for row in rows],
+        channels=channels,
+    )
+
+
+def _of_rows(numbers: list[int], means: list[MeanRow]) -> dict[str, ChannelColumns]:
+    place = {number: k for k, number in enumerate(numbers)}
+    found: dict[str, tuple[list[float | None], list[float | None]]] = {}
+    for row in means:
+        mean, std = found.setdefault(row.channel, ([None] * len(numbers), [None] * len(numbers)))
+        mean[place[row.number]], std[place[row.number]] = row.mean, row.std
+    return {name: ChannelColumns(mean=mean, std=std) for name, (mean, std) in found.items()}
+
+
+#: Columns of a table of points that say which data set it is, or how its mean was made.
+NO_CHANNEL = frozenset({"dataset", "t_s", "position", "run", "mounting", "table_rate_dps", "n", "duration_s", "valid"})
+
+
+def _of_table(numbers: list[int], points: Recording) -> dict[str, ChannelColumns]:
+    """Return the figures of points that were imported as such; they stand in the table itself."""
+    order = np.argsort(np.asarray(points.columns["dataset"]), kind="stable")
+    nothing: list[float | None] = [None] * len(numbers)
+    found: dict[str, ChannelColumns] = {}
+    for name, values in points.columns.items():
+        if name in NO_CHANNEL or name.endswith("_std") or np.asarray(values).dtype.kind not in "fiu":
+            continue
+        spread = points.columns.get(f"{name}_std")
+        std = nothing if spread is None else _numbers(np.asarray(spread)[order])
+        found[name] = ChannelColumns(mean=_numbers(np.asarray(values)[order]), std=std)
+    return found
+
+
+def _numbers(values: np.ndarray[Any, Any]) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

@@ -1,0 +1,120 @@
+"""Envelopes of a recording's readings: least, largest and mean in bins of each data set, made once, kept as a file.
+
+They let millions of readings be drawn without reading them again. A file is named by all that it depends on, as kept
+answers are; a damaged or missing one only costs the time to make it again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+from platformdirs import user_cache_path
+
+from labctl.services.cache import code_digest, one_at_a_time, write_kept
+from labctl.store import Store
+
+#: Bins of a data set: so many, or one for this many readings where it is far longer than others, up to a limit.
+LEAST_BINS, READINGS_A_BIN, MOST_BINS = 64, 128, 4096
+#: A file has some 24 bytes a bin, and a recording up to a dozen files; the oldest go when there are more.
+MOST_FILES = 200
+#: Columns that are no measured course.
+NO_COURSE = frozenset({"dataset", "t_s", "run", "mounting", "valid"})
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """One channel in bins in the order of time, (k,) each: middle time, least, largest, mean, number of readings."""
+
+    t_s: Array
+    low: Array
+    high: Array
+    mean: Array
+    n: Array
+
+
+def bins_of(readings: int) -> int:
+    """Return how many bins a data set of so many readings has."""
+    return min(max(LEAST_BINS, readings // READINGS_A_BIN), MOST_BINS, readings)
+
+
+def courses_of(columns: dict[str, NDArray[Any]]) -> list[str]:
+    """Return the names of the channels of a data set that can be drawn over time."""
+    return [name for name, values in columns.items() if name not in NO_COURSE and values.dtype.kind in "fiu"]
+
+
+def envelope_of(store: Store, recording: int, channel: str) -> Envelope:
+    """Return the envelope of one channel over all complete data sets; empty where none has it.
+
+    Each channel is made when it is looked at: whoever opens a recording waits for one, not for twelve.
+    """
+    asked = f"envelope {code_digest()} {store.recordings.fingerprint(recording, complete=True)} {channel}"
+    name = hashlib.sha256(asked.encode()).hexdigest()
+    file = user_cache_path("labctl") / "envelopes" / f"{name}.npz"
+    if (found := _read(file)) is not None:
+        return found
+    with one_at_a_time(asked):
+        if (found := _read(file)) is not None:
+            return found
+        made = _made(store, recording, channel)
+        packed = io.BytesIO()
+        np.savez(packed, t_s=made.t_s, bounds=np.stack([made.low, made.high, made.mean, made.n]).astype(np.float32))
+        with suppress(OSError):
+            write_kept(file, packed.getvalue(), MOST_FILES)
+    packed.seek(0)
+    return _taken(packed)
+
+
+def _read(file: Path) -> Envelope | None:
+    try:
+        with file.open("rb") as source:
+            found = _taken(source)
+        file.touch()
+        return found
+    except (OSError, EOFError, ValueError, KeyError, BadZipFile):
+        return None
+
+
+def _taken(source: IO[bytes]) -> Envelope:
+    with np.load(source, allow_pickle=False) as arrays:
+        low, high, mean, n = arrays["bounds"].astype(np.float64)
+        return Envelope(arrays["t_s"], low, high, mean, n)
+
+
+def _made(store: Store, recording: int, channel: str) -> Envelope:
+    times, parts = [np.zeros(0)], [np.zeros((4, 0))]
+    for _, columns in store.recordings.iter_datasets(recording):
+        n = len(next(iter(columns.values()), ()))
+        if n == 0 or "t_s" not in columns or channel not in courses_of(columns):
+            continue
+        edges = np.linspace(0, n, bins_of(n) + 1).astype(np.int64)
+        begins, width = edges[:-1], np.diff(edges)
+        times.append(np.add.reduceat(np.asarray(columns["t_s"], dtype=np.float64), begins) / width)
+        parts.append(_bounds(np.asarray(columns[channel], dtype=np.float64), begins, width))
+    return Envelope(np.concatenate(times), *np.concatenate(parts, axis=1))
+
+
+def _bounds(values: Array, begins: NDArray[np.int64], width: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return least, largest, mean and number of finite values (n,) in each bin, as (4, bins)."""
+    there = np.isfinite(values)
+    count, low, high, total = width, values, values, values
+    if not there.all():  # an instrument may send no number with a reading that it marks as bad
+        count = np.add.reduceat(there.astype(np.int64), begins)
+        low, high, total = (np.where(there, values, instead) for instead in (np.inf, -np.inf, 0.0))
+    return np.stack(
+        [
+            np.minimum.reduceat(low, begins),
+            np.maximum.reduceat(high, begins),
+            np.add.reduceat(total, begins) / np.maximum(count, 1),
+            count,
+        ]
+    )

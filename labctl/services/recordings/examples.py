@@ -1,0 +1,53 @@
+"""Recordings to begin with: examples of real gyros that come with labctl, and simulated ones with hidden effects."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from importlib import resources
+from pathlib import Path
+
+from pydantic import Field
+
+from labctl.errors import BadInput
+from labctl.services.commands.protocol import SimulatedRequest
+from labctl.services.recordings.transfer import suggested_model
+from labctl.services.schemas.answers import Imported
+from labctl.services.simulation.recordings import SimulateRequest, make_recording
+from labctl.store import Store
+
+
+class SimulatedRecording(Imported):
+    """A simulated recording that is now in the database."""
+
+    recipe: str
+    bench: str
+    seed: int
+    hidden: dict[str, float] = Field(description="Effect -> size that is hidden in the unit.")
+
+
+def examples() -> dict[str, Path]:
+    """Return the recordings that come with labctl, by name."""
+    home = Path(str(resources.files("labctl"))) / "examples"
+    return {folder.name: folder for folder in sorted(home.iterdir()) if (folder / "recording.toml").is_file()}
+
+
+def example(name: str) -> Path:
+    """Return an example's folder; raises BadInput naming those that there are."""
+    known = examples()
+    if name not in known:
+        raise BadInput(f"no example {name!r} comes with labctl (there are {', '.join(known)})")
+    return known[name]
+
+
+def add_simulated(store: Store, request: SimulatedRequest, at: datetime) -> SimulatedRecording:
+    """Make a recording in simulation and take it in. Raises BadInput, RecipeError, PlanRefused."""
+    asked = SimulateRequest(recipe=request.recipe, hide=request.hide, seed=request.seed, clip=request.clip)
+    made = make_recording(asked, request.serial)
+    recipe, bench, hidden = made.plan.recipe.name, made.bench.name, dict(made.hidden)
+    what = {"recipe": recipe, "bench": bench, "seed": request.seed, "hidden": hidden}
+    number = store.recordings.add_import(made.recording, at, what)
+    return SimulatedRecording(
+        serial=made.recording.info.serial, recording=number, datasets=made.plan.datasets,
+        readings=len(made.recording), suggested_model=suggested_model(made.recording.info), recipe=recipe,
+        bench=bench, seed=request.seed, hidden=hidden,
+    )  # fmt: skip

@@ -1,0 +1,88 @@
+"""The schedule as a person sees it: enter a start, look, cancel."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from instruments.bench_config import BenchFile
+from labctl.errors import BadInput
+from labctl.services.commands.protocol import CampaignRequest
+from labctl.services.planning.loading import limits_of, load_recipe
+from labctl.services.schedule import times
+from labctl.services.schemas.answers import ScheduledAnswer, StartEventAnswer
+from labctl.store import NewStart, StartRow, Store
+from procedures.planning.plan import make_plan
+
+NOBODY = "no service runs: it begins only while `labctl serve` holds this database with bench {bench}"
+
+
+def is_scheduled(request: CampaignRequest) -> bool:
+    """Return whether a request is for later. Raises BadInput for one that contradicts itself."""
+    if request.at is not None and request.cron is not None:
+        raise BadInput("a start has a time or a cron line, not both; leave one out")
+    if request.at is not None or request.cron is not None:
+        if request.hide:
+            raise BadInput("hide: only for a campaign that begins now; leave it out, or the time")
+        return True
+    given = [name for name in ("time_zone", "priority", "late_limit_s") if name in request.model_fields_set]
+    if given:
+        raise BadInput(f"{', '.join(given)}: only for a start with a time or a cron line; name one, or leave it out")
+    return False
+
+
+def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: datetime) -> ScheduledAnswer:
+    """Enter a campaign into the schedule of a bench.
+
+    What can be known now is refused now: raises BadInput for its time, RecipeError, PlanRefused.
+    """
+    zone = times.time_zone(request.time_zone)
+    if request.cron is not None:
+        due = times.check_cron(request.cron, zone, now)
+    else:
+        assert request.at is not None
+        due = times.moment(request.at, zone, now)
+    recipe = load_recipe(request.recipe)
+    make_plan(recipe, limits_of(bench), clip=request.clip)
+    new = NewStart(
+        bench_name=bench.name, recipe_name=recipe.name, recipe=request.recipe, clip=request.clip,
+        priority=request.priority, cron=request.cron, time_zone=zone.key, late_limit_s=request.late_limit_s, due_at=due,
+    )  # fmt: skip
+    row = store.starts.get(store.starts.add(new, now))
+    assumed = request.time_zone is None and (request.cron is not None or not _has_zone(request.at))
+    return _answer(store, row, note=f"{zone.key} is the local time zone, no other was named" if assumed else "")
+
+
+def _has_zone(at: str | None) -> bool:
+    return at == times.NOW or (at is not None and datetime.fromisoformat(at).tzinfo is not None)
+
+
+def list_starts(store: Store, *, ended: bool) -> list[ScheduledAnswer]:
+    """Return what waits to begin, next first; with `ended` also what is over."""
+    return [_answer(store, row) for row in store.starts.all(ended=ended)]
+
+
+def start_status(store: Store, start: int) -> ScheduledAnswer:
+    """Return one entry of the schedule with what became of its starts. Raises NotFound."""
+    return _answer(store, store.starts.get(start))
+
+
+def cancel_start(store: Store, start: int, now: datetime) -> ScheduledAnswer:
+    """Take an entry out of the schedule; a campaign that it has begun runs on. Raises NotFound, Conflict."""
+    store.starts.cancel(start, now)
+    return start_status(store, start)
+
+
+def _answer(store: Store, row: StartRow, note: str = "") -> ScheduledAnswer:
+    zone = times.time_zone(row.time_zone)
+    return ScheduledAnswer(
+        id=row.id, bench=row.bench_name, recipe=row.recipe_name, state=row.state,
+        due_at=row.due_at.astimezone(zone) if row.state == "waiting" else None, time_zone=row.time_zone, cron=row.cron,
+        priority=row.priority, clip=row.clip, late_limit_s=row.late_limit_s, created_at=row.created_at, note=note,
+        history=[
+            StartEventAnswer(
+                at=event.at, due_at=event.due_at.astimezone(zone), outcome=event.outcome, message=event.message,
+                campaign=event.campaign,
+            )
+            for event in store.starts.events(row.id)
+        ],
+    )  # fmt: skip

@@ -1,0 +1,160 @@
+"""Begins scheduled campaigns on a service's bench: one at a time, highest priority first, each start at most once.
+
+A start is claimed in the database before anything is opened, and concluded when its campaign is written down. What a
+process claimed and did not conclude is settled at the next start of a service: begun if a campaign came of it, else due
+again.
+"""
+
+from __future__ import annotations
+
+import threading
+from datetime import datetime, timedelta
+from typing import Protocol
+
+from instruments.clock import Clock
+from instruments.errors import InstrumentError
+from labctl.errors import BenchBusy, LabctlError
+from labctl.services.commands.protocol import CampaignRequest
+from labctl.services.schedule import times
+from labctl.services.schemas.answers import CampaignAnswer
+from labctl.store import StartEventRow, StartRow, Store
+from procedures.contracts.errors import ProcedureError
+
+POLL_S = 1.0
+#: A start within this is on time: the schedule is looked at once a second, and a service takes a while to start.
+GRACE_S = 60.0
+
+
+class Runs(Protocol):
+    """Who runs campaigns on the bench."""
+
+    @property
+    def free(self) -> bool:
+        """Whether a campaign may begin now."""
+        ...
+
+    def take_up_cut_short(self) -> None:
+        """Take up what was cut short, once that may be."""
+        ...
+
+    def start(self, request: CampaignRequest) -> CampaignAnswer:
+        """Begin a campaign."""
+        ...
+
+
+class Scheduler:
+    """The queue of one bench."""
+
+    def __init__(self, store: Store, clock: Clock, runner: Runs, bench_name: str) -> None:
+        self._store, self._clock, self._runner, self._bench = store, clock, runner, bench_name
+        self._guard = threading.Lock()
+        self._over = threading.Event()
+        self._thread: threading.Thread | None = None
+        self.trouble = ""  #: why the schedule could not be looked at
+        self._owes = False  #: what became of a start could not be written down
+
+    def start(self) -> None:
+        """Settle what an earlier process left, then look at the schedule from now on, in a thread."""
+        self.settle()
+        self._thread = threading.Thread(target=self._watch, name="scheduler", daemon=True)
+        self._thread.start()
+
+    def end_soon(self) -> None:
+        """Begin nothing more; returns at once."""
+        self._over.set()
+
+    def close(self) -> None:
+        """Begin nothing more."""
+        self.end_soon()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _watch(self) -> None:
+        while not self._over.wait(self._clock.wall_s(POLL_S)):
+            try:
+                self.tick()
+                self.trouble = ""
+            except Exception as error:  # noqa: BLE001  a schedule that nobody looks at any more would be worse
+                self.trouble = f"{type(error).__name__}: {error}"
+
+    def settle(self) -> None:
+        """Conclude what an earlier process claimed: begun if a campaign came of it, else due again."""
+        now = self._clock.utc()
+        for event in self._store.starts.open_claims(self._bench):
+            came = [
+                row.id
+                for row in self._store.campaigns.all()
+                if row.id > event.after_campaign and row.bench_name == self._bench
+            ]
+            if came:
+                self._store.starts.conclude(event, now, "started", f"campaign {min(came)} began", min(came))
+            else:
+                self._store.starts.put_back(event)
+
+    def tick(self) -> None:
+        """Go on with what was cut short, drop what is too late, then begin what is due and goes first.
+
+        Raises StoreError.
+        """
+        with self._guard:
+            if self._owes:
+                self.settle()
+                self._owes = False
+            self._runner.take_up_cut_short()
+            now = self._clock.utc()
+            for row in self._store.starts.due(self._bench, now):
+                due = row.due_at if row.cron is None else self._last_due(row, row.cron, now)
+                late_s = (now - due).total_seconds()
+                if row.late_limit_s is not None and late_s > max(row.late_limit_s, GRACE_S):
+                    message = f"missed: {_span(late_s)} late, the limit is {_span(row.late_limit_s)}"
+                    self._store.starts.take(row, due, self._next(row, now), now, "missed", message)
+                elif self._runner.free:
+                    self._begin(row, due, now)
+
+    @staticmethod
+    def _last_due(row: StartRow, cron: str, now: datetime) -> datetime:
+        """Return the newest of the times that came; earlier ones that were missed are one with it."""
+        return times.last_due(cron, times.time_zone(row.time_zone), row.due_at, now)
+
+    @staticmethod
+    def _next(row: StartRow, now: datetime) -> datetime | None:
+        if row.cron is None:
+            return None
+        return times.next_due(row.cron, times.time_zone(row.time_zone), now)
+
+    def _begin(self, row: StartRow, due: datetime, now: datetime) -> None:
+        starts = self._store.starts
+        claim = starts.take(row, due, self._next(row, now), now, "claimed", "is being started")
+        if claim is None:
+            return
+        self._owes = True
+        self._start(claim, row, due, now)
+        self._owes = False
+
+    def _start(self, claim: StartEventRow, row: StartRow, due: datetime, now: datetime) -> None:
+        starts = self._store.starts
+        try:
+            campaign = self._runner.start(CampaignRequest(recipe=row.recipe, clip=row.clip)).id
+        except BenchBusy:  # somebody was quicker: it waits its turn
+            starts.put_back(claim)
+        except (LabctlError, InstrumentError, ProcedureError) as error:
+            starts.conclude(claim, self._clock.utc(), "refused", str(error))
+        except Exception as error:
+            starts.conclude(claim, self._clock.utc(), "refused", f"{type(error).__name__}: {error}")
+            raise
+        else:
+            late = now - due
+            text = f", {_span(late.total_seconds())} late" if late > timedelta(seconds=GRACE_S) else ""
+            starts.conclude(claim, self._clock.utc(), "started", f"campaign {campaign} began{text}", campaign)
+
+
+def _span(seconds: float) -> str:
+    """Write a time span as a person says it."""
+    minutes = round(seconds / 60)
+    return (
+        f"{seconds:.0f} s"
+        if minutes < 2
+        else f"{minutes // 60} h {minutes % 60:02d} min"
+        if minutes >= 60
+        else f"{minutes} min"
+    )

@@ -1,0 +1,1 @@
+"""Recordings made in the simulated world, with effects hidden in the unit."""

@@ -1,0 +1,1 @@
+"""The connection to the database: one writer, locked beside the file."""

@@ -1,0 +1,87 @@
+"""A copy of an SQLite database while others go on writing to it: one file, verified, on the disk, or nothing."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sqlite3
+import tempfile
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from labctl.errors import BadInput, StoreError
+from labctl.store.connection.database import is_url
+
+CHUNK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Copy:
+    """A backup that is on the disk under its own name."""
+
+    path: Path
+    bytes: int
+    sha256: str
+
+
+def copy_database(location: str, target: Path) -> Copy:
+    """Copy a database into a new file, at one instant of its history, through SQLite's own backup.
+
+    Raises BadInput when the file exists or the database is not SQLite's, StoreError when the copy is not whole; then
+    nothing is left of it.
+    """
+    if is_url(location):
+        raise BadInput(f"{location.partition('://')[0]} database: use the server's own tool (pg_dump) to back it up")
+    if not Path(location).is_file():
+        raise StoreError(f"{location}: there is no such file; name the database with --database")
+    _refuse_existing(target)
+    if not target.absolute().parent.is_dir():
+        raise BadInput(f"{target}: the folder does not exist; make it first")
+    handle, name = tempfile.mkstemp(dir=target.absolute().parent, prefix=f".{target.name}-")
+    os.close(handle)
+    made = Path(name)
+    try:
+        _copy(location, made)
+        digest = _synced_digest(made)
+        _refuse_existing(target)
+        made.rename(target)
+        _sync_folder(target.absolute().parent)
+    except sqlite3.Error as error:
+        raise StoreError(f"{target}: the copy of {location} is not whole ({error}); nothing was kept of it") from error
+    finally:
+        for left in (made, Path(f"{name}-wal"), Path(f"{name}-shm"), Path(f"{name}-journal")):
+            left.unlink(missing_ok=True)
+    return Copy(target, target.stat().st_size, digest)
+
+
+def _refuse_existing(target: Path) -> None:
+    if target.exists() or target.is_symlink():
+        raise BadInput(f"{target}: exists already; a backup is never written over another, name a new file")
+
+
+def _copy(location: str, made: Path) -> None:
+    with closing(sqlite3.connect(location)) as source, closing(sqlite3.connect(made)) as copy:
+        source.execute("PRAGMA query_only=ON")
+        source.backup(copy)  # in one go, from one snapshot; the writer is not kept waiting
+        copy.execute("PRAGMA journal_mode=DELETE")  # one file, with no log beside it
+        found = [row[0] for row in copy.execute("PRAGMA integrity_check(1)")]
+        if found != ["ok"]:
+            raise sqlite3.DatabaseError(found[0])
+
+
+def _synced_digest(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+        while chunk := file.read(CHUNK):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def _sync_folder(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

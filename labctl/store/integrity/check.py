@@ -1,0 +1,218 @@
+"""Is everything in a database what was written? Looks at all of it, in one snapshot, and changes nothing."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sqlalchemy as sa
+from numpy.typing import NDArray
+
+from labctl.calibration import read_calibration
+from labctl.errors import BadCalibrationFile, StoreError
+from labctl.store import migrate, sample_codec
+from labctl.store.connection.commit_counter import missing
+from labctl.store.connection.database import Database, is_url
+from labctl.store.integrity.check_means import KeptMeans
+from labctl.store.repositories.audit import Head, first_broken
+from labctl.store.repositories.recordings import WHOLE_TABLE
+from labctl.store.schema import tables
+
+#: Blocks that are in memory at a time.
+AT_ONCE = 64
+
+Progress = Callable[[str, int, int], None]  #: which part, how far, of how many
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is not as it was written: in which part, and what."""
+
+    part: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was looked at, and what was found."""
+
+    findings: tuple[Finding, ...]
+    blocks: int
+    calibrations: int
+    audit_rows: int
+
+
+class _Nothing:
+    def __call__(self, part: str, done: int, total: int) -> None:
+        """Tell nobody."""
+
+
+@contextmanager
+def _looking(location: str) -> Iterator[Database]:
+    with closing(Database(location, write=False, as_it_is=True)) as database:
+        yield database
+
+
+def check(location: str, *, anchor: Head | None = None, progress: Progress | None = None) -> Checked:
+    """Check a database by path or URL. Raises StoreError when there is none."""
+    looked = _Look(location, anchor, progress or _Nothing())
+    with _looking(location) as database:
+        try:
+            with database.reading() as connection:
+                looked.at_all(connection)
+        except StoreError as error:  # what is damaged need not answer any question
+            looked.find("file", str(error))
+    return Checked(tuple(looked.findings), looked.blocks, looked.calibrations, looked.audit_rows)
+
+
+class _Look:
+    """One walk through a database."""
+
+    def __init__(self, location: str, anchor: Head | None, progress: Progress) -> None:
+        self._location = location
+        self._anchor = anchor
+        self._progress = progress
+        self.findings: list[Finding] = []
+        self.blocks = self.calibrations = self.audit_rows = 0
+
+    def find(self, part: str, text: str) -> None:
+        """Note something down."""
+        self.findings.append(Finding(part, " ".join(text.split())))
+
+    def at_all(self, connection: sa.Connection) -> None:
+        """Look at every part; one that cannot be read does not keep the others from being looked at."""
+        if not is_url(self._location) and (text := missing(connection, self._location)):
+            self.find("file", text)
+        for part, look in (("file", self._at_file), ("schema", self._at_schema)):
+            if not self._tried(part, look, connection):
+                return
+        parts = (("readings", self._at_readings), ("calibrations", self._at_calibrations), ("audit", self._at_audit))
+        for part, look in parts:
+            self._tried(part, look, connection)
+
+    def _tried(self, part: str, look: Callable[[sa.Connection], bool], connection: sa.Connection) -> bool:
+        self._progress(part, 0, 0)
+        try:
+            return look(connection)
+        except sa.exc.DatabaseError as error:
+            self.find(part, f"cannot be read: {error.orig}")
+        except (ValueError, TypeError) as error:  # the row is there, its content is of another kind
+            self.find(part, f"cannot be read: {error}")
+        return part != "schema"
+
+    def _at_file(self, connection: sa.Connection) -> bool:
+        if is_url(self._location):
+            return True
+        for (text,) in connection.exec_driver_sql("PRAGMA integrity_check(20)"):
+            if text != "ok":
+                self.find("file", text)
+        for table, row, parent, _ in connection.exec_driver_sql("PRAGMA foreign_key_check"):
+            self.find("file", f"row {row} of {table} names a row of {parent} that is not there")
+        return True
+
+    def _at_schema(self, connection: sa.Connection) -> bool:
+        found = migrate.revision_of(connection)
+        if found == migrate.HEAD:
+            return True
+        if found is None:
+            self.find("schema", "this is not a labctl database, or all of it is lost: there are no tables")
+        else:
+            hint = "any other command brings it there" if found in migrate.KNOWN else "use a newer labctl"
+            self.find("schema", f"the database is at step {found}, this labctl at {migrate.HEAD}: {hint}")
+        return False
+
+    def _at_readings(self, connection: sa.Connection) -> bool:
+        b, d, r = tables.sample_blocks.c, tables.data_sets.c, tables.recordings.c
+        kinds = {int(number): kind for number, kind in connection.execute(sa.select(r.id, r.kind))}
+        valid = self._valid_readings(connection, int(connection.scalar(sa.select(sa.func.count(b.id))) or 0))
+        known = set()
+        for recording, number, state, n in connection.execute(sa.select(d.recording_id, d.number, d.state, d.n)):
+            known.add((recording, number))
+            found = valid.get((recording, number), 0)
+            if kinds.get(recording) == "samples" and state != "open" and found is not None and found != n:
+                self.find(
+                    "readings", f"recording {recording} data set {number} counts {n} valid readings, holds {found}"
+                )
+        for recording, kind in kinds.items():
+            if kind != "samples" and (recording, WHOLE_TABLE) not in valid:
+                self.find("readings", f"recording {recording} ({kind}) has lost its table")
+        for recording, number in sorted(valid.keys() - known):
+            if number != WHOLE_TABLE:
+                self.find("readings", f"recording {recording} holds readings of data set {number}, which is not there")
+        return True
+
+    def _valid_readings(self, connection: sa.Connection, total: int) -> dict[tuple[int, int], int | None]:
+        """Unpack every block; returns (recording, data set) -> valid readings, None where a block is damaged."""
+        b = tables.sample_blocks.c
+        query = sa.select(b.recording_id, b.number, b.seq, b.n, b.codec, b.crc32, b.data)
+        ordered = query.order_by(b.recording_id, b.number, b.seq).execution_options(yield_per=AT_ONCE)
+        valid: dict[tuple[int, int], int | None] = {}
+        expected: dict[tuple[int, int], int] = {}
+        means: KeptMeans | None = None
+        for recording, number, seq, n, codec, crc32, data in connection.execute(ordered):
+            place = (recording, number)
+            if seq != expected.get(place, 0):
+                self.find("readings", f"recording {recording} data set {number}: blocks before block {seq} are missing")
+                valid[place] = None
+            expected[place] = seq + 1
+            where = f"recording {recording} data set {number}"
+            columns = self._unpacked(f"{where} block {seq}", sample_codec.Block(n, codec, crc32, data))
+            before, found = valid.get(place, 0), None if columns is None else _count(columns, n)
+            valid[place] = None if found is None or before is None else before + found
+            if columns is not None and seq == 0:  # of a data set that is not closed, in several blocks, nothing is kept
+                if means is None or means.recording != recording:
+                    means = KeptMeans(connection, recording)
+                for text in means.complaints(number, columns):
+                    self.find("readings", f"{where}: {text}")
+            self.blocks += 1
+            if self.blocks % AT_ONCE == 0:
+                self._progress("readings", self.blocks, total)
+        return valid
+
+    def _unpacked(self, place: str, block: sample_codec.Block) -> dict[str, NDArray[Any]] | None:
+        try:
+            columns = sample_codec.unpack(block)
+        except StoreError as error:
+            self.find("readings", f"{place}: {error}")
+            return None
+        except (
+            ValueError,
+            TypeError,
+            LookupError,
+            RuntimeError,
+            struct.error,
+        ) as error:  # the checksum fits, the content does not
+            self.find("readings", f"{place}: cannot be unpacked ({error})")
+            return None
+        if any(len(values) != block.n for values in columns.values()):
+            self.find("readings", f"{place}: its columns are not the {block.n} readings that it counts")
+            return None
+        return columns
+
+    def _at_calibrations(self, connection: sa.Connection) -> bool:
+        c = tables.calibrations.c
+        for serial, version, own, document in connection.execute(sa.select(c.serial, c.version, c.hash, c.document)):
+            self.calibrations += 1
+            try:
+                calibration = read_calibration(document if isinstance(document, bytes) else str(document).encode())
+            except BadCalibrationFile as error:
+                self.find("calibrations", f"{serial} version {version}: {error}")
+                continue
+            if (calibration.serial, calibration.version, calibration.hash) != (serial, version, own):
+                said = f"{calibration.serial} version {calibration.version}"
+                self.find("calibrations", f"{serial} version {version}: its document is another one ({said})")
+        return True
+
+    def _at_audit(self, connection: sa.Connection) -> bool:
+        self.audit_rows = int(connection.scalar(sa.select(sa.func.count(tables.audit.c.id))) or 0)
+        if broken := first_broken(connection, self._anchor):
+            self.find("audit", f"row {broken.row}: {broken.what}")
+        return True
+
+
+def _count(columns: dict[str, NDArray[Any]], n: int) -> int:
+    return int(np.count_nonzero(columns["valid"])) if "valid" in columns else n

@@ -1,0 +1,55 @@
+"""Numbered steps from an empty database to today's tables; they ship inside the package.
+
+Alembic takes a tenth of a second to load, so it is only asked when there is a step to take: where a database stands is
+one row of its table, and which steps there are is the names of their files.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import sqlalchemy as sa
+
+from labctl.errors import StoreError
+
+if TYPE_CHECKING:
+    from alembic.config import Config
+
+FOLDER = Path(__file__).parent / "migrations"
+KNOWN = frozenset(path.stem.partition("_")[0] for path in (FOLDER / "versions").glob("[0-9]*.py"))
+HEAD = max(KNOWN)
+STANDS_AT = sa.table("alembic_version", sa.column("version_num"))
+
+
+def configuration(connection: sa.Connection | None = None) -> Config:
+    """Return Alembic's settings, for a connection or for writing SQL."""
+    from alembic.config import Config  # noqa: PLC0415  as above
+
+    config = Config()
+    config.set_main_option("script_location", str(FOLDER))
+    config.attributes["connection"] = connection
+    return config
+
+
+def revision_of(connection: sa.Connection) -> str | None:
+    """Return the step at which a database stands; None for an empty one."""
+    if not sa.inspect(connection).has_table(STANDS_AT.name):
+        return None
+    return connection.scalar(sa.select(STANDS_AT.c.version_num))
+
+
+def refuse_unknown(revision: str | None, location: str) -> None:
+    """Raise StoreError when a database stands at a step that this code does not know."""
+    if revision is not None and revision not in KNOWN:
+        raise StoreError(
+            f"{location}: the database is at step {revision!r}, which is newer than this labctl (step {HEAD!r}); "
+            "use the labctl that made it, or a newer one. Nothing was changed"
+        )
+
+
+def upgrade(connection: sa.Connection) -> None:
+    """Bring a database to today's tables, inside the transaction of `connection`."""
+    from alembic import command  # noqa: PLC0415  as above
+
+    command.upgrade(configuration(connection), "head")

@@ -1,0 +1,180 @@
+"""Calibrations: immutable, numbered per unit; certification is a record beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Literal
+
+import sqlalchemy as sa
+
+from labctl.errors import Conflict, NotCertified, NotFound
+from labctl.store.connection.database import Database
+from labctl.store.records import CalibrationRecord, CertificationRow
+from labctl.store.repositories.audit import append
+from labctl.store.schema import tables
+
+
+def _document_query() -> sa.Select[bytes, str]:
+    c = tables.calibrations.c
+    return sa.select(c.document, c.hash).where(c.serial == sa.bindparam("serial"))
+
+
+def _in_force_query() -> sa.Select[bytes, str]:
+    x = tables.certifications.c
+    last = sa.select(sa.func.max(x.id)).where(x.serial == sa.bindparam("serial")).scalar_subquery()
+    act = sa.select(x.version).where(x.id == last, x.act == "certify").scalar_subquery()
+    return _document_query().where(tables.calibrations.c.version == act)
+
+
+#: Made once: what every GET asks.
+_DOCUMENT = _document_query().where(tables.calibrations.c.version == sa.bindparam("version"))
+_IN_FORCE = _in_force_query()
+
+
+@dataclass(frozen=True)
+class NewCalibration:
+    """A calibration about to be kept; `document` and `answer` know their version number."""
+
+    parent: int | None
+    recording: int | None
+    model: str
+    document: bytes
+    hash: str
+    answer: dict[str, Any]
+
+
+class Calibrations:
+    """Every calibration of every unit."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, serial: str, at: datetime, build: Callable[[int], NewCalibration]) -> CalibrationRecord:
+        """Keep a unit's next version; `build` is given its number."""
+        c = tables.calibrations
+        with self._database.writing() as connection:
+            last = connection.scalar(sa.select(sa.func.max(c.c.version)).where(c.c.serial == serial))
+            version = int(last or 0) + 1
+            new = build(version)
+            connection.execute(
+                sa.insert(c).values(
+                    serial=serial,
+                    version=version,
+                    parent=new.parent,
+                    recording_id=new.recording,
+                    model=new.model,
+                    created_at=at,
+                    hash=new.hash,
+                    document=new.document,
+                    answer=new.answer,
+                )
+            )
+            detail = {"model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash}
+            act = "fit" if new.parent is None else "improve"
+            append(connection, at, act, f"{serial} version {version}", detail)
+        return CalibrationRecord(
+            serial, version, new.parent, new.recording, new.model, at, new.hash, new.document, new.answer
+        )
+
+    def get(self, serial: str, version: int) -> CalibrationRecord:
+        """Return one version; raises NotFound."""
+        rows = self._rows(tables.calibrations.c.serial == serial, tables.calibrations.c.version == version)
+        if not rows:
+            raise NotFound(f"unit {serial!r} has no calibration version {version}")
+        return rows[0]
+
+    def of_unit(self, serial: str) -> list[CalibrationRecord]:
+        """Return every version of a unit, newest first."""
+        return self._rows(tables.calibrations.c.serial == serial)
+
+    def _rows(self, *conditions: sa.ColumnElement[bool]) -> list[CalibrationRecord]:
+        c = tables.calibrations.c
+        query = sa.select(
+            c.serial, c.version, c.parent, c.recording_id, c.model, c.created_at, c.hash, c.document, c.answer
+        ).where(*conditions)
+        with self._database.reading() as connection:
+            return [CalibrationRecord(*row) for row in connection.execute(query.order_by(c.version.desc()))]
+
+    def certified_version(self, serial: str) -> int:
+        """Return the version in force; raises NotCertified."""
+        act = self._last_act(serial)
+        if act is None or act.act != "certify":
+            raise NotCertified(
+                f"unit {serial!r} has no certified calibration; "
+                f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts one in force, "
+                "`--version N` names one that is not"
+            )
+        return act.version
+
+    def _last_act(self, serial: str) -> CertificationRow | None:
+        x = tables.certifications.c
+        query = sa.select(x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at).where(x.serial == serial)
+        with self._database.reading() as connection:
+            row = connection.execute(query.order_by(x.id.desc()).limit(1)).first()
+        return None if row is None else CertificationRow(*row)
+
+    def certify(
+        self,
+        serial: str,
+        version: int,
+        act: Literal["certify", "revoke"],
+        *,
+        by: str,
+        reason: str,
+        at: datetime,
+        due_at: datetime | None = None,
+        who: str | None = None,
+    ) -> CertificationRow:
+        """Put a version in force, or take the one in force out of it. Raises NotFound, Conflict.
+
+        `by` is the person who answers for it; `who` did it, where that is known better than by whose word.
+        """
+        self.get(serial, version)
+        last = self._last_act(serial)
+        in_force = last.version if last is not None and last.act == "certify" else None
+        if act == "revoke" and in_force != version:
+            raise Conflict(f"{serial} version {version} is not in force (in force: {in_force or 'none'})")
+        row = CertificationRow(serial, version, act, by, reason, at, due_at)
+        with self._database.writing() as connection:
+            connection.execute(
+                sa.insert(tables.certifications).values(
+                    serial=serial, version=version, act=act, by=by, reason=reason, at=at, due_at=due_at
+                )
+            )
+            detail = {"by": by, "reason": reason, "due": due_at.isoformat() if due_at else None}
+            append(connection, at, act, f"{serial} version {version}", detail, who=who or by)
+        return row
+
+    def document(self, serial: str, version: int | None) -> tuple[bytes, str]:
+        """Return the bytes and hash of a version, or of the one in force: the point read behind every GET."""
+        with self._database.reading() as connection:
+            if version is None:
+                row = connection.execute(_IN_FORCE, {"serial": serial}).first()
+            else:
+                row = connection.execute(_DOCUMENT, {"serial": serial, "version": version}).first()
+        if row is not None:
+            return bytes(row[0]), str(row[1])
+        with self._database.reading() as connection:
+            known = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial))
+        if known is None:
+            raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign brings one in")
+        if version is None:
+            self.certified_version(serial)  # says why there is none
+        raise NotFound(f"unit {serial!r} has no calibration version {version}")
+
+    def history(self, serial: str) -> list[CertificationRow]:
+        """Return every act of certifying and revoking, newest first."""
+        x = tables.certifications.c
+        query = sa.select(x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at).where(x.serial == serial)
+        with self._database.reading() as connection:
+            return [CertificationRow(*row) for row in connection.execute(query.order_by(x.id.desc()))]
+
+    def versions(self, serial: str) -> list[int]:
+        """Return a unit's version numbers, rising."""
+        c = tables.calibrations.c
+        with self._database.reading() as connection:
+            return [
+                int(v) for v in connection.scalars(sa.select(c.version).where(c.serial == serial).order_by(c.version))
+            ]

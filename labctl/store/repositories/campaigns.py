@@ -1,0 +1,185 @@
+"""Campaigns: the plan as rows, written down before the first move, and what became of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Literal
+
+import sqlalchemy as sa
+
+from labctl.errors import NotFound
+from labctl.recording import RecordingInfo
+from labctl.store.connection.database import Database
+from labctl.store.records import CampaignRow, EventRow, NewUnit, StepRow
+from labctl.store.repositories.audit import append
+from labctl.store.repositories.journal import StoreJournal
+from labctl.store.repositories.recordings import new_recording
+from labctl.store.schema import tables
+
+
+@dataclass(frozen=True)
+class NewCampaign:
+    """What a campaign starts from."""
+
+    recipe_name: str
+    recipe: Mapping[str, Any]
+    bench_name: str
+    bench: Mapping[str, Any]
+    schedule_hash: str
+    expected_s: float
+    steps: Sequence[Mapping[str, Any]]  #: JSON of every step, in order; `kind` and `expected_s` among the keys
+    units: Sequence[NewUnit]
+    boot_id: str | None = None  #: of the host that runs it
+
+
+class Campaigns:
+    """Runs of recipes on benches."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def create(self, new: NewCampaign, at: datetime) -> int:
+        """Write down a whole campaign before anything moves; returns its number."""
+        with self._database.writing() as connection:
+            self._remember_bench(connection, new, at)
+            row = sa.insert(tables.campaigns).values(
+                recipe_name=new.recipe_name,
+                recipe=dict(new.recipe),
+                bench_name=new.bench_name,
+                bench=dict(new.bench),
+                schedule_hash=new.schedule_hash,
+                expected_s=new.expected_s,
+                state="planned",
+                reason="",
+                created_at=at,
+                boot_id=new.boot_id,
+            )
+            number = int(connection.scalar(row.returning(tables.campaigns.c.id)) or 0)
+            connection.execute(
+                sa.insert(tables.steps),
+                [
+                    {
+                        "campaign_id": number,
+                        "number": index,
+                        "kind": step["kind"],
+                        "body": dict(step),
+                        "expected_s": step["expected_s"],
+                        "state": "planned",
+                    }
+                    for index, step in enumerate(new.steps)
+                ],
+            )
+            for unit in new.units:
+                info = RecordingInfo.model_validate(unit.info)
+                new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
+            what: dict[str, Any] = {
+                "recipe": new.recipe_name,
+                "bench": new.bench_name,
+                "units": [str(unit.info["serial"]) for unit in new.units],
+                "schedule_hash": new.schedule_hash,
+            }
+            if hidden := (new.bench.get("simulation") or {}).get("hidden"):
+                what["hidden"] = hidden
+            append(connection, at, "campaign start", f"campaign {number}", what)
+        return number
+
+    @staticmethod
+    def _remember_bench(connection: sa.Connection, new: NewCampaign, at: datetime) -> None:
+        b = tables.benches
+        values = {"file": dict(new.bench), "last_used_at": at}
+        changed = connection.execute(sa.update(b).where(b.c.name == new.bench_name).values(**values))
+        if changed.rowcount == 0:
+            connection.execute(sa.insert(b).values(name=new.bench_name, **values))
+
+    def journal(self, campaign: int) -> StoreJournal:
+        """Return the journal that a run of this campaign is written to."""
+        return StoreJournal(self._database, campaign)
+
+    def get(self, campaign: int) -> CampaignRow:
+        """Return one campaign; raises NotFound."""
+        found = self._rows(tables.campaigns.c.id == campaign)
+        if not found:
+            raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows them")
+        return found[0]
+
+    def newest(self) -> CampaignRow:
+        """Return the campaign made last; raises NotFound when there is none."""
+        found = self._rows(tables.campaigns.c.id == sa.select(sa.func.max(tables.campaigns.c.id)).scalar_subquery())
+        if not found:
+            raise NotFound("there is no campaign in this database yet; `labctl campaign start RECIPE` makes one")
+        return found[0]
+
+    def all(self) -> list[CampaignRow]:
+        """Return every campaign, newest first."""
+        return self._rows(sa.true())
+
+    def _rows(self, condition: sa.ColumnElement[bool]) -> list[CampaignRow]:
+        c, r = tables.campaigns.c, tables.recordings.c
+        query = sa.select(
+            c.id, c.recipe_name, c.recipe, c.bench_name, c.bench, c.schedule_hash, c.expected_s, c.state, c.reason,
+            c.created_at, c.started_at, c.ended_at,
+        )  # fmt: skip
+        with self._database.reading() as connection:
+            rows = [dict(row) for row in connection.execute(query.where(condition).order_by(c.id.desc())).mappings()]
+            made = connection.execute(sa.select(r.campaign_id, r.serial, r.id).where(r.campaign_id.is_not(None))).all()
+        recordings: dict[int, dict[str, int]] = {}
+        for campaign, serial, recording in made:
+            recordings.setdefault(campaign, {})[serial] = recording
+        return [CampaignRow(**row, recordings=recordings.get(row["id"], {})) for row in rows]
+
+    def steps(self, campaign: int) -> list[StepRow]:
+        """Return the whole plan with what became of each step."""
+        s = tables.steps.c
+        query = (
+            sa.select(s.number, s.kind, s.body, s.expected_s, s.state, s.started_s, s.ended_s, s.result)
+            .where(s.campaign_id == campaign)
+            .order_by(s.number)
+        )
+        with self._database.reading() as connection:
+            return [StepRow(*row) for row in connection.execute(query)]
+
+    def events(self, campaign: int, after: int = 0, limit: int = 1000) -> list[EventRow]:
+        """Return events in order, those with a number above `after`."""
+        e = tables.events.c
+        query = (
+            sa.select(
+                e.id, e.campaign_id, e.at, e.t_s, e.kind, e.level, e.message, e.device, e.value, e.limit_value, e.unit
+            )
+            .where(e.campaign_id == campaign, e.id > after)
+            .order_by(e.id)
+            .limit(limit)
+        )
+        with self._database.reading() as connection:
+            return [EventRow(*row) for row in connection.execute(query)]
+
+    def last_environment(self, campaign: int) -> Mapping[str, Any] | None:
+        """Return the newest environment row of a campaign: temperatures as they were logged last."""
+        e, r = tables.environment.c, tables.recordings.c
+        query = (
+            sa.select(e.t_s, e.temperature_c, e.chamber_c, e.chamber_setpoint_c)
+            .join(tables.recordings, r.id == e.recording_id)
+            .where(r.campaign_id == campaign)
+            .order_by(e.id.desc())
+            .limit(1)
+        )
+        with self._database.reading() as connection:
+            row = connection.execute(query).mappings().first()
+        return None if row is None else dict(row)
+
+    def unfinished(self) -> list[CampaignRow]:
+        """Return campaigns that a process left without an end."""
+        return self._rows(tables.campaigns.c.state.in_(("planned", "running", "paused", "waiting", "interrupted")))
+
+    def close_unfinished(
+        self, campaign: int, reason: str, at: datetime, state: Literal["failed", "aborted"] = "failed"
+    ) -> None:
+        """Mark a campaign that nobody runs any more as over, saying why."""
+        with self._database.writing() as connection:
+            connection.execute(
+                sa.update(tables.campaigns)
+                .where(tables.campaigns.c.id == campaign)
+                .values(state=state, reason=reason, ended_at=at)
+            )
+            append(connection, at, "campaign state", f"campaign {campaign}", {"state": state, "reason": reason})

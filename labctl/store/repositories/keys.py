@@ -1,0 +1,59 @@
+"""API keys: names, roles, and digests of keys that nobody here knows."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+import sqlalchemy as sa
+
+from labctl.errors import Conflict, NotFound
+from labctl.store.connection.database import Database
+from labctl.store.records import KeyRow
+from labctl.store.repositories.audit import append
+from labctl.store.schema import tables
+
+_k = tables.api_keys.c
+_ALL = sa.select(_k.name, _k.role, _k.digest, _k.created_at, _k.revoked_at)
+#: Made once: asked by every request that carries a key.
+_BY_DIGEST = _ALL.where(_k.digest == sa.bindparam("digest"))
+
+
+class Keys:
+    """Every key that was ever made; a revoked one stays, without power."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, name: str, role: str, digest: str, at: datetime) -> KeyRow:
+        """Keep a new key's digest. Raises Conflict when the name was used before."""
+        with self._database.writing() as connection:
+            if connection.scalar(sa.select(_k.name).where(_k.name == name)) is not None:
+                raise Conflict(f"key {name!r} was made before; a name is used once, also after a revocation")
+            connection.execute(
+                sa.insert(tables.api_keys).values(name=name, role=role, digest=digest, created_at=at, revoked_at=None)
+            )
+            append(connection, at, "key create", f"key {name}", {"role": role})
+        return KeyRow(name, role, digest, at, None)
+
+    def revoke(self, name: str, reason: str, at: datetime) -> KeyRow:
+        """Take a key's power away, at once. Raises NotFound, Conflict when it was revoked before."""
+        with self._database.writing() as connection:
+            row = connection.execute(_ALL.where(_k.name == name)).first()
+            if row is None:
+                raise NotFound(f"there is no key {name!r}; `labctl key list` shows them")
+            if row.revoked_at is not None:
+                raise Conflict(f"key {name!r} was revoked before, at {row.revoked_at.isoformat()}")
+            connection.execute(sa.update(tables.api_keys).where(_k.name == name).values(revoked_at=at))
+            append(connection, at, "key revoke", f"key {name}", {"role": row.role, "reason": reason})
+        return KeyRow(row.name, row.role, row.digest, row.created_at, at)
+
+    def all(self) -> list[KeyRow]:
+        """Return every key, by name."""
+        with self._database.reading() as connection:
+            return [KeyRow(*row) for row in connection.execute(_ALL.order_by(_k.name))]
+
+    def by_digest(self, digest: str) -> KeyRow | None:
+        """Return the key of a digest, in force or not; None when there is none."""
+        with self._database.reading() as connection:
+            row = connection.execute(_BY_DIGEST, {"digest": digest}).first()
+        return None if row is None else KeyRow(*row)

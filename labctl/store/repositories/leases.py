@@ -1,0 +1,74 @@
+"""Leases: who may drive which bench. One row per bench; taking it over compares and swaps in one transaction."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from datetime import datetime
+
+import sqlalchemy as sa
+
+from labctl.store.connection.database import Database
+from labctl.store.schema import tables
+
+
+@dataclass(frozen=True)
+class LeaseRow:
+    """Who holds a bench. `machine` names the place where `pid` means something; empty when that is not known."""
+
+    bench_name: str
+    owner: str  #: one for each time that a bench is held
+    host: str
+    machine: str
+    pid: int
+    since: datetime
+    beat: int  #: counts renewals: a lease that lives is one whose beat changes
+    beat_at: datetime
+    expires_at: datetime
+
+
+class Leases:
+    """The leases on the benches of one database."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def holder(self, bench_name: str) -> LeaseRow | None:
+        """Return who holds a bench; None when nobody does."""
+        x = tables.leases.c
+        query = sa.select(
+            x.bench_name, x.owner, x.host, x.machine, x.pid, x.since, x.beat, x.beat_at, x.expires_at
+        ).where(x.bench_name == bench_name)
+        with self._database.reading() as connection:
+            row = connection.execute(query).first()
+        return None if row is None else LeaseRow(*row)
+
+    def claim(self, lease: LeaseRow, replacing: LeaseRow | None) -> bool:
+        """Take a bench that nobody holds, or from the holder `replacing` as it was seen; False when that changed."""
+        x = tables.leases
+        try:
+            with self._database.writing() as connection:
+                if replacing is None:
+                    connection.execute(sa.insert(x).values(**asdict(lease)))
+                    return True
+                seen = (
+                    x.c.bench_name == lease.bench_name,
+                    x.c.owner == replacing.owner,
+                    x.c.beat == replacing.beat,
+                )
+                return connection.execute(sa.update(x).where(*seen).values(**asdict(lease))).rowcount == 1
+        except sa.exc.IntegrityError:
+            return False
+
+    def renew(self, bench_name: str, owner: str, at: datetime, expires_at: datetime) -> bool:
+        """Prolong a lease; False when it is no longer the owner's."""
+        x = tables.leases
+        mine = sa.update(x).where(x.c.bench_name == bench_name, x.c.owner == owner)
+        with self._database.writing(synced=False) as connection:
+            changed = connection.execute(mine.values(beat=x.c.beat + 1, beat_at=at, expires_at=expires_at))
+        return changed.rowcount == 1
+
+    def release(self, bench_name: str, owner: str) -> None:
+        """Let a bench go; nothing happens when the lease is another's by now."""
+        x = tables.leases
+        with self._database.writing() as connection:
+            connection.execute(sa.delete(x).where(x.c.bench_name == bench_name, x.c.owner == owner))

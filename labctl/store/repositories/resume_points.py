@@ -1,0 +1,183 @@
+"""Campaigns that a process left without an end: where they stand, and taking them up in one transaction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+
+import sqlalchemy as sa
+
+from labctl.errors import Conflict
+from labctl.store.connection.database import Database
+from labctl.store.repositories.audit import append
+from labctl.store.repositories.journal import StoreJournal
+from labctl.store.repositories.recordings import blocks_of
+from labctl.store.schema import tables
+from procedures.contracts.journal import DataSetState
+from procedures.contracts.steps import StepResult
+
+#: Events after which a temperature has to be soaked again, and those that say that it was.
+OWED, PAID = ("taken_up", "soak_owed"), ("lead_in_done", "soaked_again")
+FINISHED = frozenset({"done", "skipped"})
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a campaign stands that no process runs."""
+
+    start_at: int  #: the first step that has to be run
+    complete: frozenset[int]  #: steps whose data set was complete when the process ended, before it was said
+    skipped: frozenset[int]
+    last_t_s: float  #: campaign time of the last sign of life
+    last_at: datetime
+    soak_owed: bool
+    added_runs: int
+    boot_id: str | None
+    dropped: dict[str, str]  #: gyro -> why it takes no further part
+    tries: int  #: how often it was taken up since a step ended
+
+
+@dataclass(frozen=True)
+class TakeUp:
+    """What is written down when a campaign is taken up."""
+
+    t_s: float
+    at: datetime
+    reason: str
+    added_runs: int
+    new_session: bool
+    boot_id: str | None
+
+
+class Interruptions:
+    """Where interrupted campaigns stand, and how they go on."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def standing(self, campaign: int) -> Standing:
+        """Return where a campaign stands, from its rows alone."""
+        c, s, r, d = tables.campaigns.c, tables.steps.c, tables.recordings.c, tables.data_sets.c
+        with self._database.reading() as connection:
+            row = connection.execute(
+                sa.select(c.created_at, c.started_at, c.added_runs, c.boot_id).where(c.id == campaign)
+            ).one()
+            steps = connection.execute(
+                sa.select(s.number, s.state, s.body, s.ended_s).where(s.campaign_id == campaign).order_by(s.number)
+            ).all()
+            units = connection.execute(sa.select(r.id, r.gyro, r.dropped).where(r.campaign_id == campaign)).all()
+            recordings = [unit[0] for unit in units]
+            planned = set(
+                connection.scalars(
+                    sa.select(d.planned).where(d.recording_id.in_(recordings), d.state == DataSetState.COMPLETE.value)
+                )
+            )
+            last_t_s = self._last_t_s(connection, campaign, recordings)
+            ended_s = max((step[3] for step in steps if step[3] is not None), default=-1.0)
+            owed, tries = self._events(connection, campaign, ended_s)
+        complete = frozenset(
+            step[0] for step in steps if step[1] not in FINISHED and step[2].get("dataset") in planned - {None}
+        )
+        left = [step[0] for step in steps if step[1] not in FINISHED and step[0] not in complete]
+        return Standing(
+            start_at=left[0] if left else len(steps),
+            complete=complete,
+            skipped=frozenset(step[0] for step in steps if step[1] == "skipped"),
+            last_t_s=last_t_s,
+            last_at=(row.started_at or row.created_at) + timedelta(seconds=last_t_s),
+            soak_owed=owed,
+            added_runs=row.added_runs,
+            boot_id=row.boot_id,
+            dropped={unit[1]: unit[2] for unit in units if unit[2] is not None},
+            tries=tries,
+        )
+
+    def _last_t_s(self, connection: sa.Connection, campaign: int, recordings: list[int]) -> float:
+        e, v, d = tables.environment.c, tables.events.c, tables.data_sets.c
+        found = [
+            connection.scalar(sa.select(sa.func.max(v.t_s)).where(v.campaign_id == campaign)),
+            connection.scalar(sa.select(sa.func.max(e.t_s)).where(e.recording_id.in_(recordings))),
+            connection.scalar(
+                sa.select(sa.func.max(d.gate_until_s)).where(d.recording_id.in_(recordings), d.state == "complete")
+            ),
+        ]
+        newest = sa.select(d.recording_id, d.number).where(d.recording_id.in_(recordings), d.state != "complete")
+        for recording, number in connection.execute(newest).all():
+            found += [float(part["t_ns"][-1]) / 1e9 for part in blocks_of(connection, recording, number)[-1:]]
+        return max((t_s for t_s in found if t_s is not None), default=0.0)
+
+    @staticmethod
+    def _events(connection: sa.Connection, campaign: int, ended_s: float) -> tuple[bool, int]:
+        """Return whether a soak is owed, and how often the campaign was taken up since its last step ended."""
+        v = tables.events.c
+
+        def last(kinds: tuple[str, ...]) -> int:
+            query = sa.select(sa.func.max(v.id)).where(v.campaign_id == campaign, v.kind.in_(kinds))
+            return int(connection.scalar(query) or 0)
+
+        tries = sa.select(sa.func.count()).where(v.campaign_id == campaign, v.kind == "taken_up", v.t_s >= ended_s)
+        return last(OWED) > last(PAID), int(connection.scalar(tries) or 0)
+
+    def take_up(self, campaign: int, standing: Standing, how: TakeUp) -> None:
+        """Mark what the interruption left half done, and the campaign as running again. Safe to be cut short itself.
+
+        Raises Conflict when it is done already.
+        """
+        self._close_open_data_sets(campaign)
+        c, s = tables.campaigns, tables.steps
+        values: dict[str, Any] = {"state": "running", "reason": how.reason, "ended_at": None, "boot_id": how.boot_id}
+        values["added_runs"] = how.added_runs
+        if how.new_session:
+            values["powered_on_s"] = how.t_s
+        with self._database.writing() as connection:
+            taken = connection.execute(sa.update(c).where(c.c.id == campaign, c.c.state != "done").values(**values))
+            if taken.rowcount == 0:
+                raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
+            mine = s.c.campaign_id == campaign
+            self._mark(connection, mine & s.c.number.in_(standing.complete), "done", how, "its data set was complete")
+            running = mine & (s.c.state == "running")
+            self._mark(connection, running, "interrupted", how, "the process that ran it ended")
+            append(connection, how.at, "campaign resume", f"campaign {campaign}", {"reason": how.reason})
+            connection.execute(
+                sa.insert(tables.events).values(
+                    campaign_id=campaign,
+                    at=how.at,
+                    t_s=how.t_s,
+                    kind="taken_up",
+                    level="warning",
+                    message=how.reason,
+                )
+            )
+
+    @staticmethod
+    def _mark(
+        connection: sa.Connection,
+        which: sa.ColumnElement[bool],
+        outcome: str,
+        how: TakeUp,
+        reason: str,
+    ) -> None:
+        result = StepResult.model_validate({"outcome": outcome, "reason": reason}).model_dump(mode="json")
+        connection.execute(
+            sa.update(tables.steps)
+            .where(which)
+            .values(
+                state=outcome, ended_s=sa.func.coalesce(tables.steps.c.ended_s, how.t_s), ended_at=how.at, result=result
+            )
+        )
+
+    def _close_open_data_sets(self, campaign: int) -> None:
+        """Keep what a data set had when it was cut short, and mark it; it is never merged with what redoes it."""
+        r, d = tables.recordings.c, tables.data_sets.c
+        query = (
+            sa.select(d.number)
+            .join(tables.recordings, r.id == d.recording_id)
+            .where(r.campaign_id == campaign, d.state == DataSetState.OPEN.value)
+            .distinct()
+        )
+        with self._database.reading() as connection:
+            numbers = list(connection.scalars(query))
+        journal = StoreJournal(self._database, campaign)
+        for number in numbers:
+            journal.dataset_closed(number, DataSetState.PARTIAL, "the process that took it ended")

@@ -1,0 +1,48 @@
+"""Units: gyros by serial number."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+import sqlalchemy as sa
+
+from labctl.errors import NotFound
+from labctl.store.connection.database import Database
+from labctl.store.records import Unit
+from labctl.store.schema import tables
+
+
+def remember_unit(connection: sa.Connection, serial: str, model: str, technology: str | None, at: datetime) -> None:
+    """Keep a unit that is seen for the first time; fill in what was not known of it."""
+    found = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial)).first()
+    if found is None:
+        connection.execute(
+            sa.insert(tables.units).values(serial=serial, model=model, technology=technology, first_seen_at=at)
+        )
+    elif (model and not found.model) or (technology and not found.technology):
+        connection.execute(
+            sa.update(tables.units)
+            .where(tables.units.c.serial == serial)
+            .values(model=found.model or model, technology=found.technology or technology)
+        )
+
+
+class Units:
+    """Gyros by serial number."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def get(self, serial: str) -> Unit:
+        """Return a unit; raises NotFound naming the nearest things to do."""
+        with self._database.reading() as connection:
+            row = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial)).first()
+        if row is None:
+            raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign brings one in")
+        return Unit(*row)
+
+    def all(self) -> list[Unit]:
+        """Return every unit, by serial number."""
+        with self._database.reading() as connection:
+            rows = connection.execute(sa.select(tables.units).order_by(tables.units.c.serial))
+            return [Unit(*row) for row in rows]

@@ -1,0 +1,137 @@
+"""The interface the engine records to. Everything handed over here is durable before the call returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from typing import Protocol
+
+from instruments.interfaces.gyro import Readings
+from procedures.contracts.steps import Acquire, StepResult
+
+
+class CampaignState(StrEnum):
+    """Where a campaign is in its life."""
+
+    PLANNED = "planned"
+    RUNNING = "running"
+    PAUSED = "paused"
+    WAITING = "waiting"  #: for a person: a mounting to confirm
+    INTERRUPTED = "interrupted"  #: whoever ran it had to let the bench go; to be taken up
+    DONE = "done"
+    ABORTED = "aborted"
+    FAILED = "failed"
+
+
+_S = CampaignState
+#: Ways to stop before the end of the plan.
+_ENDS = frozenset({_S.INTERRUPTED, _S.ABORTED, _S.FAILED})
+#: Which state may follow which. Only `done` is final: what failed or was aborted goes on by a person's word, what was
+#: interrupted or a dying process left as it was by itself. A suspension inside a pause is a pause for another reason.
+NEXT: Mapping[CampaignState, frozenset[CampaignState]] = {
+    _S.PLANNED: frozenset({_S.RUNNING, *_ENDS}),
+    _S.RUNNING: frozenset({_S.RUNNING, _S.PAUSED, _S.WAITING, _S.DONE, *_ENDS}),
+    _S.PAUSED: frozenset({_S.RUNNING, _S.PAUSED, *_ENDS}),
+    _S.WAITING: frozenset({_S.RUNNING, *_ENDS}),
+    _S.INTERRUPTED: frozenset({_S.RUNNING, _S.FAILED}),
+    _S.DONE: frozenset(),
+    _S.ABORTED: frozenset({_S.RUNNING}),
+    _S.FAILED: frozenset({_S.RUNNING}),
+}
+
+
+class DataSetState(StrEnum):
+    """What became of a data set. Only complete ones are fitted; the others are kept and marked."""
+
+    OPEN = "open"
+    COMPLETE = "complete"
+    PARTIAL = "partial"
+
+
+@dataclass(frozen=True)
+class DataSetHeader:
+    """One fixed rate at one fixed temperature in one position, as it was really run, for all units at once."""
+
+    step: Acquire
+    rate_dps: float  #: the reference: steps inside the gate over gate time
+    asked_dps: float
+    gate_from_s: float  #: campaign time
+    gate_until_s: float
+    angle_from_deg: float  #: table angle at `gate_from_s`
+    setpoint_c: float
+    run: int  #: powered session as it really was: the plan's, and those that a power cut added
+    gyros: tuple[str, ...]  #: the units that take part, by name
+
+
+@dataclass(frozen=True)
+class EnvironmentSample:
+    """What happened between the data sets: one row per 10 s or oftener, from power-on to the last data set."""
+
+    t_s: float  #: campaign time
+    run: int
+    chamber_c: float
+    chamber_setpoint_c: float
+    gyro_c: dict[str, float]  #: gyro name -> its own thermometer (the mean where it has one per axis)
+
+
+#: How an event of kind `safe_state` begins that says what could not be confirmed.
+NOT_SAFE = "NOT confirmed safe: "
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something worth telling a person: a guard trip, a retry, a state change, with value, limit and reason."""
+
+    kind: str
+    message: str
+    level: str = "info"  #: "info", "warning" or "error"
+    device: str | None = None
+    value: float | None = None
+    limit: float | None = None
+    unit: str | None = None
+
+
+class Journal(Protocol):
+    """Where a campaign is written down. Times `t_s` are campaign time: clock seconds since the campaign started."""
+
+    def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:
+        """Record a change of state and why."""
+        ...
+
+    def step_started(self, index: int, t_s: float, at: datetime) -> None:
+        """Record that step `index` of the plan begins."""
+        ...
+
+    def step_ended(self, index: int, result: StepResult, t_s: float, at: datetime) -> None:
+        """Record how step `index` ended."""
+        ...
+
+    def session_began(self, run: int, t_s: float) -> None:
+        """Record that the units were switched on for session `run`."""
+        ...
+
+    def unit_dropped(self, gyro: str, reason: str) -> None:
+        """Record that a unit takes no further part, and why."""
+        ...
+
+    def dataset_opened(self, header: DataSetHeader) -> int:
+        """Record a data set before its first reading; returns its number, unique in the campaign."""
+        ...
+
+    def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
+        """Record one block of one unit, times in campaign time; durable when this returns."""
+        ...
+
+    def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
+        """Record that no more readings follow; statistics are derived and blocks compacted here."""
+        ...
+
+    def environment(self, sample: EnvironmentSample) -> None:
+        """Record the environment between and during data sets."""
+        ...
+
+    def event(self, event: Event, t_s: float, at: datetime) -> None:
+        """Record something worth telling a person."""
+        ...

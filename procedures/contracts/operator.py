@@ -1,0 +1,122 @@
+"""What is asked of a person: turn the units, switch them. Every question has an id; old answers are refused."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+from procedures.contracts.errors import StalePrompt
+
+if TYPE_CHECKING:
+    from instruments.interfaces.unit_handler import Hand
+
+
+@dataclass(frozen=True)
+class Prompt:
+    """One question to a person."""
+
+    id: str  #: unique, so that a late answer cannot hit the next question
+    kind: Literal["mount", "power_on", "power_off"]
+    text: str
+    position: str | None = None  #: where the units are to be turned
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the person said, and who it was."""
+
+    prompt_id: str
+    confirmed: bool
+    by: str
+    reason: str = ""
+
+
+class Operator(Protocol):
+    """Somebody who can be asked. The engine asks once and then looks for the answer about once a second."""
+
+    @property
+    def at_once(self) -> bool:
+        """Whether answers come without anybody having to walk up."""
+        ...
+
+    def ask(self, prompt: Prompt) -> None:
+        """Put the question; must not block for longer than it takes to show it."""
+        ...
+
+    def answer(self, prompt_id: str) -> Answer | None:
+        """Return the answer to a question, or None while there is none."""
+        ...
+
+    def withdraw(self, prompt_id: str) -> None:
+        """Take a question back that is no longer of interest."""
+        ...
+
+
+class HandOperator:
+    """Somebody who does at once what is asked, with a hand that reaches into the simulated bench."""
+
+    at_once = True
+
+    def __init__(self, hand: Hand, by: str = "simulated bench") -> None:
+        self._hand = hand
+        self._by = by
+
+    def ask(self, prompt: Prompt) -> None:
+        if prompt.kind == "mount":
+            assert prompt.position is not None
+            self._hand.mount(prompt.position)
+        else:
+            self._hand.power(prompt.kind == "power_on")
+
+    def answer(self, prompt_id: str) -> Answer | None:
+        return Answer(prompt_id, confirmed=True, by=self._by)
+
+    def withdraw(self, prompt_id: str) -> None:  # nothing is ever left open
+        pass
+
+
+class PersonOperator:
+    """A person who answers from another thread: command line, HTTP, a page. One question at a time."""
+
+    at_once = False
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._pending: Prompt | None = None
+        self._answer: Answer | None = None
+
+    @property
+    def pending(self) -> Prompt | None:
+        """The question that waits for an answer."""
+        with self._lock:
+            return self._pending if self._answer is None else None
+
+    def ask(self, prompt: Prompt) -> None:
+        with self._lock:
+            self._pending, self._answer = prompt, None
+
+    def answer(self, prompt_id: str) -> Answer | None:
+        with self._lock:
+            fits = self._answer is not None and self._answer.prompt_id == prompt_id
+            return self._answer if fits else None
+
+    def withdraw(self, prompt_id: str) -> None:
+        with self._lock:
+            if self._pending is not None and self._pending.id == prompt_id:
+                self._pending, self._answer = None, None
+
+    def confirm(self, prompt_id: str, by: str) -> None:
+        """Say that it is done. Raises StalePrompt when another question, or none, is open."""
+        self._reply(Answer(prompt_id, confirmed=True, by=by))
+
+    def decline(self, prompt_id: str, by: str, reason: str) -> None:
+        """Say that it cannot be done; the campaign ends. Raises StalePrompt like `confirm`."""
+        self._reply(Answer(prompt_id, confirmed=False, by=by, reason=reason))
+
+    def _reply(self, answer: Answer) -> None:
+        with self._lock:
+            if self._pending is None or self._pending.id != answer.prompt_id or self._answer is not None:
+                now = f"{self._pending.id!r} is" if self._pending and self._answer is None else "no question is"
+                raise StalePrompt(f"question {answer.prompt_id!r} is no longer asked; {now} open now")
+            self._answer = answer

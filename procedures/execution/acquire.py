@@ -1,0 +1,179 @@
+"""One data set: spin up, settle, read every unit inside the gate, let the table come to rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from instruments.errors import LinkError
+from instruments.interfaces.gyro import Readings
+from instruments.interfaces.table import Spin
+from procedures.contracts.errors import BadData, GuardTripped, StepFailed
+from procedures.contracts.journal import DataSetHeader, DataSetState
+from procedures.contracts.steps import Acquire
+from procedures.execution.context import UNIT_FAULTS, Stage, heed
+from procedures.monitoring.bench_snapshot import Tally
+from procedures.monitoring.recorder import warning
+
+LEAD_S = 0.5  #: streams are cleared this long before the gate opens
+BLOCK_S = 1.0  #: readings are written down this often
+#: With several units each is read in turn while the others' ports buffer; half a second of the fastest stream fits.
+SHARED_BLOCK_S = 0.5
+
+
+def acquire(stage: Stage, step: Acquire) -> dict[str, float]:
+    """Take one data set, again where a unit's readings failed and the recipe allows another attempt.
+
+    Raises StepFailed, InstrumentError, Aborted.
+    """
+    attempt = 0
+    while True:
+        attempt += 1
+        try:
+            return _take(stage, step)
+        except (LinkError, BadData, GuardTripped) as error:
+            unit = _unit_at_fault(stage, error)
+            if unit is None:
+                raise
+            if attempt >= stage.recipe.on_failure.acquire_attempts:
+                if not stage.can_drop(unit):
+                    raise
+                stage.drop(unit, str(error))
+                attempt = 0  # the others had no fault of their own yet
+            stage.log.event(warning("data_set_repeated", f"data set {step.dataset} is taken again: {error}"))
+            stage.bench.table.stop()
+            reopen(stage)
+
+
+def reopen(stage: Stage) -> None:
+    """Open every unit's stream anew; a unit that cannot be reached drops out where others go on."""
+    for name, gyro in list(stage.bench.gyros.items()):
+        try:
+            gyro.stop()
+            gyro.start()
+        except LinkError as error:
+            if not stage.can_drop(name):
+                raise
+            stage.drop(name, str(error))
+
+
+def _unit_at_fault(stage: Stage, error: LinkError | BadData | GuardTripped) -> str | None:
+    """Return the unit whose readings failed; None when it is something else, or a limit that suspends."""
+    if isinstance(error, GuardTripped) and (error.kind not in UNIT_FAULTS or error.action != "fail"):
+        return None
+    unit = error.gyro if isinstance(error, BadData) else error.device
+    return unit if unit in stage.bench.gyros else None
+
+
+def _take(stage: Stage, step: Acquire) -> dict[str, float]:
+    ramp_s = abs(step.rate_dps) / stage.bench.table.limits.max_acceleration_dps2
+    if stage.watch.due(within_s=ramp_s):
+        stage.look()
+    spin = stage.bench.table.spin(step.rate_dps, _steady_s(stage, step))
+    gate = _gate(spin, step)
+    tallies = {name: Tally(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in stage.bench.gyros.items()}
+    with stage.watch.taking_readings(spin, tallies):
+        stage.look()
+        _wait_for_gate(stage, gate[0])
+        number = stage.log.journal.dataset_opened(_header(stage, step, spin, gate))
+        try:
+            _read_gate(stage, number, gate, tallies)
+            if stage.watch.due(within_s=ramp_s + LEAD_S):
+                stage.look(glance=False)
+            stage.bench.table.settle(spin)  # a run that does not end as computed was not the run it was taken for
+            _demand_readings(tallies)
+        except BaseException as error:
+            reason = str(error) or type(error).__name__
+            stage.log.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
+            raise
+    stage.log.journal.dataset_closed(number, DataSetState.COMPLETE)
+    counts = {f"readings.{name}": float(tally.valid + tally.invalid) for name, tally in tallies.items()}
+    return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **counts}
+
+
+def _steady_s(stage: Stage, step: Acquire) -> float:
+    """Return how long the table has to be steady: settling, the gate rounded up to step edges, and the last block."""
+    step_deg = stage.bench.table.limits.step_deg
+    edges_s = 2 * step_deg / abs(step.rate_dps) if step.rate_dps else 0.0
+    last_block_s = LEAD_S + sum(3 / gyro.sample_rate_hz for gyro in stage.bench.gyros.values())
+    return step.settle_s + step.duration_s + edges_s + last_block_s
+
+
+def _gate(spin: Spin, step: Acquire) -> tuple[float, float]:
+    """Return when readings count, clock time, on step edges. Raises StepFailed when the steady part is too short."""
+    from_s, until_s = spin.gate(spin.steady_from_s + step.settle_s, step.duration_s)
+    if until_s - from_s < step.duration_s - 1e-6:
+        raise StepFailed(
+            f"the table is steady at {spin.rate_dps:g} deg/s for {until_s - from_s:.3f} s after settling,"
+            f" not for the {step.duration_s:g} s of the data set"
+        )
+    return from_s, until_s
+
+
+def _wait_for_gate(stage: Stage, from_s: float) -> None:
+    """Let the table settle, then drop what the streams have buffered meanwhile, unless the gate is open already."""
+    stage.pass_time(from_s - LEAD_S - stage.clock.now_s(), pausing=False)
+    if stage.clock.now_s() >= from_s:
+        return
+    for name, gyro in stage.bench.gyros.items():
+        stage.watch.heard(name, gyro, gyro.glance())
+
+
+def _header(stage: Stage, step: Acquire, spin: Spin, gate: tuple[float, float]) -> DataSetHeader:
+    return DataSetHeader(
+        step=step,
+        rate_dps=spin.rate_dps,
+        asked_dps=spin.asked_dps,
+        gate_from_s=gate[0] - stage.log.start_s,
+        gate_until_s=gate[1] - stage.log.start_s,
+        angle_from_deg=float(spin.angle_deg(np.array([gate[0]]))[0]),
+        setpoint_c=stage.watch.setpoint_c,
+        run=step.run + stage.added_runs,
+        gyros=tuple(stage.bench.gyros),
+    )
+
+
+def _read_gate(stage: Stage, number: int, gate: tuple[float, float], tallies: dict[str, Tally]) -> None:
+    gyros = stage.bench.gyros
+    block_s = BLOCK_S if len(gyros) == 1 else SHARED_BLOCK_S
+    while (left_s := gate[1] - stage.clock.now_s()) > 0:
+        _read_round(stage, number, gate, tallies, min(block_s, left_s) / len(gyros))
+        if stage.watch.due(within_s=block_s):
+            stage.look(glance=False)
+        else:
+            heed(stage.watch.judge())
+        stage.checkpoint()
+    if len(gyros) > 1:  # whoever was read first in the last round still has the end of the gate in its buffer
+        _read_round(stage, number, gate, tallies, 0.0)
+        heed(stage.watch.judge())
+
+
+def _read_round(
+    stage: Stage, number: int, gate: tuple[float, float], tallies: dict[str, Tally], slice_s: float
+) -> None:
+    """Read every unit once and write down what falls into the gate."""
+    for name, gyro in stage.bench.gyros.items():
+        readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
+        if len(readings):
+            stage.watch.heard(name, gyro, readings)
+        kept = cut(readings, gate, stage.log.start_s)
+        if len(kept) or kept.lost or kept.damaged:
+            tallies[name].add(kept)
+            stage.log.journal.readings(number, name, kept, stage.watch.chamber_c)
+
+
+def cut(readings: Readings, gate: tuple[float, float], start_s: float) -> Readings:
+    """Return the readings inside the gate [from, until) with their times in campaign time; both in clock seconds."""
+    t_s = readings.t_s
+    if len(t_s) and gate[0] <= t_s[0] and t_s[-1] < gate[1]:
+        return Readings(t_s - start_s, readings.raw, readings.valid, readings.lost, readings.damaged)
+    inside = (t_s >= gate[0]) & (t_s < gate[1])
+    raw = {channel: values[inside] for channel, values in readings.raw.items()}
+    return Readings(t_s[inside] - start_s, raw, readings.valid[inside], readings.lost, readings.damaged)
+
+
+def _demand_readings(tallies: dict[str, Tally]) -> None:
+    for name, tally in tallies.items():
+        if tally.valid + tally.invalid == 0:
+            raise BadData(
+                name, f"not one of about {tally.expected:.0f} readings came; check cable, power and baud rate"
+            )

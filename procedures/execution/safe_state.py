@@ -1,0 +1,73 @@
+"""The safe state: table at rest, chamber at its safe set point and read back, streams closed."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from functools import partial
+
+from instruments.clock import Clock
+from instruments.interfaces.chamber import Chamber
+from instruments.interfaces.table import RateTable
+from procedures.contracts.bench import Bench
+
+STANDSTILL_TIMEOUT_S = 30.0
+#: Before each further round of what could not be confirmed: a wire may come back.
+PAUSES_S = (2.0, 10.0, 30.0)
+
+
+def make_safe(bench: Bench, clock: Clock) -> tuple[str, ...]:
+    """Bring the bench to its safe state; returns what could not be confirmed, empty when all is well.
+
+    Every part is tried even when another fails; what failed is tried again, after all the others, with growing pauses.
+    An interrupt (Ctrl-C) during a part makes it be tried once more.
+    """
+    open_parts = [(what, part, "") for what, part in _parts(bench, clock)]
+    for pause_s in (0.0, *PAUSES_S):
+        with contextlib.suppress(KeyboardInterrupt):  # without the pause the next try only comes earlier
+            clock.sleep(pause_s)
+        tried = [(what, part, _tried(what, part)) for what, part, _ in open_parts]
+        open_parts = [each for each in tried if each[2]]
+        if not open_parts:
+            break
+    return tuple(complaint for _, _, complaint in open_parts)
+
+
+def _parts(bench: Bench, clock: Clock) -> Iterator[tuple[str, Callable[[], str | None]]]:
+    yield "table to rest", partial(stop_table, bench.table, clock)
+    yield "chamber to its safe set point", partial(_make_chamber_safe, bench.chamber)
+    for name, gyro in bench.gyros.items():
+        yield f"stream of {name} closed", gyro.stop
+
+
+def _tried(what: str, part: Callable[[], str | None]) -> str:
+    """Try one part; returns what is to be complained of, empty when it is confirmed."""
+    for attempt in (1, 2):
+        try:
+            complaint = part()
+        except Exception as error:  # noqa: BLE001  whatever one part does, the others are still tried
+            return f"{what}: {str(error) or type(error).__name__}"
+        except KeyboardInterrupt:
+            if attempt == 2:
+                return f"{what}: interrupted twice"
+        else:
+            return f"{what}: {complaint}" if complaint else ""
+    return ""
+
+
+def stop_table(table: RateTable, clock: Clock) -> str | None:
+    """Bring the table to rest and look until it stands; returns what could not be confirmed. Raises InstrumentError."""
+    table.stop()
+    until_s = clock.now_s() + STANDSTILL_TIMEOUT_S
+    while table.is_moving():
+        if clock.now_s() >= until_s:
+            return f"it still moves {STANDSTILL_TIMEOUT_S:g} s after it was stopped; switch its power off"
+        clock.sleep(1.0)
+    return None
+
+
+def _make_chamber_safe(chamber: Chamber) -> str | None:
+    set_c = chamber.make_safe()
+    if abs(set_c - chamber.safe_c) > chamber.limits.resolution_c:
+        return f"set point {set_c:g} deg C was read back instead of {chamber.safe_c:g} deg C; set it by hand"
+    return None

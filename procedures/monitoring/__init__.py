@@ -1,0 +1,1 @@
+"""Watching the bench while anything runs: snapshots, guards, progress and the record."""

@@ -1,0 +1,55 @@
+"""What is known of the bench at one moment: what guards judge, progress shows and the environment record is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from instruments.interfaces.gyro import Gyro, Readings
+
+
+@dataclass
+class Tally:
+    """How the readings of one unit in one data set came in."""
+
+    expected: float  #: by the unit's sample rate and the length of the gate
+    valid: int = 0
+    invalid: int = 0  #: marked bad by the instrument itself
+    damaged: int = 0  #: lost, or not of the protocol
+
+    def add(self, readings: Readings) -> None:
+        """Count one block."""
+        valid = int(readings.valid.sum())
+        self.valid += valid
+        self.invalid += len(readings) - valid
+        self.damaged += readings.lost + readings.damaged
+
+    @property
+    def base(self) -> float:
+        """What fractions refer to: all readings of the data set, also those still to come."""
+        return max(self.expected, self.valid + self.invalid + self.damaged)
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The bench at one moment."""
+
+    t_s: float  #: campaign time
+    chamber_c: float
+    setpoint_c: float
+    alarms: tuple[str, ...] = ()
+    gyro_c: Mapping[str, float] = field(default_factory=dict)  #: by the units' own thermometers
+    silent_s: Mapping[str, float] = field(default_factory=dict)  #: device -> time since it was last heard
+    taking_readings: bool = False  #: the air is meant to be at its set point
+    asked_dps: float = 0.0
+    rate_dps: float = 0.0
+    tallies: Mapping[str, Tally] = field(default_factory=dict)
+
+
+def gyro_temperature_c(gyro: Gyro, readings: Readings) -> float | None:
+    """Return what the unit's own thermometers say, averaged; None for a unit without one or without readings."""
+    channels = [channel for channel in gyro.channels if channel.name.startswith("temperature")]
+    if not channels or not len(readings):
+        return None
+    means_c = [channel.offset + channel.scale * float(readings.raw[channel.name].mean()) for channel in channels]
+    return sum(means_c) / len(means_c)

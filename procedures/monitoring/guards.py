@@ -1,0 +1,183 @@
+"""Limits that are watched while anything runs. Each is judged at every look, the first time when it is armed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from procedures.contracts.errors import GuardTripped
+from procedures.contracts.journal import Event
+from procedures.monitoring.bench_snapshot import Situation
+from procedures.planning.limits import BenchLimits
+from procedures.recipe.recipe import Action, GuardKind, GuardRules
+
+
+@dataclass(frozen=True)
+class Trip:
+    """A limit that was passed."""
+
+    kind: GuardKind
+    action: Action
+    device: str
+    value: float
+    limit: float
+    unit: str
+    message: str
+
+    def event(self) -> Event:
+        """Return what the journal is told."""
+        return Event(
+            kind=f"guard.{self.kind}",
+            message=self.message,
+            level="warning" if self.action == "warn" else "error",
+            device=self.device,
+            value=self.value,
+            limit=self.limit,
+            unit=self.unit,
+        )
+
+    def error(self) -> GuardTripped:
+        """Return what ends the step."""
+        return GuardTripped(self.kind, self.action, self.message, self.device)
+
+
+@dataclass(frozen=True)
+class Excess:
+    """A value beyond its limit, before the recipe has said what that leads to."""
+
+    device: str
+    value: float
+    limit: float
+    unit: str
+    text: str
+
+
+Check = Callable[["Guards", Situation], Iterator[Excess]]
+
+
+class Guards:
+    """All limits of one campaign."""
+
+    def __init__(
+        self,
+        rules: GuardRules,
+        limits: BenchLimits | Callable[[], BenchLimits],
+        chamber: str = "chamber",
+        table: str = "table",
+    ) -> None:
+        self.rules = rules
+        self._limits = limits
+        self.chamber = chamber
+        self.table = table
+
+    @property
+    def limits(self) -> BenchLimits:
+        """The limits of the bench; its controllers are asked at first use."""
+        if not isinstance(self._limits, BenchLimits):
+            self._limits = self._limits()
+        return self._limits
+
+    def check(self, now: Situation) -> list[Trip]:
+        """Return every limit that is passed at this moment."""
+        return [
+            Trip(
+                kind,
+                self.rules.actions.get(kind, "fail"),
+                excess.device,
+                excess.value,
+                excess.limit,
+                excess.unit,
+                f"{excess.device}: {excess.text}: {excess.value:.6g} {excess.unit}, limit {excess.limit:.6g}".rstrip(),
+            )
+            for kind, check in CHECKS.items()
+            for excess in check(self, now)
+        ]
+
+
+def _outside(device: str, value_c: float, low_c: float, high_c: float, text: str) -> Iterator[Excess]:
+    if not low_c <= value_c <= high_c:
+        yield Excess(device, value_c, low_c if value_c < low_c else high_c, "deg C", text)
+
+
+def _chamber_limits(guards: Guards, now: Situation) -> Iterator[Excess]:
+    limits, margin_c = guards.limits.chamber, guards.rules.chamber_margin_c
+    text = "the air is beyond the limits of the chamber"
+    return _outside(guards.chamber, now.chamber_c, limits.min_c - margin_c, limits.max_c + margin_c, text)
+
+
+def _unit_air(guards: Guards, now: Situation) -> Iterator[Excess]:
+    margin_c = guards.rules.chamber_margin_c
+    for name, unit in guards.limits.gyros.items():
+        text = f"the air is beyond what unit {name} may be exposed to"
+        yield from _outside(guards.chamber, now.chamber_c, unit.min_c - margin_c, unit.max_c + margin_c, text)
+
+
+def _unit_temperature(guards: Guards, now: Situation) -> Iterator[Excess]:
+    margin_c = guards.rules.gyro_margin_c
+    for name, temperature_c in now.gyro_c.items():
+        unit = guards.limits.gyros[name]
+        yield from _outside(name, temperature_c, unit.min_c - margin_c, unit.max_c + margin_c, "its own thermometer")
+
+
+def _chamber_deviation(guards: Guards, now: Situation) -> Iterator[Excess]:
+    off_c = abs(now.chamber_c - now.setpoint_c)
+    if now.taking_readings and off_c > guards.rules.chamber_deviation_c:
+        text = f"the air left its set point of {now.setpoint_c:g} deg C while readings were taken"
+        yield Excess(guards.chamber, off_c, guards.rules.chamber_deviation_c, "deg C", text)
+
+
+def _unit_off_air(guards: Guards, now: Situation) -> Iterator[Excess]:
+    limit_c = guards.rules.max_gyro_off_air_c
+    for name, temperature_c in now.gyro_c.items():
+        off_c = abs(temperature_c - now.chamber_c)
+        if now.taking_readings and off_c > limit_c:
+            text = f"its own thermometer is off the air's {now.chamber_c:.1f} deg C by"
+            yield Excess(name, off_c, limit_c, "deg C", text)
+
+
+def _chamber_alarm(guards: Guards, now: Situation) -> Iterator[Excess]:
+    if now.alarms:
+        yield Excess(guards.chamber, float(len(now.alarms)), 0.0, "", f"alarms ({', '.join(now.alarms)})")
+
+
+def _stale(guards: Guards, now: Situation) -> Iterator[Excess]:
+    for device, silent_s in now.silent_s.items():
+        if silent_s > guards.rules.stale_s:
+            yield Excess(device, silent_s, guards.rules.stale_s, "s", "nothing heard; check cable and power")
+
+
+def _damaged(guards: Guards, now: Situation) -> Iterator[Excess]:
+    for name, tally in now.tallies.items():
+        yield from _fraction(name, tally.damaged, tally.base, guards.rules.max_damaged_fraction, "lost or damaged")
+
+
+def _invalid(guards: Guards, now: Situation) -> Iterator[Excess]:
+    for name, tally in now.tallies.items():
+        yield from _fraction(name, tally.invalid, tally.base, guards.rules.max_invalid_fraction, "marked bad")
+
+
+def _fraction(name: str, count: int, base: float, limit: float, what: str) -> Iterator[Excess]:
+    if count > 1 + limit * base:  # a single bad reading is never a trend
+        yield Excess(name, 100 * count / base, 100 * limit, "%", f"readings {what}")
+
+
+def _rate(guards: Guards, now: Situation) -> Iterator[Excess]:
+    limit_dps = guards.rules.max_rate_error_fraction * abs(now.asked_dps)
+    off_dps = abs(now.rate_dps - now.asked_dps)
+    if off_dps > limit_dps:
+        text = f"runs {now.rate_dps:g} deg/s instead of {now.asked_dps:g} deg/s, off by"
+        yield Excess(guards.table, off_dps, limit_dps, "deg/s", text)
+
+
+CHECKS: Mapping[GuardKind, Check] = {
+    "chamber_limits": _chamber_limits,
+    "unit_air": _unit_air,
+    "unit_temperature": _unit_temperature,
+    "chamber_deviation": _chamber_deviation,
+    "chamber_alarm": _chamber_alarm,
+    "stale": _stale,
+    "damaged_readings": _damaged,
+    "invalid_readings": _invalid,
+    "rate": _rate,
+    "unit_off_air": _unit_off_air,
+}

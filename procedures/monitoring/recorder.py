@@ -1,0 +1,56 @@
+"""The journal with the clock in hand: everything written gets campaign time and aware UTC."""
+
+from __future__ import annotations
+
+from instruments.clock import Clock
+from procedures.contracts.journal import CampaignState, Event, Journal
+from procedures.contracts.steps import StepResult
+from procedures.monitoring.progress import Board
+
+
+class Logbook:
+    """Writes to the journal and keeps the progress board in step with it.
+
+    Campaign time is clock seconds since `start_s`, the clock's reading when the campaign began.
+    """
+
+    def __init__(self, journal: Journal, clock: Clock, board: Board, start_s: float) -> None:
+        self.journal = journal
+        self.clock = clock
+        self.board = board
+        self.start_s = start_s
+        self.state = CampaignState.PLANNED
+
+    def t_s(self) -> float:
+        """Return the present campaign time."""
+        return self.clock.now_s() - self.start_s
+
+    def change_state(self, state: CampaignState, reason: str) -> None:
+        """Record a change of the campaign's state."""
+        self.state = state
+        self.board.update(state=state, reason=reason)
+        self.journal.campaign_state(state, reason, self.t_s(), self.clock.utc())
+
+    def event(self, event: Event) -> None:
+        """Record something worth telling a person."""
+        self.board.update(last_event=event.message)
+        if event.level == "error":
+            self.board.update(last_error=event.message)
+        self.journal.event(event, self.t_s(), self.clock.utc())
+
+    def step_started(self, index: int) -> None:
+        """Record that a step of the plan begins."""
+        self.board.step_started(index, self.t_s())
+        self.journal.step_started(index, self.t_s(), self.clock.utc())
+
+    def step_ended(self, index: int, result: StepResult) -> None:
+        """Record how a step of the plan ended, with the time it took among its figures."""
+        took_s = self.t_s() - self.board.step_began_s
+        result = result.model_copy(update={"figures": {**result.figures, "took_s": took_s}})
+        self.board.step_ended(index)
+        self.journal.step_ended(index, result, self.t_s(), self.clock.utc())
+
+
+def warning(kind: str, message: str, device: str | None = None) -> Event:
+    """Return an event that a person should read."""
+    return Event(kind, message, level="warning", device=device)

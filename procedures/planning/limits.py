@@ -1,0 +1,116 @@
+"""What a bench and its units can do, and which points of a recipe lie beyond it. Pure: no device is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from instruments.errors import InstrumentError
+from instruments.interfaces.chamber import ChamberLimits
+from instruments.interfaces.gyro import GyroLimits
+from instruments.interfaces.table import TableLimits
+from procedures.contracts.bench import Bench
+from procedures.contracts.errors import PlanRefused
+from procedures.recipe.recipe import Recipe
+
+ADVICE = "Change the recipe, or plan with --clip to leave these points out."
+
+
+@dataclass(frozen=True)
+class BenchLimits:
+    """What the table, the chamber and every unit may be asked for."""
+
+    table: TableLimits
+    chamber: ChamberLimits
+    gyros: Mapping[str, GyroLimits]
+    achievable_dps: Callable[[float], float] | None = None  #: the rate a table would really run (step quantisation)
+
+    @classmethod
+    def of(cls, bench: Bench) -> BenchLimits:
+        """Return the limits of an opened bench."""
+        units = {name: gyro.limits for name, gyro in bench.gyros.items()}
+        return cls(bench.table.limits, bench.chamber.limits, units, bench.table.achievable_dps)
+
+    def rate_complaint(self, rate_dps: float, max_error_fraction: float) -> str | None:
+        """Return why the table or a unit cannot do a rate, or None."""
+        complaints = [
+            f"the {limit:g} deg/s of {owner}"
+            for owner, limit in [("the table", self.table.max_rate_dps), *_unit_rates(self.gyros)]
+            if abs(rate_dps) > limit
+        ]
+        if complaints:
+            return "beyond " + " and ".join(complaints)
+        return self._quantisation_complaint(rate_dps, max_error_fraction)
+
+    def _quantisation_complaint(self, rate_dps: float, max_error_fraction: float) -> str | None:
+        if self.achievable_dps is None or rate_dps == 0:
+            return None
+        try:
+            real_dps = self.achievable_dps(rate_dps)
+        except InstrumentError as error:
+            return str(error)
+        if abs(real_dps - rate_dps) <= max_error_fraction * abs(rate_dps):
+            return None
+        return f"the nearest that the table runs is {real_dps:g} deg/s, more than {100 * max_error_fraction:g} % off"
+
+    def temperature_complaint(self, temperature_c: float) -> str | None:
+        """Return why the chamber or a unit cannot stand a temperature, or None."""
+        ranges = [("the chamber", self.chamber.min_c, self.chamber.max_c)]
+        ranges += [(f"unit {name}", unit.min_c, unit.max_c) for name, unit in self.gyros.items()]
+        complaints = [
+            f"the {low:g} to {high:g} deg C of {owner}"
+            for owner, low, high in ranges
+            if not low <= temperature_c <= high
+        ]
+        return "outside " + " and ".join(complaints) if complaints else None
+
+    def real_rate_dps(self, rate_dps: float) -> float:
+        """Return the rate the table would really run, as far as it is known."""
+        return rate_dps if self.achievable_dps is None or rate_dps == 0 else self.achievable_dps(rate_dps)
+
+
+def _unit_rates(gyros: Mapping[str, GyroLimits]) -> list[tuple[str, float]]:
+    return [(f"unit {name}", unit.max_rate_dps) for name, unit in gyros.items()]
+
+
+def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Recipe, tuple[str, ...]]:
+    """Return the recipe as this bench can run it, and what was left out.
+
+    Raises PlanRefused naming every point beyond a limit; with `clip` only when a needed list would become empty or the
+    temperature at which units are handled is out of reach.
+    """
+    values = recipe.model_dump()
+    beyond: list[str] = []
+    empty: list[str] = []
+    for table, key in _point_lists(recipe):
+        holder = values[table] if table else values
+        name = f"{table}.{key}" if table else key
+        complaints = {value: _complaint(limits, recipe, key, value) for value in holder[key]}
+        beyond += [f"{name} {value:g}: {text}" for value, text in complaints.items() if text]
+        holder[key] = tuple(value for value in holder[key] if not complaints[value])
+        if not holder[key]:
+            empty.append(f"{name}: nothing is left")
+    handling = recipe.mounting.handling_c
+    if handling is not None and (text := limits.temperature_complaint(handling)):
+        empty.append(f"mounting.handling_c {handling:g}: {text}")
+    if empty:
+        raise PlanRefused(recipe.name, [*beyond, *empty], "Change the recipe.")
+    if beyond and not clip:
+        raise PlanRefused(recipe.name, beyond, ADVICE)
+    return (Recipe.model_validate(values), tuple(beyond)) if beyond else (recipe, ())
+
+
+def _point_lists(recipe: Recipe) -> list[tuple[str, str]]:
+    """Return where the recipe lists points, as (table, key)."""
+    lists = [("", "temperatures_c"), ("", "rates_dps")]
+    if recipe.inverted is not None:
+        lists += [("inverted", "temperatures_c"), ("inverted", "rates_dps")]
+    if recipe.power_cycle is not None:
+        lists += [("power_cycle", "rates_dps")]
+    return lists
+
+
+def _complaint(limits: BenchLimits, recipe: Recipe, key: str, value: float) -> str | None:
+    if key == "temperatures_c":
+        return limits.temperature_complaint(value)
+    return limits.rate_complaint(value, recipe.guards.max_rate_error_fraction)

@@ -1,0 +1,118 @@
+"""In which order a recipe's points are visited: mountings, their levels of temperature, the rates of each level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.recipe.recipe import Recipe
+
+
+@dataclass(frozen=True)
+class Level:
+    """One temperature with the rates that are run at it, in order."""
+
+    temperature_c: float
+    rates_dps: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Stay:
+    """One mounting: what is measured between two turnings of the units."""
+
+    position: str
+    levels: tuple[Level, ...]
+    same_session: bool = False  #: turned without being switched off, whatever the recipe says of other mountings
+
+
+def schedule(recipe: Recipe) -> list[Stay]:
+    """Return the mountings of a recipe in order, with everything measured in each."""
+    return [_with_rates(recipe, stay, number) for number, stay in enumerate(_stays(recipe))]
+
+
+def upside_down(position: str) -> str:
+    """Return the position with the same axis along the table axis, the other way up."""
+    return position.removeprefix("-") if position.startswith("-") else f"-{position}"
+
+
+def temperature_sequence(recipe: Recipe) -> tuple[float, ...]:
+    """Return the temperatures of one mounting in the order in which they are visited."""
+    listed = recipe.temperatures_c
+    rising = tuple(sorted(listed))
+    falling_half = tuple(reversed(rising[1::2]))
+    order = {
+        "as_listed": listed,
+        "up": rising,
+        "down": tuple(reversed(rising)),
+        "up_down": rising[::2] + falling_half,
+    }[recipe.temperature_order]
+    return (*order, order[0]) if recipe.replicates.first_temperature_again else order
+
+
+def _stays(recipe: Recipe) -> list[Stay]:
+    """Return the mountings with the listed rates, not yet in their order within a level."""
+    temperatures = temperature_sequence(recipe)
+    if recipe.order == "position-major":
+        visits = [(position, temperatures) for position in recipe.positions]
+    else:
+        visits = [(position, (temperature,)) for temperature in temperatures for position in recipe.positions]
+    stays: list[Stay] = []
+    for position, levels in visits:
+        stays.append(Stay(position, tuple(Level(each, recipe.rates_dps) for each in levels)))
+        stays += _inverted(recipe, position, levels)
+    return _merged(stays)
+
+
+def _inverted(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[Stay]:
+    """Return the upside-down mounting that follows a mounting, if one does."""
+    if recipe.inverted is None:
+        return []
+    wanted = recipe.inverted.temperatures_c
+    if recipe.order == "temperature-major":
+        wanted = tuple(each for each in wanted if each in visited)
+    levels = tuple(Level(each, recipe.inverted.rates_dps) for each in wanted)
+    return [Stay(upside_down(position), levels, same_session=True)] if levels else []
+
+
+def _merged(stays: list[Stay]) -> list[Stay]:
+    """Return the mountings with neighbours of one position as one: nobody turns a unit to where it already is."""
+    merged: list[Stay] = []
+    for stay in stays:
+        if merged and merged[-1].position == stay.position:
+            merged[-1] = Stay(stay.position, merged[-1].levels + stay.levels, merged[-1].same_session)
+        else:
+            merged.append(stay)
+    return merged
+
+
+def _with_rates(recipe: Recipe, stay: Stay, number: int) -> Stay:
+    """Return the mounting with each level's rates in their final order; `number` makes each level's lot its own."""
+    levels = tuple(
+        Level(
+            level.temperature_c,
+            level.rates_dps
+            if stay.same_session
+            else level_rates(recipe, level.rates_dps, np.random.default_rng([recipe.seed, number, index])),
+        )
+        for index, level in enumerate(stay.levels)
+    )
+    return Stay(stay.position, levels, stay.same_session)
+
+
+def level_rates(recipe: Recipe, listed: tuple[float, ...], lot: np.random.Generator) -> tuple[float, ...]:
+    """Return one level's rates in the order in which they are run, with its replicates."""
+    zero_at = recipe.replicates.zero_rate
+    rates = [rate for rate in listed * recipe.repeats if not (zero_at and rate == 0)]
+    if recipe.rate_order == "ascending":
+        rates.sort()
+    elif recipe.rate_order == "random":
+        rates = [rates[index] for index in lot.permutation(len(rates))]
+    again = min(recipe.replicates.repeated_rates, len(set(rates)))
+    for rate in lot.choice(sorted(set(rates)), size=again, replace=False) if again else ():
+        rates.insert(int(lot.integers(len(rates) + 1)), float(rate))
+    if "middle" in zero_at:
+        rates.insert((len(rates) + 1) // 2, 0.0)
+    start = [0.0] if "start" in zero_at else []
+    end = [0.0] if "end" in zero_at else []
+    return (*start, *rates, *end)

@@ -1,0 +1,120 @@
+"""Which size of a hidden effect gives which z on which protocol: effect_sizes.json, by `-m studies.effect_sizes`.
+
+A size belongs to a schedule, a simulated unit and a model, so it is worked out once and kept with the code.
+"""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ProcessPoolExecutor
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from instruments.transport.factory import hidden_defaults
+from labctl.services.simulation.sizing import CLOSE, Sizing
+from studies.campaigns import PROTOCOLS, protocol
+
+FILE = Path(__file__).with_name("effect_sizes.json")
+COMMAND = "python -m studies.effect_sizes"
+Z_LEVELS = (5.0, 10.0, 20.0, 30.0, 100.0)
+#: Less of an effect than this beside the model, and the protocol cannot show it.
+LEAST_VISIBLE = 0.15
+#: z is taken to be proportional to the size when it is at both ends of the levels, to within this share.
+STRAIGHT = 0.03
+#: A size may be this many times what a person would notice, or as much less.
+FARTHEST = 1e3
+ROUNDS = 16
+#: What is known and taken off (the Earth), what a mean of many noisy readings hides whatever its size, or what changes
+#: the thermometer and so everything.
+NOT_DRAWN = frozenset(
+    {"earth_rate", "quantization", "self_heating", "thermometer_error", "bias", "scale_factor", "table_rate_ratio"}
+)
+#: On one axis a tilt of the gyro is only seen by the Earth, and is then called so.
+ONE_AXIS_NOT = frozenset({"misalignment", "non_orthogonality", "cross_axis_nonlinearity"})
+
+Sizes = dict[str, dict[str, float]]
+
+
+@lru_cache(maxsize=1)
+def _kept() -> dict[str, Sizes]:
+    return dict(json.loads(FILE.read_text(encoding="utf-8"))["sizes"])
+
+
+def sizes(name: str) -> Sizes:
+    """Return effect -> z -> size of every effect that a protocol can show."""
+    return _kept()[name]
+
+
+def sizing_of(name: str) -> Sizing:
+    """Return what works out sizes on a protocol."""
+    p = protocol(name)
+    return Sizing(p.plan, p.bench, p.gyro)
+
+
+def sizes_of(sizing: Sizing, effect: str, default: float) -> dict[str, float]:
+    """Return z -> size of one effect; levels that no size gives are left out.
+
+    Most effects are proportional to their size: three simulations tell, and the rest is a rule of three.
+    """
+    at, share = sizing.z_of(effect, default)
+    if share < LEAST_VISIBLE or at <= 0:
+        return {}
+    factors = [min(z / at, FARTHEST) for z in (Z_LEVELS[0], Z_LEVELS[-1])]
+    seen = {1.0: at} | {factor: sizing.z_of(effect, default * factor)[0] for factor in factors}
+    if all(abs(found / (at * factor) - 1) < STRAIGHT for factor, found in seen.items()):
+        return {f"{z:g}": float(f"{default * z / at:.5g}") for z in Z_LEVELS}
+    found = {z: _factor(sizing, effect, default, z, seen) for z in Z_LEVELS}
+    return {f"{z:g}": float(f"{default * factor:.5g}") for z, factor in found.items() if factor is not None}
+
+
+def _factor(sizing: Sizing, effect: str, default: float, z: float, seen: dict[float, float]) -> float | None:
+    """Return by how much a size must be multiplied for z, or None; what is simulated on the way is added to `seen`.
+
+    Between two sizes by a straight line in logarithms and by their middle in turn: some effects stand still in between.
+    """
+    for attempt in range(ROUNDS):
+        nearest = min(seen, key=lambda factor: abs(seen[factor] / z - 1))
+        if abs(seen[nearest] / z - 1) < CLOSE:
+            return nearest
+        below = max((factor for factor, found in seen.items() if found < z), default=None)
+        above = min((factor for factor, found in seen.items() if found > z), default=None)
+        if above is None or below is None or below > above:
+            guess = max(seen) * 3.0 if above is None else min(seen) / 3.0
+        elif attempt % 2:
+            guess = float(np.sqrt(below * above))
+        else:
+            share = np.log(z / max(seen[below], 1e-3)) / np.log(seen[above] / max(seen[below], 1e-3))
+            guess = float(below * (above / below) ** np.clip(share, 0.05, 0.95))
+        if not 1 / FARTHEST <= guess <= FARTHEST:
+            return None
+        seen[guess] = sizing.z_of(effect, default * guess)[0]
+    return None
+
+
+def make(name: str) -> Sizes:
+    """Work out every size on one protocol."""
+    sizing = sizing_of(name)
+    one_axis = len(protocol(name).gyro.axes) == 1
+    made = {
+        effect: sizes_of(sizing, effect, default)
+        for effect, default in sorted(hidden_defaults().items())
+        if effect not in NOT_DRAWN and not (one_axis and effect in ONE_AXIS_NOT)
+    }
+    return {effect: by_z for effect, by_z in made.items() if len(by_z) == len(Z_LEVELS)}
+
+
+def main() -> None:
+    """Work out every size on every protocol, and keep them."""
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        longest_first = sorted(PROTOCOLS, key=lambda name: -len(protocol(name).gyro.axes))
+        made = dict(zip(longest_first, pool.map(make, longest_first), strict=True))
+    document = {"made_by": COMMAND, "sizes": {name: made[name] for name in PROTOCOLS}}
+    FILE.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    for name in PROTOCOLS:
+        print(f"{name:3} {len(made[name])} effects")
+
+
+if __name__ == "__main__":
+    main()
