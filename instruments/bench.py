@@ -18,7 +18,7 @@ from instruments.errors import InstrumentError
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.table import RateTable
-from instruments.interfaces.unit_handler import Hand, NoHand, RemoteHand, SimulatedHand
+from instruments.interfaces.unit_handler import ManualUnitHandler, RemoteUnitHandler, SimulatedUnitHandler, UnitHandler
 from instruments.transport.factory import Ports, Simulation, open_simulation
 
 TABLES: dict[str, Callable[..., RateTable]] = {"arrick-c4": ArrickC4}
@@ -38,7 +38,7 @@ class Bench:
     table: RateTable
     chamber: Chamber
     gyros: dict[str, Gyro]
-    hand: Hand
+    unit_handler: UnitHandler
     simulation: Simulation | None = None
 
     def close(self) -> None:
@@ -66,7 +66,7 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
         TABLES[bench.table.driver](bench.table, ports, clock),
         CHAMBERS[bench.chamber.driver](bench.chamber, ports, clock),
         {gyro.name: GYROS[gyro.driver](gyro, ports, clock) for gyro in bench.gyros},
-        _hand(bench, simulation, clock),
+        _unit_handler(bench, simulation, clock),
         simulation,
     )
 
@@ -78,12 +78,12 @@ def check_options(bench: BenchFile) -> None:
         GYROS[gyro.driver](gyro, Ports(clock), clock)
 
 
-def _hand(bench: BenchFile, simulation: Simulation | None, clock: Clock) -> Hand:
+def _unit_handler(bench: BenchFile, simulation: Simulation | None, clock: Clock) -> UnitHandler:
     if simulation is not None:
-        return SimulatedHand(simulation, clock)
+        return SimulatedUnitHandler(simulation, clock)
     if bench.simulation is not None and bench.simulation.control is not None:
-        return RemoteHand(bench.simulation.control)
-    return NoHand()
+        return RemoteUnitHandler(bench.simulation.control)
+    return ManualUnitHandler()
 
 
 def check(bench: BenchFile, clock: Clock) -> list[tuple[str, bool, str]]:

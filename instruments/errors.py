@@ -28,11 +28,11 @@ class NoReply(LinkError):
     """Nothing came back in time."""
 
 
-class Garbled(LinkError):
+class MalformedReply(LinkError):
     """Something came back that is not the protocol's."""
 
 
-class Refused(InstrumentError):
+class RequestRejected(InstrumentError):
     """The instrument answered, and said no."""
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.evidence import LEAST_LEFT, Design
-from labctl.fitting.criticism.reduction import Compressed
+from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.channels import Array
 from labctl.fitting.data.temperature_levels import folds
 
@@ -64,7 +64,7 @@ def _version(name: str) -> str | None:
         return None
 
 
-def table_of(data: Compressed, design: Design, axis: str, *, means: bool) -> Table:
+def table_of(data: ReducedRecording, design: Design, axis: str, *, means: bool) -> Table:
     """Return one axis of a campaign as a regression."""
     y = data.output[axis] - data.rows_of(data.nodes.rate_dps(axis)[:, None])[:, :, 0]
     effects = [option for option in design.options if not option.smooth]
@@ -88,7 +88,7 @@ def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(u[:, s > INDEPENDENT * s[0]])
 
 
-def _levels(data: Compressed, there: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _levels(data: ReducedRecording, there: NDArray[np.bool_]) -> NDArray[np.int64]:
     masks = folds(data.at_sets(np.asarray(data.nodes["temperature_c"], dtype=np.float64)))
     return np.asarray(np.broadcast_to(np.argmax(masks, axis=0), there.shape)[there], dtype=np.int64)
 
@@ -204,7 +204,7 @@ def _rms(values: Array) -> float:
 TOOLS: tuple[Callable[[Table], dict[str, Picks]], ...] = (forward, lasso, stlsq)
 
 
-def ask(data: Compressed, designs: Mapping[str, Design]) -> dict[str, dict[str, Any]]:
+def ask(data: ReducedRecording, designs: Mapping[str, Design]) -> dict[str, dict[str, Any]]:
     """Return tool and view -> the effects it names, greatest gain over all axes first, and the seconds it took."""
     answers: dict[str, dict[str, Any]] = {}
     for view in ("means", "rows"):

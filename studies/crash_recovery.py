@@ -146,7 +146,7 @@ def judge(kill: Kill, expected: Fitted, folder: Path) -> Verdict:
     life = Life(kill.at)
     database, campaign = first_process(world, str(folder / "first" / "lab.sqlite"), life)
     world.pass_gap(kill.gap_s, power_cut=kill.power_cut)
-    location = database.left_behind(folder / "next", power_cut=kill.power_cut, rng=rng)
+    location = database.abandoned_campaigns(folder / "next", power_cut=kill.power_cut, rng=rng)
     database.close()
     database = MortalDatabase(location, world.clock.life)
     store = Store(database)

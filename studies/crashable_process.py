@@ -111,7 +111,7 @@ class MortalDatabase(Database):
             self.synced_bytes = self.log.stat().st_size
         self.life.tick()
 
-    def left_behind(self, folder: Path, *, power_cut: bool, rng: np.random.Generator) -> str:
+    def abandoned_campaigns(self, folder: Path, *, power_cut: bool, rng: np.random.Generator) -> str:
         """Copy what the next process finds: everything committed, or after a power cut what was on the disk at least.
 
         Between the last sync and the end of the log a power cut may leave any byte as the last one.

@@ -19,7 +19,7 @@ from labctl.errors import LabctlError
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.residuals import residuals_of
 from labctl.fitting.criticism.verdict import overlap
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.estimation.fit import fit_context
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed, preset_for
@@ -89,7 +89,7 @@ def one(task: Task) -> Task:
     """Simulate one campaign, criticise it, ask the other tools, and return what was said."""
     clock = _Stopwatch()
     recording = clock("simulate", lambda: _recording(task))
-    model, _ = preset_for(MODELS[task["protocol"]], []).build(context_of(recording))
+    model, _ = preset_for(MODELS[task["protocol"]], []).build(fit_data_of(recording))
     found = clock("labctl", lambda: criticise(recording, model, full=False))
     answer = {**task, **_said(found)}
     if task["kind"] == "effect" and task["z"] == HELD_OUT_AT_Z and found.verdict.form == "missing":
@@ -155,7 +155,7 @@ def nodes(found: Criticism) -> int:
 def held_out(recording: Recording, model: ErrorModel, found: Criticism) -> float | None:
     """Return held-out RMS over floor with what was named added; None where that cannot be fitted or inverted."""
     try:
-        error = fit_context(context_of(recording), changed(model, tuple(found.verdict.terms.values()))).error
+        error = fit_context(fit_data_of(recording), changed(model, tuple(found.verdict.terms.values()))).error
     except LabctlError:
         return None
     if not error.noise_floor_dps or error.heldout_rms_dps is None:

@@ -14,7 +14,7 @@ import serial
 
 from instruments.bench_config import TableSettings
 from instruments.clock import Clock, sleep_until
-from instruments.errors import Garbled, LimitError, LinkError, NoReply, Refused, WrongInstrument
+from instruments.errors import LimitError, LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.table import Spin, TableLimits
 from instruments.transport.factory import Ports
 from instruments.transport.serial import BROKEN
@@ -124,7 +124,7 @@ class ArrickC4:
     def _program(self, run: Run) -> None:
         """Set ramp and speed by the bench file's templates; each is written on change only."""
         if self.settings.speed_template is None:
-            raise Refused(
+            raise RequestRejected(
                 self.name,
                 "no constant rate: the C4's speed command is not public; set speed_template of the table in the bench "
                 "file from your controller's manual",
@@ -150,7 +150,7 @@ class ArrickC4:
         ended = self._clock.now_s()
         self._moving = None
         if ended < due - tolerance:
-            raise Garbled(
+            raise MalformedReply(
                 self.name,
                 f"{abs(run.steps)} steps took {ended - began:.1f} s instead of {run.duration_s:.1f} s; "
                 "check speed_template, step_clock_hz and acceleration_dps2, or the motor stalls; home the table",
@@ -251,7 +251,7 @@ class ArrickC4:
     def _expect(self, letter: str, timeout_s: float, what: str) -> None:
         found = self._byte(timeout_s)
         if found != letter:
-            raise Refused(
+            raise RequestRejected(
                 self.name, f"answered {found!r} where {letter!r} was expected, so it did not {what}; home the table"
             )
 

@@ -171,7 +171,7 @@ class Gyrostar:
         sleep_until(self._clock, end_s)
         return self._readings(rows, times, lost)
 
-    def glance(self) -> Readings:
+    def read_latest(self) -> Readings:
         """Get one fresh reading; raises LinkError."""
         self._begun_s, self._k = self._clock.now_s(), 1
         return self._readings([self._poll()], [self._begun_s])

@@ -94,7 +94,7 @@ class KvhLines:
         """Get the unit's identity from the bench file, once a line has shown that it speaks."""
         was_open = self._port is not None
         self.start()
-        self.glance()
+        self.read_latest()
         if not was_open:
             self.stop()
         settings = self.settings
@@ -162,7 +162,7 @@ class KvhLines:
             f"{self._baudrate}",
         )
 
-    def glance(self) -> Readings:
+    def read_latest(self) -> Readings:
         """Get one fresh reading and drop everything older."""
         self._drop()
         deadline = self._clock.now_s() + SILENCE_S

@@ -72,7 +72,7 @@ class Stim300:
         """Get the unit's identity from the bench file, once an intact datagram has shown that it speaks."""
         was_open = self._port is not None
         self.start()
-        self.glance()
+        self.read_latest()
         if not was_open:
             self.stop()
         settings = self.settings
@@ -132,7 +132,7 @@ class Stim300:
             )
         return readings
 
-    def glance(self) -> Readings:
+    def read_latest(self) -> Readings:
         """Get one fresh reading and drop everything older."""
         self._drop()
         deadline = self._clock.now_s() + START_WITHIN_S

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 from instruments.bench_config import ChamberSettings
 from instruments.clock import Clock
-from instruments.errors import LimitError, Refused, WrongInstrument
+from instruments.errors import LimitError, RequestRejected, WrongInstrument
 from instruments.interfaces.chamber import ChamberLimits, ChamberState
 from instruments.transport.modbus import Registers
 
@@ -126,7 +126,7 @@ class Watlow(ABC):
 
     def _refuse_while_a_profile_runs(self) -> None:
         if self._profile_runs():
-            raise Refused(
+            raise RequestRejected(
                 self.name,
                 "a profile runs or is held on the controller, a set point would have no effect; "
                 "end it at the front panel",
@@ -137,7 +137,7 @@ class Watlow(ABC):
             self._write_setpoint(rounded_c)
         found = self._read_setpoint()
         if abs(found - rounded_c) > self.limits.resolution_c / 2:
-            raise Refused(
+            raise RequestRejected(
                 self.name,
                 f"set point {rounded_c:g} deg C was written but {found:g} deg C read back; "
                 "the controller must show its run page",

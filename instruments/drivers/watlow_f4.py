@@ -9,7 +9,7 @@ from __future__ import annotations
 from instruments.bench_config import ChamberSettings
 from instruments.clock import Clock
 from instruments.drivers.watlow import REPLY_S, Watlow
-from instruments.errors import Refused
+from instruments.errors import RequestRejected
 from instruments.protocols.modbus_registers import Register
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Client, Registers
@@ -100,7 +100,9 @@ class WatlowF4(Watlow):
         if self._registers.get_int(event) != 1:
             self._registers.put(event, 1)
             if self._registers.get_int(event) != 1:
-                raise Refused(self.name, f"{event} stays off, the chamber cannot be switched on; check enable_event")
+                raise RequestRejected(
+                    self.name, f"{event} stays off, the chamber cannot be switched on; check enable_event"
+                )
 
     def _write_setpoint(self, temperature_c: float) -> None:
         self._registers.put(SETPOINT, round(temperature_c * self._scale()))

@@ -10,7 +10,7 @@ import math
 from instruments.bench_config import ChamberSettings
 from instruments.clock import Clock
 from instruments.drivers.watlow import REPLY_S, Watlow
-from instruments.errors import Refused
+from instruments.errors import RequestRejected
 from instruments.protocols.modbus_registers import Register
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import ILLEGAL_ADDRESS, Client, RefusedRegister, Registers
@@ -85,7 +85,7 @@ class WatlowF4T(Watlow):
 
     def _switch_on(self) -> None:
         if (mode := self._registers.get_int(CONTROL_MODE)) != MODE_AUTO:
-            raise Refused(
+            raise RequestRejected(
                 self.name, f"control loop 1 is in mode {MODES.get(mode, mode)}, not auto; switch it on at its panel"
             )
 

@@ -83,7 +83,7 @@ class Gyro(Protocol):
         """Get every reading of the next `duration_s` clock seconds; blocks that long. May hold fewer, even none."""
         ...
 
-    def glance(self) -> Readings:
+    def read_latest(self) -> Readings:
         """Get one fresh reading (n = 1) and drop everything older; raises NoReply when none comes in time."""
         ...
 

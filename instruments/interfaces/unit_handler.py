@@ -6,13 +6,13 @@ import socket
 from typing import TYPE_CHECKING, Protocol
 
 from instruments.clock import Clock
-from instruments.errors import LinkError, Refused
+from instruments.errors import LinkError, RequestRejected
 
 if TYPE_CHECKING:
     from instruments.transport.factory import Simulation
 
 
-class Hand(Protocol):
+class UnitHandler(Protocol):
     """Somebody, or something, that can turn and switch the units."""
 
     def mount(self, position: str) -> None:
@@ -24,19 +24,21 @@ class Hand(Protocol):
         ...
 
 
-class NoHand:
+class ManualUnitHandler:
     """A bench on which only a person can do it."""
 
     def mount(self, position: str) -> None:
         """Control nothing: a person has to turn the units."""
-        raise Refused("hand", f"only a person can turn the units to {position} up; confirm when it is done")
+        raise RequestRejected("hand", f"only a person can turn the units to {position} up; confirm when it is done")
 
     def power(self, on: bool) -> None:
         """Control nothing: a person has to switch the units."""
-        raise Refused("hand", f"only a person can switch the units {'on' if on else 'off'}; confirm when it is done")
+        raise RequestRejected(
+            "hand", f"only a person can switch the units {'on' if on else 'off'}; confirm when it is done"
+        )
 
 
-class SimulatedHand:
+class SimulatedUnitHandler:
     """Reaches into the simulated world of this process."""
 
     def __init__(self, simulation: Simulation, clock: Clock) -> None:
@@ -52,7 +54,7 @@ class SimulatedHand:
         self._world.power(self._clock.now_s(), on)
 
 
-class RemoteHand:
+class RemoteUnitHandler:
     """Asks the simulator in another process, one line of text per act."""
 
     TIMEOUT_S = 5.0
@@ -77,4 +79,4 @@ class RemoteHand:
         except OSError as error:
             raise LinkError("hand", f"the simulator at {self._address} does not answer ({error})") from error
         if answer != "ok":
-            raise Refused("hand", f"the simulator answered {answer!r} to {line!r}")
+            raise RequestRejected("hand", f"the simulator answered {answer!r} to {line!r}")

@@ -18,7 +18,7 @@ from pymodbus.exceptions import ConnectionException
 from pymodbus.pdu import ModbusPDU
 
 from instruments.clock import Clock, sleep_until
-from instruments.errors import Garbled, InstrumentError, LimitError, LinkError, NoReply, Refused
+from instruments.errors import InstrumentError, LimitError, LinkError, MalformedReply, NoReply, RequestRejected
 from instruments.protocols.modbus_registers import Register, WordOrder
 from instruments.transport.serial import BROKEN
 
@@ -47,7 +47,7 @@ UNDECODABLE = (IndexError, KeyError, ValueError, struct.error)
 CHECK = "check power, cable and address"
 
 
-class RefusedRegister(Refused):
+class RefusedRegister(RequestRejected):
     """A Modbus exception reply; `code` is its number."""
 
     def __init__(self, device: str, what: str, code: int) -> None:
@@ -119,7 +119,7 @@ class Registers:
         """Get the value of a register; raises Garbled when it lies outside what the register can hold."""
         value = register.decode(self.words(register), self._word_order)
         if not register.holds(value):
-            raise Garbled(
+            raise MalformedReply(
                 self._device,
                 f"{register} reads {value:g} {register.unit}, possible are {register.low:g} to {register.high:g}; "
                 "check the sensor, the word order and that the bench file names the right driver",
@@ -222,14 +222,16 @@ class Registers:
         except (ModbusException, *UNDECODABLE) as error:
             if self._heard:
                 text = f"cannot {what}, {len(self._heard)} bytes came that are no reply; check line settings and cable"
-                raise Garbled(self._device, text) from error
+                raise MalformedReply(self._device, text) from error
             raise NoReply(self._device, f"no answer to {what}; {CHECK} {self._address}") from error
         finally:
             self._quiet_until_s = self._clock.now_s() + self._pause_s
         if answer.isError():
             raise RefusedRegister(self._device, what, answer.exception_code)
         if not fits(answer) or (isinstance(client, ModbusTcpClient) and not _whole_frames(self._heard)):
-            raise Garbled(self._device, f"cannot {what}, the reply belongs to another request; {CHECK} {self._address}")
+            raise MalformedReply(
+                self._device, f"cannot {what}, the reply belongs to another request; {CHECK} {self._address}"
+            )
         return answer
 
     def _connected(self) -> Client:

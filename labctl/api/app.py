@@ -10,9 +10,9 @@ from fastapi import FastAPI
 
 from labctl import web
 from labctl.api import problems, swagger_ui, systemd
-from labctl.api.middleware import Access, Door
+from labctl.api.middleware import AccessMiddleware, AccessPolicy
 from labctl.api.routers import admin, calibrations, campaigns, health, plans, recordings, schedule, units
-from labctl.services.app import House
+from labctl.services.app import LabService
 
 DESCRIPTION = """
 Calibrations of gyroscopes by serial number, the campaigns that measured them, and the recordings behind them.
@@ -33,18 +33,18 @@ certifying and keys for an approver's.
 MOST_FILES = 4
 
 
-def create_app(house: House, access: Access | None = None) -> FastAPI:
+def create_app(service: LabService, access: AccessPolicy | None = None) -> FastAPI:
     """Make the HTTP application of a house; closing the application closes the house, bench left safe."""
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        house.start()
+        service.start()
         systemd.ready()
         try:
             yield
         finally:
             systemd.stopping()
-            house.close()
+            service.close()
 
     app = FastAPI(
         title="labctl",
@@ -55,11 +55,11 @@ def create_app(house: House, access: Access | None = None) -> FastAPI:
         redoc_url=None,
         form_limits={"max_files": MOST_FILES, "max_fields": MOST_FILES},
     )
-    app.state.house = house
+    app.state.service = service
     problems.install(app)
     rooms = (health, units, calibrations, plans, campaigns, schedule, recordings, admin, swagger_ui)
     for room in rooms:
         app.include_router(room.router)
     web.install(app)
-    app.add_middleware(Door, house=house, access=access or Access())
+    app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy())
     return app

@@ -6,12 +6,12 @@ from typing import Annotated, cast
 
 from fastapi import Depends, Request
 
-from labctl.services.app import House
+from labctl.services.app import LabService
 
 
-def house_of(request: Request) -> House:
+def get_service(request: Request) -> LabService:
     """Return the house that this application serves."""
-    return cast(House, request.app.state.house)
+    return cast(LabService, request.app.state.service)
 
 
-HouseOf = Annotated[House, Depends(house_of)]
+ServiceDep = Annotated[LabService, Depends(get_service)]

@@ -14,8 +14,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from labctl.actor import Actor, acting
 from labctl.api.problems import as_problem
 from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, TooLarge
-from labctl.services.admin.api_keys import Caller, Role, identify, refuse_beyond
-from labctl.services.app import House
+from labctl.services.admin.api_keys import Caller, Role, identify, require_role
+from labctl.services.app import LabService
 from labctl.services.commands.remote import USER_HEADER
 from labctl.web import is_page
 
@@ -31,7 +31,7 @@ MIB = 1 << 20
 
 
 @dataclass(frozen=True)
-class Access:
+class AccessPolicy:
     """Who may come in, and with how much.
 
     Without keys the only callers are this machine's, so a request must have been sent to this machine by name: a page
@@ -45,12 +45,12 @@ class Access:
     upload_bytes: int = 2048 * MIB
 
 
-class Door:
+class AccessMiddleware:
     """Wraps the application; what it refuses never reaches it."""
 
-    def __init__(self, app: ASGIApp, house: House, access: Access) -> None:
+    def __init__(self, app: ASGIApp, service: LabService, access: AccessPolicy) -> None:
         self._app = app
-        self._house = house
+        self._service = service
         self._access = access
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -78,7 +78,7 @@ class Door:
             raise BadInput("the address holds a NUL character; nothing here has one in its name")
         try:
             caller = self._caller(scope)
-            refuse_beyond(caller, Role.VIEWER if _only_asks(scope) else Role.OPERATOR)
+            require_role(caller, Role.VIEWER if _only_asks(scope) else Role.OPERATOR)
         except NotAllowed:
             if (scope["path"] in OPEN or is_page(scope["path"])) and scope["method"] in READING:
                 return None
@@ -88,7 +88,7 @@ class Door:
     def _caller(self, scope: Scope) -> Caller:
         headers = Headers(scope=scope)
         if (authorization := headers.get("authorization")) is not None:
-            return identify(self._house.store, authorization)
+            return identify(self._service.store, authorization)
         if self._access.keys:
             raise NotIdentified("this service asks for a key: send `Authorization: Bearer KEY`")
         self._refuse_strangers(scope["method"], headers)
@@ -151,7 +151,7 @@ def _bounded(receive: Receive, declared: int, limit: int) -> Receive:
 
 
 def _approver(request: Request) -> None:
-    refuse_beyond(request.state.caller, Role.APPROVER)
+    require_role(request.state.caller, Role.APPROVER)
 
 
 #: Of a route that asks for more than its method says; for `dependencies=[...]`.

@@ -14,11 +14,11 @@ import uvicorn
 from instruments.clock import Clock, WallClock
 from labctl.api import systemd
 from labctl.api.app import create_app
-from labctl.api.middleware import LOOPBACK_NAMES, MIB, Access
+from labctl.api.middleware import LOOPBACK_NAMES, MIB, AccessPolicy
 from labctl.config import default_database
 from labctl.errors import BadInput
-from labctl.services.admin.api_keys import refuse_open_doors
-from labctl.services.app import House
+from labctl.services.admin.api_keys import require_an_api_key
+from labctl.services.app import LabService
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import clock_for
@@ -44,7 +44,7 @@ class ServeRequest:
     max_upload_mib: int = 2048
 
 
-def open_house(request: ServeRequest, url: str | None) -> House:
+def create_service(request: ServeRequest, url: str | None) -> LabService:
     """Open the store for this process and put a bench runner beside it, where a bench is named."""
     store = Store(Database(request.database or default_database(), write=True, url=url))
     try:
@@ -63,7 +63,7 @@ def open_house(request: ServeRequest, url: str | None) -> House:
                 return clock_for(bench, None if own_pace else request.speed)
 
             runner = BenchRunner(store, bench, make_clock, hold_bench(store, bench))
-        return House(store, WallClock(), runner)
+        return LabService(store, WallClock(), runner)
     except BaseException:
         store.close()
         raise
@@ -90,11 +90,11 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> str:
             raise BadInput(f"--port {request.port} on {request.host}: {error.strerror}; name another, or 0") from error
         at = f"[{request.host}]" if ":" in request.host else request.host
         url = f"http://{at}:{listener.getsockname()[1]}"
-        house = open_house(request, url)
+        service = create_service(request, url)
         try:
-            app = create_app(house, access_for(request, house, at))
+            app = create_app(service, access_for(request, service, at))
         except BaseException:
-            house.close()
+            service.close()
             raise
         settings = uvicorn.Config(
             app, log_level="warning", lifespan="on", callback_notify=systemd.alive, timeout_notify=systemd.period_s(),
@@ -110,20 +110,20 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> str:
             with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how it is stopped
                 server.run(sockets=[listener])
         finally:
-            house.close()  # a second Ctrl-C makes the server skip it
-        return house.left
+            service.close()  # a second Ctrl-C makes the server skip it
+        return service.left
 
 
-def access_for(request: ServeRequest, house: House, at: str) -> Access:
+def access_for(request: ServeRequest, service: LabService, at: str) -> AccessPolicy:
     """Return who may come in: on loopback this machine's users, elsewhere whoever shows a key. Raises BadInput."""
     upload = request.max_upload_mib * MIB
     if _is_loopback(request.host) and not request.require_keys:
-        return Access(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload)
+        return AccessPolicy(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload)
     asked = (
         "--require-keys" if _is_loopback(request.host) else f"--host {request.host}: other machines could reach this"
     )
-    refuse_open_doors(house.store, asked)
-    return Access(keys=True, upload_bytes=upload)
+    require_an_api_key(service.store, asked)
+    return AccessPolicy(keys=True, upload_bytes=upload)
 
 
 def _is_loopback(host: str) -> bool:

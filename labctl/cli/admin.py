@@ -10,7 +10,7 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
-from labctl.cli.output import complaints, console, print_json, table
+from labctl.cli.output import console, print_json, stderr, table
 
 key_app = typer.Typer(no_args_is_help=True, help="API keys: who may read, act and approve over HTTP.")
 audit_app = typer.Typer(no_args_is_help=True, help="The audit trail: who did what, when and why.")
@@ -28,25 +28,25 @@ def key_create(
 ) -> None:
     """Make a key and print it, this once: only its digest is kept."""
     from labctl.services.admin.api_keys import KeyRequest, Role
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
 
-    with one_clear_line(), open_acts(database) as acts:
-        answer = acts.create_key(KeyRequest.model_validate({"name": name, "role": role}))
+    with one_clear_line(), open_commands(database) as commands:
+        answer = commands.create_key(KeyRequest.model_validate({"name": name, "role": role}))
     if as_json:
         print_json(answer)
         return
     console.print(answer.key, markup=False, soft_wrap=True)
     may = {Role.VIEWER: "read", Role.OPERATOR: "read and act", Role.APPROVER: "read, act and approve"}[answer.role]
-    complaints.print(f"{answer.name} may {may}. The key is not shown again: keep it now.", markup=False)
+    stderr.print(f"{answer.name} may {may}. The key is not shown again: keep it now.", markup=False)
 
 
 @key_app.command("list")
 def key_list(as_json: Json = False, database: Database = None) -> None:
     """List every key that was made, by name; the keys themselves are kept nowhere."""
     from labctl.services.admin.api_keys import list_keys
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         answers = list_keys(store)
     if as_json:
         print_json(answers)
@@ -63,10 +63,10 @@ def key_revoke(
     name: KeyName, reason: Reason = "revoked from the command line", as_json: Json = False, database: Database = None
 ) -> None:
     """Take a key's power away, at once."""
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
 
-    with one_clear_line(), open_acts(database) as acts:
-        answer = acts.revoke_key(name, reason)
+    with one_clear_line(), open_commands(database) as commands:
+        answer = commands.revoke_key(name, reason)
     print_json(answer) if as_json else console.print(f"{answer.name} is revoked", markup=False)
 
 
@@ -79,11 +79,11 @@ def audit_list(
     database: Database = None,
 ) -> None:
     """List who did what, when and why."""
-    from labctl.services.admin.audit import AuditAnswer, list_audit
-    from labctl.services.commands.open import open_reading
+    from labctl.services.admin.audit import AuditResponse, list_audit
+    from labctl.services.commands.open import open_readonly
 
-    answers: list[AuditAnswer] = []
-    with one_clear_line(), open_reading(database) as store:
+    answers: list[AuditResponse] = []
+    with one_clear_line(), open_readonly(database) as store:
         while page := list_audit(store, since, answers[-1].id if answers else 0):
             answers += page
     if as_json:
@@ -108,9 +108,9 @@ def audit_verify(
 ) -> None:
     """Find the first row that was changed, moved, or follows a missing one."""
     from labctl.services.admin.audit import verify_audit
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         answer = verify_audit(store, anchor)
     if as_json:
         print_json(answer)
@@ -119,7 +119,7 @@ def audit_verify(
             f"{answer.rows} rows, all as they were written; anchor {answer.anchor or 'none yet'}", markup=False
         )
     else:
-        complaints.print(f"labctl: audit trail: {answer.text}", markup=False)
+        stderr.print(f"labctl: audit trail: {answer.text}", markup=False)
     if not answer.ok:
         raise typer.Exit(1)
 
@@ -139,9 +139,9 @@ def backup(
     else:
         console.print(f"{answer.file}: {answer.bytes} bytes, sha256 {answer.sha256}", markup=False, soft_wrap=True)
     if answer.remark:
-        complaints.print(f"labctl: {answer.remark}", markup=False)
+        stderr.print(f"labctl: {answer.remark}", markup=False)
     for finding in answer.findings:
-        complaints.print(
+        stderr.print(
             f"labctl: the copy is what the database was, and there: {finding.part}: {finding.text}", markup=False
         )
     if answer.findings:
@@ -155,7 +155,7 @@ def check(as_json: Json = False, database: Database = None) -> None:
     def said(part: str, done: int, total: int) -> None:
         status.update(f"{part} {done} of {total}" if total else part)
 
-    with one_clear_line(), complaints.status("checking") as status:
+    with one_clear_line(), stderr.status("checking") as status:
         answer = check_database(database, None if as_json else said)
     if as_json:
         print_json(answer)

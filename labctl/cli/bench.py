@@ -39,9 +39,9 @@ def check(
 def status(as_json: Json = False, database: Database = None) -> None:
     """Say which benches were not confirmed safe when their last campaign ended, or had none: their process is gone."""
     from labctl.services.benches.check import bench_statuses
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         benches = bench_statuses(store)
     if as_json:
         print_json(benches)
@@ -63,11 +63,11 @@ def clear(
     database: Database = None,
 ) -> None:
     """Say that you have looked at a bench that was not confirmed safe; campaigns may start on it again."""
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
     from labctl.services.commands.protocol import ClearRequest
 
-    with one_clear_line(), open_acts(database) as acts:
-        answer = acts.clear_bench(bench, ClearRequest(by=by, reason=reason))
+    with one_clear_line(), open_commands(database) as commands:
+        answer = commands.clear_bench(bench, ClearRequest(by=by, reason=reason))
     print_json(answer) if as_json else console.print(f"{answer.name}: nothing is unconfirmed", markup=False)
 
 

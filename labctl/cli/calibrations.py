@@ -10,10 +10,10 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json, RecordingId, Serial
-from labctl.cli.output import console, figure, print_json, table
+from labctl.cli.output import console, format_number, print_json, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.answers import FitAnswer
+    from labctl.services.schemas.answers import FitResponse
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
 By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it.")]
@@ -33,26 +33,26 @@ def fit(
     database: Database = None,
 ) -> None:
     """Fit a model to a recording; it becomes the unit's next calibration version."""
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
     from labctl.services.commands.protocol import FitRequest
 
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
-    with one_clear_line(), open_acts(database) as acts:
-        answer = acts.fit(serial, FitRequest(recording=recording, model=model, effects=names))
+    with one_clear_line(), open_commands(database) as commands:
+        answer = commands.fit(serial, FitRequest(recording=recording, model=model, effects=names))
     if as_json:
         print_json(answer)
     else:
         print_fit(answer)
 
 
-def print_fit(answer: FitAnswer) -> None:
+def print_fit(answer: FitResponse) -> None:
     """Print a fit for a person: the errors first, then the coefficients."""
     error = answer.error
     console.print(f"[bold]{answer.serial}[/] version {answer.version}: {answer.model.name}")
-    console.print(f"  before             {figure(error.raw_rms_dps)} deg/s RMS")
-    console.print(f"  after              {figure(error.rms_dps)} deg/s RMS")
-    console.print(f"  held-out           {figure(error.heldout_rms_dps)} deg/s RMS")
-    console.print(f"  noise floor        {figure(error.noise_floor_dps)} deg/s")
+    console.print(f"  before             {format_number(error.raw_rms_dps)} deg/s RMS")
+    console.print(f"  after              {format_number(error.rms_dps)} deg/s RMS")
+    console.print(f"  held-out           {format_number(error.heldout_rms_dps)} deg/s RMS")
+    console.print(f"  noise floor        {format_number(error.noise_floor_dps)} deg/s")
     low, high = answer.validity.temperature_c
     slow, fast = answer.validity.rate_dps
     console.print(f"  valid              {low:.1f} to {high:.1f} deg C, {slow:.4g} to {fast:.4g} deg/s")
@@ -64,7 +64,7 @@ def print_fit(answer: FitAnswer) -> None:
             continue
         rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
         for name, entry in coefficients.items():
-            rows.add_row(name, entry["unit"], figure(entry["value"], 6), figure(entry["u"], 2))
+            rows.add_row(name, entry["unit"], format_number(entry["value"], 6), format_number(entry["u"], 2))
         console.print(rows)
 
 
@@ -75,7 +75,7 @@ def print_table(coefficients: dict[str, object]) -> None:
     rows = table("", "deg C", *names, numbers=len(names) + 1)
     for index, node in enumerate(nodes):
         values = [coefficients[name]["value"][index] for name in names]  # type: ignore[index]
-        rows.add_row(f"{node:.2f}", *(figure(value, 5) for value in values))
+        rows.add_row(f"{node:.2f}", *(format_number(value, 5) for value in values))
     console.print(rows)
 
 
@@ -127,12 +127,16 @@ def _act(
     as_json: bool,
     database: str | None,
 ) -> None:
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
     from labctl.services.commands.protocol import CertifyRequest
 
-    with one_clear_line(), open_acts(database) as acts:
+    with one_clear_line(), open_commands(database) as commands:
         request = CertifyRequest(by=by, reason=reason, due_days=due_days)
-        answer = acts.certify(serial, version, request) if act == "certify" else acts.revoke(serial, version, request)
+        answer = (
+            commands.certify(serial, version, request)
+            if act == "certify"
+            else commands.revoke(serial, version, request)
+        )
     if as_json:
         print_json(answer)
     else:
@@ -150,9 +154,9 @@ def calibration(
 ) -> None:
     """Print a calibration as a file to load elsewhere."""
     from labctl.services.calibrations.fitting import calibration_file
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         content = calibration_file(store, serial, version, format_).content
         if out is None:
             sys.stdout.buffer.write(content)

@@ -9,10 +9,10 @@ import typer
 from labctl.cli import schedule
 from labctl.cli.error_reporting import ending_is_an_interrupt, one_clear_line
 from labctl.cli.options import BenchName, Database, Json
-from labctl.cli.output import complaints, console, figure, print_json, table
+from labctl.cli.output import console, format_number, print_json, stderr, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.answers import CampaignAnswer, PlanAnswer
+    from labctl.services.schemas.answers import CampaignResponse, PlanResponse
 
 app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units.")
 app.add_typer(schedule.app, name="schedule")
@@ -45,7 +45,7 @@ def plan(
         print_plan(answer)
 
 
-def print_plan(answer: PlanAnswer) -> None:
+def print_plan(answer: PlanResponse) -> None:
     """Print a plan's figures for a person."""
     console.print(f"[bold]{answer.recipe}[/] on {answer.bench}")
     console.print(f"  {answer.datasets} data sets in {answer.steps} steps, about {hours(answer.expected_s)}")
@@ -56,7 +56,7 @@ def print_plan(answer: PlanAnswer) -> None:
     rows = table("\nwhat this plan could find", "effect", "visible share", "from size", "unit", numbers=3)
     for line in answer.visibility:
         if line.visible:
-            rows.add_row(line.effect, figure(line.share, 2), figure(line.smallest_size, 2), line.unit)
+            rows.add_row(line.effect, format_number(line.share, 2), format_number(line.smallest_size, 2), line.unit)
     console.print(rows)
     hidden = table("\nand what not", "effect", "because of", "what would show it")
     for line in answer.visibility:
@@ -106,7 +106,7 @@ def start(
     With --at or --cron it is entered into the schedule, which only a service (`labctl serve`) carries out.
     """
     from labctl.cli.progress_bar import CampaignProgress
-    from labctl.cli.terminal_operator import Attendant
+    from labctl.cli.terminal_operator import TerminalOperator
     from labctl.services.campaigns.execution import StartRequest, run_here
     from labctl.services.commands.local import service_url
     from labctl.services.commands.protocol import CampaignRequest
@@ -122,28 +122,28 @@ def start(
             return
         request = StartRequest(recipe=recipe, bench=bench, clip=clip, speed=speed, seed=seed)
         if url := service_url(database):
-            from labctl.services.commands.remote import RemoteActs
+            from labctl.services.commands.remote import HttpCommands
 
-            answer = RemoteActs(url).start_campaign(request)
+            answer = HttpCommands(url).start_campaign(request)
         else:
             with ending_is_an_interrupt(), CampaignProgress(quiet=as_json) as progress:
-                answer = run_here(database, request, progress.update, Attendant().attend, _say)
+                answer = run_here(database, request, progress.update, TerminalOperator().answer_prompts, _say)
     print_end(answer, as_json=as_json)
 
 
 def _say(text: str) -> None:
     """Print what is worth knowing beside the answer."""
-    complaints.print(f"labctl: {text}", markup=False)
+    stderr.print(f"labctl: {text}", markup=False)
 
 
-def print_end(answer: CampaignAnswer, *, as_json: bool) -> None:
+def print_end(answer: CampaignResponse, *, as_json: bool) -> None:
     """Print how a campaign ended; exit 1 when that is not as it was meant."""
     print_json(answer) if as_json else print_campaign(answer)
     if answer.state in {"failed", "aborted", "interrupted"}:
         raise typer.Exit(1)
 
 
-def print_campaign(answer: CampaignAnswer) -> None:
+def print_campaign(answer: CampaignResponse) -> None:
     """Print where a campaign is."""
     console.print(f"campaign {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]", end="")
     console.print(f" – {answer.reason}" if answer.reason else "", markup=False)
@@ -155,8 +155,8 @@ def print_campaign(answer: CampaignAnswer) -> None:
         console.print(f"  expected end {answer.expected_end:%Y-%m-%d %H:%M} UTC")
     if answer.chamber_c is not None:
         console.print(
-            f"  chamber {figure(answer.chamber_c)} deg C, gyro {figure(answer.gyro_c)} deg C, "
-            f"table {figure(answer.rate_dps)} deg/s"
+            f"  chamber {format_number(answer.chamber_c)} deg C, gyro {format_number(answer.gyro_c)} deg C, "
+            f"table {format_number(answer.rate_dps)} deg/s"
         )
     if answer.prompt is not None:
         console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow", markup=False)
@@ -176,9 +176,9 @@ def print_campaign(answer: CampaignAnswer) -> None:
 def list_(as_json: Json = False, database: Database = None) -> None:
     """List all campaigns, newest first."""
     from labctl.services.campaigns.status import list_campaigns
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         answers = list_campaigns(store)
     if as_json:
         print_json(answers)
@@ -200,16 +200,16 @@ def status(campaign: CampaignId = None, as_json: Json = False, database: Databas
     print_json(answer) if as_json else print_campaign(answer)
 
 
-def look(database: str | None, campaign: int | None) -> CampaignAnswer:
+def look(database: str | None, campaign: int | None) -> CampaignResponse:
     """Return where a campaign is; without a number the newest."""
     from labctl.services.campaigns.status import campaign_status
     from labctl.services.commands.local import service_url
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
 
-    with open_reading(database) as store:
+    with open_readonly(database) as store:
         answer = campaign_status(store, campaign)
     if url := service_url(database):
-        from labctl.services.commands.remote import RemoteActs
+        from labctl.services.commands.remote import HttpCommands
 
-        return RemoteActs(url).campaign(answer.id)
+        return HttpCommands(url).campaign(answer.id)
     return answer

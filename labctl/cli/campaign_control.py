@@ -54,11 +54,11 @@ def pause(
     database: Database = None,
 ) -> None:
     """Hold a running campaign after the present data set; the bench is still watched."""
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
     from labctl.services.commands.protocol import ReasonRequest
 
-    with one_clear_line(), open_acts(database) as acts:
-        answer = acts.pause_campaign(campaign, ReasonRequest(reason=reason, by=person(by)))
+    with one_clear_line(), open_commands(database) as commands:
+        answer = commands.pause_campaign(campaign, ReasonRequest(reason=reason, by=person(by)))
     print_json(answer) if as_json else print_campaign(answer)
 
 
@@ -78,7 +78,7 @@ def resume(
 ) -> None:
     """Let a paused campaign go on, or take up one that was interrupted, failed or aborted; safe state first."""
     from labctl.cli.progress_bar import CampaignProgress
-    from labctl.cli.terminal_operator import Attendant
+    from labctl.cli.terminal_operator import TerminalOperator
     from labctl.services.campaigns.resume import resume_here
     from labctl.services.commands.local import service_url
     from labctl.services.commands.protocol import ResumeRequest
@@ -86,14 +86,16 @@ def resume(
     with one_clear_line():
         request = ResumeRequest.model_validate({"by": person(by), "power": power})
         if url := service_url(database):
-            from labctl.services.commands.remote import RemoteActs
+            from labctl.services.commands.remote import HttpCommands
 
             wanted = look(database, campaign).id
-            answer = RemoteActs(url).resume_campaign(wanted, request)
+            answer = HttpCommands(url).resume_campaign(wanted, request)
             print_json(answer) if as_json else print_campaign(answer)
             return
         with ending_is_an_interrupt(), CampaignProgress(quiet=as_json) as progress:
-            answer = resume_here(database, campaign, bench, speed, request, progress.update, Attendant().attend)
+            answer = resume_here(
+                database, campaign, bench, speed, request, progress.update, TerminalOperator().answer_prompts
+            )
     print_end(answer, as_json=as_json)
 
 
@@ -104,10 +106,10 @@ def abort(
     database: Database = None,
 ) -> None:
     """End a running campaign now, in the safe state. What was measured is kept."""
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
 
-    with one_clear_line(), open_acts(database) as acts:
-        answer = acts.abort_campaign(campaign, reason)
+    with one_clear_line(), open_commands(database) as commands:
+        answer = commands.abort_campaign(campaign, reason)
     print_json(answer) if as_json else print_campaign(answer)
 
 
@@ -124,14 +126,14 @@ def confirm(
     database: Database = None,
 ) -> None:
     """Answer a campaign's question: it is done, or cannot be. An answer to an older question is refused."""
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
     from labctl.services.commands.protocol import ConfirmRequest
 
     with one_clear_line():
         wanted = campaign if campaign is not None else look(database, None).id
         request = ConfirmRequest(prompt=prompt, by=person(by), confirmed=decline is None, reason=decline or "")
-        with open_acts(database) as acts:
-            answer = acts.confirm(wanted, request)
+        with open_commands(database) as commands:
+            answer = commands.confirm(wanted, request)
     print_json(answer) if as_json else print_campaign(answer)
 
 

@@ -10,11 +10,11 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json, RecordingId, Serial
-from labctl.cli.output import console, figure, print_json, table
+from labctl.cli.output import console, format_number, print_json, table
 
 if TYPE_CHECKING:
     from labctl.fitting.effects import Formula
-    from labctl.services.schemas.answers import CriticismAnswer, FitAnswer, LadderAnswer
+    from labctl.services.schemas.answers import CriticismResponse, FitResponse, LadderResponse
 
 VersionOption = Annotated[int | None, typer.Option("--version", metavar="N", help="Version; default: the newest.")]
 FormulaOption = Annotated[
@@ -40,10 +40,10 @@ def criticise(
     database: Database = None,
 ) -> None:
     """Hold a version against a recording: what is left, where, and which effect may be missing."""
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
     from labctl.services.criticism.criticise import criticise_unit, write_next
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         answer = criticise_unit(store, serial, version, recording, written(formula))
         if next_recipe is not None:
             write_next(answer, next_recipe)
@@ -68,7 +68,7 @@ def written(sources: list[str] | None) -> list[Formula]:
     return with_files(sources)
 
 
-def print_criticism(answer: CriticismAnswer) -> None:
+def print_criticism(answer: CriticismResponse) -> None:
     """Print a criticism for a person: the verdict, the errors, a small map, then the table."""
     whole = not console.is_terminal  # a program that reads lines gets each sentence on one
     for line in answer.text:
@@ -76,8 +76,8 @@ def print_criticism(answer: CriticismAnswer) -> None:
     error = answer.error
     console.print(
         f"{answer.serial} version {answer.version}, recording {answer.recording}: "
-        f"left {figure(error['rms_dps'])} deg/s, "
-        f"held-out {figure(error['heldout_rms_dps'])}, noise floor {figure(error['noise_floor_dps'])}",
+        f"left {format_number(error['rms_dps'])} deg/s, "
+        f"held-out {format_number(error['heldout_rms_dps'])}, noise floor {format_number(error['noise_floor_dps'])}",
         style="dim",
     )
     if answer.noise.get("static"):
@@ -89,8 +89,9 @@ def print_criticism(answer: CriticismAnswer) -> None:
         for suspect in answer.suspects:
             others = [e for e in suspect["alias_group"] if e != suspect["effect"]]
             rows.add_row(
-                suspect["effect"], suspect["origin"], figure(suspect["log_bayes_factor"], 3),
-                figure(suspect["rms_after_dps"]), figure(suspect["heldout_rms_after_dps"]), ", ".join(others[:3]),
+                suspect["effect"], suspect["origin"], format_number(suspect["log_bayes_factor"], 3),
+                format_number(suspect["rms_after_dps"]), format_number(suspect["heldout_rms_after_dps"]),
+                ", ".join(others[:3]),
             )  # fmt: skip
         console.print(rows)
     for experiment in answer.experiments:
@@ -107,7 +108,7 @@ def print_criticism(answer: CriticismAnswer) -> None:
         console.print(f"next: labctl improve {answer.serial} --add {first}", style="dim", markup=False)
 
 
-def _not_testable(answer: CriticismAnswer) -> list[str]:
+def _not_testable(answer: CriticismResponse) -> list[str]:
     """Return what a recording says nothing of: what its schedule hides, and what is for want of a channel."""
     hidden = [line["effect"] for line in answer.not_testable if line["why"] != "channel"]
     lacking: dict[str, list[str]] = {}
@@ -122,7 +123,9 @@ def _print_static(static: dict[str, Any]) -> None:
     """Print what the longest stretch at rest shows."""
     for axis, noise in static["axes"].items():
         shown = [(letter, noise[letter]) for letter in ("N", "B", "K") if noise[letter]["value"] is not None]
-        said = ", ".join(f"{letter} {figure(f['value'], 3)} +- {figure(f['u'], 2)} {f['unit']}" for letter, f in shown)
+        said = ", ".join(
+            f"{letter} {format_number(f['value'], 3)} +- {format_number(f['u'], 2)} {f['unit']}" for letter, f in shown
+        )
         instead = "; B stands for the data sheet" if noise["replaces_datasheet"] else ""
         text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {said or 'no slope shows'}{instead}"
         console.print(text, style="dim", markup=False)
@@ -163,33 +166,33 @@ def improve(
     database: Database = None,
 ) -> None:
     """Change a version's effects and fit again: a new version, with the error before and after."""
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
     from labctl.services.commands.protocol import ImproveRequest
     from labctl.services.formulas import as_lines
 
     def names(given: list[str] | None) -> list[str]:
         return [name.strip() for text in given or [] for name in text.split(",") if name.strip()]
 
-    with one_clear_line(), open_acts(database) as acts:
+    with one_clear_line(), open_commands(database) as commands:
         request = ImproveRequest(
             add=names(add), remove=names(remove), formula=as_lines(formula or []), version=version, recording=recording
         )
-        answer = acts.improve(serial, request)
+        answer = commands.improve(serial, request)
     if as_json:
         print_json(answer)
     else:
         print_improvement(answer)
 
 
-def print_improvement(answer: FitAnswer) -> None:
+def print_improvement(answer: FitResponse) -> None:
     """Print what a change brought."""
     extra: dict[str, Any] = answer.model_extra or {}
     before = extra["before"]
     console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {extra['parent']}: {answer.model.name}")
     rows = table("", "deg/s", "before", "after", numbers=2)
-    rows.add_row("RMS", figure(before["rms_dps"]), figure(answer.error.rms_dps))
-    rows.add_row("held-out", figure(before["heldout_rms_dps"]), figure(answer.error.heldout_rms_dps))
-    rows.add_row("noise floor", figure(before["noise_floor_dps"]), figure(answer.error.noise_floor_dps))
+    rows.add_row("RMS", format_number(before["rms_dps"]), format_number(answer.error.rms_dps))
+    rows.add_row("held-out", format_number(before["heldout_rms_dps"]), format_number(answer.error.heldout_rms_dps))
+    rows.add_row("noise floor", format_number(before["noise_floor_dps"]), format_number(answer.error.noise_floor_dps))
     console.print(rows)
     for effect_id, span in extra["plausible"].items():
         if not span["inside"]:
@@ -204,10 +207,10 @@ def print_improvement(answer: FitAnswer) -> None:
 
 def ladder(serial: Serial, as_json: Json = False, database: Database = None) -> None:
     """Show the error, version by version, down to the noise floor."""
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
     from labctl.services.criticism.criticise import ladder as ladder_of
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         answer = ladder_of(store, serial)
     if as_json:
         print_json(answer)
@@ -215,13 +218,13 @@ def ladder(serial: Serial, as_json: Json = False, database: Database = None) -> 
         print_ladder(answer)
 
 
-def print_ladder(answer: LadderAnswer) -> None:
+def print_ladder(answer: LadderResponse) -> None:
     """Draw the fall."""
     for line in ladder_lines(answer):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
-def ladder_lines(answer: LadderAnswer, width: int = 40) -> list[str]:
+def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:
     """Return the fall on a logarithmic scale, a line per version, the floor as a line down."""
     known = [e for s in answer.steps for e in (s.rms_dps, s.heldout_rms_dps) if e]
     if not known:
@@ -239,8 +242,8 @@ def ladder_lines(answer: LadderAnswer, width: int = 40) -> list[str]:
             bar[place(step.heldout_rms_dps)] = "o"
         if answer.noise_floor_dps:
             bar[place(answer.noise_floor_dps)] = "|"
-        figures = f"{figure(step.rms_dps)}  held-out {figure(step.heldout_rms_dps)}"
+        figures = f"{format_number(step.rms_dps)}  held-out {format_number(step.heldout_rms_dps)}"
         lines.append(f"{step.version:3d} {''.join(bar)} {figures}  {step.model}")
     if answer.noise_floor_dps:
-        lines.append(f"    noise floor {figure(answer.noise_floor_dps)} deg/s")
+        lines.append(f"    noise floor {format_number(answer.noise_floor_dps)} deg/s")
     return lines

@@ -11,7 +11,7 @@ from types import FrameType
 import typer
 from pydantic import ValidationError
 
-from labctl.cli.output import complaints
+from labctl.cli.output import stderr
 from procedures.execution.signals import ENDING
 
 
@@ -47,7 +47,7 @@ def one_clear_line() -> Iterator[None]:
 
 
 def _said(text: str, status: int) -> typer.Exit:
-    complaints.print(f"labctl: {' '.join(text.split())}", markup=False)
+    stderr.print(f"labctl: {' '.join(text.split())}", markup=False)
     return typer.Exit(status)
 
 

@@ -12,7 +12,7 @@ from rich.table import Table
 
 #: Where nobody looks at a terminal, lines are not cut to its width.
 console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
-complaints = Console(stderr=True, highlight=False, soft_wrap=True)
+stderr = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def print_json(answer: Any, *, one_line: bool = False) -> None:
@@ -37,6 +37,6 @@ def table(title: str, *columns: str, numbers: int = 0) -> Table:
     return made
 
 
-def figure(value: float | None, digits: int = 4) -> str:
+def format_number(value: float | None, digits: int = 4) -> str:
     """Write a number with `digits` significant digits, or a dash where there is none."""
     return "–" if value is None else f"{value:.{digits}g}"

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Self
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from labctl.cli.output import complaints
+from labctl.cli.output import stderr
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.answers import CampaignAnswer
+    from labctl.services.schemas.answers import CampaignResponse
 
 
 class CampaignProgress:
@@ -25,8 +25,8 @@ class CampaignProgress:
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(elapsed_when_finished=False),
-            console=complaints,
-            disable=quiet or not complaints.is_terminal,
+            console=stderr,
+            disable=quiet or not stderr.is_terminal,
             transient=True,
         )
         self._task = self._progress.add_task(title or "starting", total=1.0)
@@ -40,7 +40,7 @@ class CampaignProgress:
     ) -> None:
         self._progress.stop()
 
-    def update(self, answer: CampaignAnswer) -> None:
+    def update(self, answer: CampaignResponse) -> None:
         """Show where the campaign is now."""
         step = f"{self._title} step {answer.step or 0}/{answer.steps} {answer.step_text}".strip()
         self._progress.update(self._task, completed=answer.progress, description=step[:64].ljust(64))

@@ -20,10 +20,10 @@ def import_(
     database: Database = None,
 ) -> None:
     """Take in a recording made on any bench, in the interchange format."""
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
 
-    with one_clear_line(), open_acts(database) as acts:
-        answer = acts.import_recording(folder)
+    with one_clear_line(), open_commands(database) as commands:
+        answer = commands.import_recording(folder)
     if as_json:
         print_json(answer)
         return
@@ -43,10 +43,10 @@ def export_recording(
     database: Database = None,
 ) -> None:
     """Write a recording in the interchange format: every reading, as it was measured."""
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
     from labctl.services.recordings.transfer import export_recording as export
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         written = export(store, recording, out, "csv" if csv else "parquet", points=points)
     if as_json:
         print_json({"recording": recording, "folder": str(out), "files": written})

@@ -8,11 +8,11 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
-from labctl.cli.output import complaints, console, print_json, table
+from labctl.cli.output import console, print_json, stderr, table
 
 if TYPE_CHECKING:
     from labctl.services.commands.protocol import CampaignRequest
-    from labctl.services.schemas.answers import ScheduledAnswer
+    from labctl.services.schemas.answers import ScheduledResponse
 
 app = typer.Typer(no_args_is_help=True, help="The schedule: campaigns that begin later, in a running service.")
 
@@ -30,17 +30,17 @@ def enter(
 ) -> None:
     """Enter a start into the schedule, and print the entry."""
     from labctl.errors import BadInput
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
 
     for option, value in (("--speed", pace), ("--seed", seed)):
         if value is not None:
             raise BadInput(f"{option} {value}: the service that runs it then sets its own; leave the option out")
-    with open_acts(database) as acts:
-        answer = acts.schedule_campaign(request, bench)
+    with open_commands(database) as commands:
+        answer = commands.schedule_campaign(request, bench)
     print_json(answer) if as_json else print_start(answer)
 
 
-def print_start(answer: ScheduledAnswer) -> None:
+def print_start(answer: ScheduledResponse) -> None:
     """Print one entry of the schedule."""
     console.print(f"start {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]")
     if answer.due_at is not None:
@@ -60,10 +60,10 @@ def list_(
 ) -> None:
     """List what begins when, next first."""
     from labctl.services.commands.local import service_url
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
     from labctl.services.schedule.queue import list_starts
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         answers = list_starts(store, ended=ended)
         served = service_url(database) is not None
     if as_json:
@@ -79,16 +79,16 @@ def list_(
         )  # fmt: skip
     console.print(rows)
     if answers and not served:
-        complaints.print("no service holds this database, so nothing begins; `labctl serve` does", style="yellow")
+        stderr.print("no service holds this database, so nothing begins; `labctl serve` does", style="yellow")
 
 
 @app.command("show")
 def show(start: StartId, as_json: Json = False, database: Database = None) -> None:
     """Say when an entry begins next and what became of each start that fell due."""
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
     from labctl.services.schedule.queue import start_status
 
-    with one_clear_line(), open_reading(database) as store:
+    with one_clear_line(), open_readonly(database) as store:
         answer = start_status(store, start)
     print_json(answer) if as_json else print_start(answer)
 
@@ -96,8 +96,8 @@ def show(start: StartId, as_json: Json = False, database: Database = None) -> No
 @app.command("cancel")
 def cancel(start: StartId, as_json: Json = False, database: Database = None) -> None:
     """Take an entry out of the schedule. A campaign that it has begun runs on."""
-    from labctl.services.commands.local import open_acts
+    from labctl.services.commands.local import open_commands
 
-    with one_clear_line(), open_acts(database) as acts:
-        answer = acts.cancel_start(start)
+    with one_clear_line(), open_commands(database) as commands:
+        answer = commands.cancel_start(start)
     print_json(answer) if as_json else print_start(answer)

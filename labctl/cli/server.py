@@ -9,7 +9,7 @@ import typer
 
 from labctl.cli.error_reporting import ending_is_an_interrupt, one_clear_line
 from labctl.cli.options import BenchName, Database, Json
-from labctl.cli.output import complaints, console, print_json
+from labctl.cli.output import console, print_json, stderr
 
 
 def serve(
@@ -55,20 +55,20 @@ def serve(
             require_keys=require_keys, max_upload_mib=max_upload_mib,
         )  # fmt: skip
         left = serve_forever(request, ready)
-    complaints.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
+    stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
 
 
 def _found(source: str, database: str | None) -> tuple[str, str]:
     """Say what is wrong with a bench when its service starts, and which campaign was left there; empty for nothing."""
-    from labctl.services.campaigns.execution import how_left
+    from labctl.services.campaigns.execution import describe_safe_state
     from labctl.services.campaigns.resume import to_be_taken_up
-    from labctl.services.commands.open import open_reading
+    from labctl.services.commands.open import open_readonly
     from labctl.services.planning.loading import load_bench
 
     name = load_bench(source).name
-    with open_reading(database) as store:
+    with open_readonly(database) as store:
         unconfirmed = store.benches.unconfirmed(name)
-        return how_left(name, unconfirmed) if unconfirmed else "", to_be_taken_up(store, name)
+        return describe_safe_state(name, unconfirmed) if unconfirmed else "", to_be_taken_up(store, name)
 
 
 def simulator(

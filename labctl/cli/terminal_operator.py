@@ -10,11 +10,11 @@ from contextvars import copy_context
 from typing import TYPE_CHECKING
 
 from instruments.clock import SystemClock
-from labctl.cli.output import complaints
+from labctl.cli.output import stderr
 from labctl.config import os_user
 from labctl.errors import StoreError
 from procedures.contracts.errors import StalePrompt
-from procedures.contracts.operator import PersonOperator
+from procedures.contracts.operator import HumanOperator
 
 if TYPE_CHECKING:
     from procedures.contracts.operator import Operator, Prompt
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 LOOK_S = 0.5
 
 
-class Attendant:
+class TerminalOperator:
     """Prints each question and takes the next line for its answer: empty for done, anything else says why not."""
 
-    def attend(self, operator: Operator, note: Callable[[str], None]) -> None:
+    def answer_prompts(self, operator: Operator, note: Callable[[str], None]) -> None:
         """Answer for an operator from now on, in the background; `note` is told of each answer.
 
         A bench that helps itself asks nobody.
         """
-        if isinstance(operator, PersonOperator):
+        if isinstance(operator, HumanOperator):
             here = copy_context()  # in the name of whoever gave the command
             threading.Thread(target=here.run, args=(self._serve, operator, note), daemon=True).start()
 
-    def _serve(self, operator: PersonOperator, note: Callable[[str], None]) -> None:
+    def _serve(self, operator: HumanOperator, note: Callable[[str], None]) -> None:
         clock, asked = SystemClock(), ""
         while True:
             prompt = operator.pending
@@ -44,10 +44,10 @@ class Attendant:
             clock.sleep(LOOK_S)
 
     @staticmethod
-    def _put(operator: PersonOperator, prompt: Prompt, note: Callable[[str], None]) -> None:
+    def _put(operator: HumanOperator, prompt: Prompt, note: Callable[[str], None]) -> None:
         if sys.stdin.isatty():  # an Enter from before the question is no answer to it
             termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
-        complaints.print(f"{prompt.text}. Press Enter when it is done, or type why it cannot be.", markup=False)
+        stderr.print(f"{prompt.text}. Press Enter when it is done, or type why it cannot be.", markup=False)
         line = sys.stdin.readline()
         if not line:  # nobody sits there
             return
@@ -58,4 +58,4 @@ class Attendant:
                 operator.confirm(prompt.id, os_user())
             note(f"{prompt.id}: {f'cannot be done; {why}' if why else 'done'}; {prompt.text}")
         except (StalePrompt, StoreError) as error:
-            complaints.print(f"labctl: {error}", markup=False)
+            stderr.print(f"labctl: {error}", markup=False)

@@ -1,7 +1,7 @@
 """Numbers only: a recording in, a model out. No database, no HTTP, no clock."""
 
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.fit_data import Context, context_of
+from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.effects import CATALOGUE, describe_effects
 from labctl.fitting.estimation.error_metrics import ErrorFigures, Spread, by_turning_axis, rms
 from labctl.fitting.estimation.fit import FitResult, coefficients_json, fit, fit_turning, residuals
@@ -12,18 +12,18 @@ __all__ = [
     "CATALOGUE",
     "PRESETS",
     "Channels",
-    "Context",
     "ErrorFigures",
     "ErrorModel",
+    "FitData",
     "FitResult",
     "FittedModel",
     "Spread",
     "by_turning_axis",
     "coefficients_json",
-    "context_of",
     "describe_effects",
     "describe_presets",
     "fit",
+    "fit_data_of",
     "fit_turning",
     "residuals",
     "rms",

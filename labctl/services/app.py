@@ -12,28 +12,28 @@ from instruments.clock import Clock
 from labctl.actor import ITSELF, acting
 from labctl.errors import Conflict, StoreError
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.event_stream import Followers
-from labctl.services.campaigns.execution import how_left
+from labctl.services.campaigns.event_stream import CampaignEventStream
+from labctl.services.campaigns.execution import describe_safe_state
 from labctl.services.campaigns.status import from_rows, looked_after
-from labctl.services.commands.local import LocalActs
+from labctl.services.commands.local import LocalCommands
 from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.schedule import queue
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.answers import CampaignAnswer, EventAnswer, ScheduledAnswer
+from labctl.services.schemas.answers import CampaignResponse, EventResponse, ScheduledResponse
 from labctl.store import Store
-from procedures.execution.signals import told_first
+from procedures.execution.signals import add_shutdown_hook
 
 NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`"
 
 
-class ServiceActs(LocalActs):
+class ServiceCommands(LocalCommands):
     """The acts of a service: a campaign on its own bench is aborted by its runner."""
 
     def __init__(self, store: Store, clock: Clock, runner: BenchRunner | None) -> None:
         super().__init__(store, clock)
         self._runner = runner
 
-    def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
+    def abort_campaign(self, campaign: int, reason: str) -> CampaignResponse:
         """End a campaign now, in the safe state."""
         if self._runner is not None and self._runner.runs(campaign):
             try:
@@ -43,7 +43,7 @@ class ServiceActs(LocalActs):
             return answer
         return super().abort_campaign(campaign, reason)
 
-    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignResponse:
         """Ask a running campaign to hold after the present data set."""
         if self._runner is None:
             return super().pause_campaign(campaign, request)
@@ -51,7 +51,7 @@ class ServiceActs(LocalActs):
         self._note_campaign("pause", campaign, request.text)
         return answer
 
-    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignResponse:
         """Let a paused campaign go on, or take up one that was interrupted."""
         if self._runner is None:
             raise Conflict(NO_BENCH)
@@ -61,7 +61,7 @@ class ServiceActs(LocalActs):
             self._note_campaign("resume", campaign, f"{request.reason or 'goes on'} ({request.by})")
         return answer
 
-    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:
         """Answer the question that a campaign has put."""
         if self._runner is None:
             return super().confirm(campaign, request)
@@ -70,7 +70,7 @@ class ServiceActs(LocalActs):
         self._note_campaign("confirm", campaign, said)
         return answer
 
-    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledResponse:
         """Enter a campaign into the schedule of this service's bench."""
         if self._runner is None:
             raise Conflict(NO_BENCH)
@@ -78,12 +78,12 @@ class ServiceActs(LocalActs):
             raise Conflict(f"this service runs bench {self._runner.bench.name}, not {bench}; leave the bench out")
         return queue.add_start(self._store, request, self._runner.bench, self._clock.utc())
 
-    def cancel_start(self, start: int) -> ScheduledAnswer:
+    def cancel_start(self, start: int) -> ScheduledResponse:
         """Take an entry out of the schedule."""
         return queue.cancel_start(self._store, start, self._clock.utc())
 
 
-class House:
+class LabService:
     """What a running service serves."""
 
     def __init__(self, store: Store, clock: Clock, runner: BenchRunner | None = None) -> None:
@@ -91,7 +91,7 @@ class House:
         self.clock = clock
         self._runner = runner
         self.scheduler = None if runner is None else Scheduler(store, clock, runner, runner.bench.name)
-        self._followers = Followers(store, self.status, None if runner is None else runner.listen)
+        self._event_stream = CampaignEventStream(store, self.status, None if runner is None else runner.listen)
         self._opened_at = clock.utc()
         self._stops = self._closed = False
         self.left = ""  #: once it is closed: how the bench was left
@@ -107,7 +107,7 @@ class House:
         Then the schedule runs: what is due waits for that campaign. A signal to end is heard here first: an HTTP server
         waits for its requests before it closes the house, and a listener may stay for hours.
         """
-        told_first(self.end_soon)
+        add_shutdown_hook(self.end_soon)
         with acting(ITSELF):  # nobody asked for it
             if self._runner is not None:
                 self._runner.take_up_left()
@@ -138,13 +138,15 @@ class House:
         bench = runner.bench.name
         try:
             unconfirmed = self.store.benches.unconfirmed(bench)
-            return how_left(bench, unconfirmed) if runner.used or unconfirmed else f"bench {bench} was not used"
+            return (
+                describe_safe_state(bench, unconfirmed) if runner.used or unconfirmed else f"bench {bench} was not used"
+            )
         except StoreError as error:
             return f"whether bench {bench} is safe cannot be read ({error}); look at it"
 
-    def acts(self) -> ServiceActs:
+    def commands(self) -> ServiceCommands:
         """Return who acts on the database."""
-        return ServiceActs(self.store, self.clock, self._runner)
+        return ServiceCommands(self.store, self.clock, self._runner)
 
     def bench_runner(self) -> BenchRunner:
         """Return the runner of this service's bench; raises Conflict when it has none."""
@@ -156,7 +158,7 @@ class House:
         """Describe the bench of this service."""
         return [] if self._runner is None else [self._runner.describe()]
 
-    def status(self, campaign: int) -> CampaignAnswer:
+    def status(self, campaign: int) -> CampaignResponse:
         """Return where a campaign is: live when it runs here, else as the database tells."""
         live = self._runner.status(campaign) if self._runner is not None else None
         if live is not None:
@@ -167,13 +169,13 @@ class House:
     def _runs(self, campaign: int) -> bool:
         return self._runner is not None and self._runner.runs(campaign)
 
-    def campaigns(self) -> list[CampaignAnswer]:
+    def campaigns(self) -> list[CampaignResponse]:
         """Return every campaign, newest first."""
         return [self.status(row.id) for row in self.store.campaigns.all()]
 
-    def follow(self, campaign: int, after: int) -> AsyncIterator[EventAnswer | CampaignAnswer | None]:
+    def follow(self, campaign: int, after: int) -> AsyncIterator[EventResponse | CampaignResponse | None]:
         """Tell where a campaign is, as `Followers.follow` does, until it ends or this service does."""
-        return self._followers.follow(campaign, after, over=lambda: self._stops and not self._runs(campaign))
+        return self._event_stream.follow(campaign, after, over=lambda: self._stops and not self._runs(campaign))
 
     def pulse(self) -> dict[str, Any]:
         """Return what anybody may know: that the service lives, and which."""

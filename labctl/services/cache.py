@@ -21,21 +21,21 @@ from weakref import WeakValueDictionary
 
 from platformdirs import user_cache_path
 
-from labctl.services.schemas.answers import Answer
+from labctl.services.schemas.answers import ResponseModel
 
-A = TypeVar("A", bound=Answer)
+A = TypeVar("A", bound=ResponseModel)
 ROOMS = ("instruments", "labctl", "procedures")
 LIBRARIES = ("numpy", "scipy")
 #: The oldest go when there are more; an answer has some 200 kB.
 MOST = 400
 
 
-def kept(kind: type[A], question: Mapping[str, object], work: Callable[[], A]) -> A:
+def cached(kind: type[A], question: Mapping[str, object], work: Callable[[], A]) -> A:
     """Return the answer to a question (JSON values), worked out by `work` only when it is not kept yet."""
-    return kept_among(kind, question, lambda: [work()])
+    return cached_group(kind, question, lambda: [work()])
 
 
-def kept_among(kind: type[A], question: Mapping[str, object], work: Callable[[], Sequence[Answer]]) -> A:
+def cached_group(kind: type[A], question: Mapping[str, object], work: Callable[[], Sequence[ResponseModel]]) -> A:
     """Return the answer of one kind where one work gives answers of several: all of them are kept.
 
     Whoever asks the same question meanwhile, also for another kind, waits for that work instead of doing it again.
@@ -43,18 +43,18 @@ def kept_among(kind: type[A], question: Mapping[str, object], work: Callable[[],
     file = _file(kind, question)
     if (answer := _read(kind, file)) is not None:
         return answer
-    with one_at_a_time(json.dumps(question, sort_keys=True)):
+    with single_flight(json.dumps(question, sort_keys=True)):
         if (answer := _read(kind, file)) is not None:
             return answer
         # What is kept is what is said, also the first time: one way through JSON, one answer.
         said = {type(each): each.model_dump_json() for each in work()}
         for each, text in said.items():
             with suppress(OSError):
-                write_kept(_file(each, question), text.encode(), MOST)
+                write_cached(_file(each, question), text.encode(), MOST)
         return kind.model_validate_json(said[kind])
 
 
-def _file(kind: type[Answer], question: Mapping[str, object]) -> Path:
+def _file(kind: type[ResponseModel], question: Mapping[str, object]) -> Path:
     asked = json.dumps({"by": code_digest(), "kind": kind.__name__, **question}, sort_keys=True)
     return user_cache_path("labctl") / "answers" / f"{hashlib.sha256(asked.encode()).hexdigest()}.json"
 
@@ -79,7 +79,7 @@ _turns_guard = threading.Lock()
 
 
 @contextmanager
-def one_at_a_time(asked: str) -> Iterator[None]:
+def single_flight(asked: str) -> Iterator[None]:
     """Let one thread of this process at a time work at the same question."""
     with _turns_guard:
         turn = _turns.setdefault(asked, _Turn())
@@ -87,7 +87,7 @@ def one_at_a_time(asked: str) -> Iterator[None]:
         yield
 
 
-def write_kept(file: Path, content: bytes, most: int) -> None:
+def write_cached(file: Path, content: bytes, most: int) -> None:
     """Write a file whole or not at all; of its folder's files only the `most` used last stay. Raises OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with NamedTemporaryFile("wb", dir=file.parent, suffix=".part", delete=False) as part:

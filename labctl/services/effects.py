@@ -9,9 +9,9 @@ import numpy as np
 
 from labctl.fitting import describe_effects, describe_presets
 from labctl.fitting.data.channels import Channels, body_rates
-from labctl.fitting.data.temperature_history import Past
+from labctl.fitting.data.temperature_history import TemperatureHistory
 from labctl.fitting.effects import CATALOGUE, Reference, Term
-from labctl.fitting.models.error_model import leaves_the_house
+from labctl.fitting.models.error_model import is_exported
 
 #: Sizes that are not told as a coefficient: how far the thermometer is off.
 OTHER_UNITS = {"thermometer_error": "K"}
@@ -24,8 +24,7 @@ def catalogue() -> dict[str, Any]:
     """
     units = _units()
     effects = [
-        {**about, "unit": units[about["id"]], "leaves": leaves_the_house(Term(about["id"]))}
-        for about in describe_effects()
+        {**about, "unit": units[about["id"]], "leaves": is_exported(Term(about["id"]))} for about in describe_effects()
     ]
     return {"effects": effects, "models": describe_presets()}
 
@@ -40,7 +39,9 @@ def _units() -> dict[str, str]:
     columns: dict[str, Any] = {name: np.arange(1.0, n + 1) for name in needed}
     columns |= {"table_rate_dps": rate, "temperature_c": np.linspace(20.0, 45.0, n), "position": position}
     numbers = tuple(range(1, n + 1))
-    channels = Channels(columns, body_rates(rate, position), Past(counted={"run": numbers, "mounting": numbers}))
+    channels = Channels(
+        columns, body_rates(rate, position), TemperatureHistory(counted={"run": numbers, "mounting": numbers})
+    )
     found = {}
     for name, kind in CATALOGUE.items():
         term = Term(name, None, {each.name: each.low for each in kind.parameters})

@@ -30,7 +30,7 @@ from labctl.store.repositories.journal import StoreJournal
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.recordings import Recordings
-from labctl.store.repositories.resume_points import Interruptions, Standing, TakeUp
+from labctl.store.repositories.resume_points import Interruptions, ResumePoint, TakeUp
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.repositories.units import Units
 
@@ -65,7 +65,7 @@ __all__ = [
     "Progress",
     "RecordingRow",
     "Recordings",
-    "Standing",
+    "ResumePoint",
     "StartEventRow",
     "StartRow",
     "Starts",

@@ -11,7 +11,7 @@ from procedures.contracts.bench import Bench
 
 
 @dataclass
-class Crew:
+class ActiveBench:
     """A bench whose units can drop out. `dropped` says which did, and why."""
 
     table: RateTable
@@ -20,7 +20,7 @@ class Crew:
     dropped: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, bench: Bench, dropped: dict[str, str] | None = None) -> Crew:
+    def of(cls, bench: Bench, dropped: dict[str, str] | None = None) -> ActiveBench:
         """Return the crew of an opened bench, without the units that dropped out before."""
         gone = dict(dropped or {})
         taking_part = {name: gyro for name, gyro in bench.gyros.items() if name not in gone}

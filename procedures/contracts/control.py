@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
-class Wish:
+class ControlRequest:
     """What a person wants of the campaign at present."""
 
     pause: bool = False
@@ -21,10 +21,10 @@ class Control:
 
     def __init__(self) -> None:
         self._lock = threading.RLock()  # a signal may come while its own thread is in here
-        self._wish = Wish()
+        self._wish = ControlRequest()
 
     @property
-    def wish(self) -> Wish:
+    def wish(self) -> ControlRequest:
         """The present wish."""
         return self._wish
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 from procedures.contracts.errors import StalePrompt
 
 if TYPE_CHECKING:
-    from instruments.interfaces.unit_handler import Hand
+    from instruments.interfaces.unit_handler import UnitHandler
 
 
 @dataclass(frozen=True)
@@ -53,21 +53,21 @@ class Operator(Protocol):
         ...
 
 
-class HandOperator:
+class UnitHandlerOperator:
     """Somebody who does at once what is asked, with a hand that reaches into the simulated bench."""
 
     at_once = True
 
-    def __init__(self, hand: Hand, by: str = "simulated bench") -> None:
-        self._hand = hand
+    def __init__(self, unit_handler: UnitHandler, by: str = "simulated bench") -> None:
+        self._unit_handler = unit_handler
         self._by = by
 
     def ask(self, prompt: Prompt) -> None:
         if prompt.kind == "mount":
             assert prompt.position is not None
-            self._hand.mount(prompt.position)
+            self._unit_handler.mount(prompt.position)
         else:
-            self._hand.power(prompt.kind == "power_on")
+            self._unit_handler.power(prompt.kind == "power_on")
 
     def answer(self, prompt_id: str) -> Answer | None:
         return Answer(prompt_id, confirmed=True, by=self._by)
@@ -76,7 +76,7 @@ class HandOperator:
         pass
 
 
-class PersonOperator:
+class HumanOperator:
     """A person who answers from another thread: command line, HTTP, a page. One question at a time."""
 
     at_once = False

@@ -10,8 +10,8 @@ from instruments.interfaces.table import Spin
 from procedures.contracts.errors import BadData, GuardTripped, StepFailed
 from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
-from procedures.execution.context import UNIT_FAULTS, Stage, heed
-from procedures.monitoring.bench_snapshot import Tally
+from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
+from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.recorder import warning
 
 LEAD_S = 0.5  #: streams are cleared this long before the gate opens
@@ -20,7 +20,7 @@ BLOCK_S = 1.0  #: readings are written down this often
 SHARED_BLOCK_S = 0.5
 
 
-def acquire(stage: Stage, step: Acquire) -> dict[str, float]:
+def acquire(stage: ExecutionContext, step: Acquire) -> dict[str, float]:
     """Take one data set, again where a unit's readings failed and the recipe allows another attempt.
 
     Raises StepFailed, InstrumentError, Aborted.
@@ -44,7 +44,7 @@ def acquire(stage: Stage, step: Acquire) -> dict[str, float]:
             reopen(stage)
 
 
-def reopen(stage: Stage) -> None:
+def reopen(stage: ExecutionContext) -> None:
     """Open every unit's stream anew; a unit that cannot be reached drops out where others go on."""
     for name, gyro in list(stage.bench.gyros.items()):
         try:
@@ -56,7 +56,7 @@ def reopen(stage: Stage) -> None:
             stage.drop(name, str(error))
 
 
-def _unit_at_fault(stage: Stage, error: LinkError | BadData | GuardTripped) -> str | None:
+def _unit_at_fault(stage: ExecutionContext, error: LinkError | BadData | GuardTripped) -> str | None:
     """Return the unit whose readings failed; None when it is something else, or a limit that suspends."""
     if isinstance(error, GuardTripped) and (error.kind not in UNIT_FAULTS or error.action != "fail"):
         return None
@@ -64,13 +64,15 @@ def _unit_at_fault(stage: Stage, error: LinkError | BadData | GuardTripped) -> s
     return unit if unit in stage.bench.gyros else None
 
 
-def _take(stage: Stage, step: Acquire) -> dict[str, float]:
+def _take(stage: ExecutionContext, step: Acquire) -> dict[str, float]:
     ramp_s = abs(step.rate_dps) / stage.bench.table.limits.max_acceleration_dps2
     if stage.watch.due(within_s=ramp_s):
         stage.look()
     spin = stage.bench.table.spin(step.rate_dps, _steady_s(stage, step))
     gate = _gate(spin, step)
-    tallies = {name: Tally(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in stage.bench.gyros.items()}
+    tallies = {
+        name: ReadingCounts(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in stage.bench.gyros.items()
+    }
     with stage.watch.taking_readings(spin, tallies):
         stage.look()
         _wait_for_gate(stage, gate[0])
@@ -78,7 +80,7 @@ def _take(stage: Stage, step: Acquire) -> dict[str, float]:
         try:
             _read_gate(stage, number, gate, tallies)
             if stage.watch.due(within_s=ramp_s + LEAD_S):
-                stage.look(glance=False)
+                stage.look(read_latest=False)
             stage.bench.table.settle(spin)  # a run that does not end as computed was not the run it was taken for
             _demand_readings(tallies)
         except BaseException as error:
@@ -90,7 +92,7 @@ def _take(stage: Stage, step: Acquire) -> dict[str, float]:
     return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **counts}
 
 
-def _steady_s(stage: Stage, step: Acquire) -> float:
+def _steady_s(stage: ExecutionContext, step: Acquire) -> float:
     """Return how long the table has to be steady: settling, the gate rounded up to step edges, and the last block."""
     step_deg = stage.bench.table.limits.step_deg
     edges_s = 2 * step_deg / abs(step.rate_dps) if step.rate_dps else 0.0
@@ -109,16 +111,16 @@ def _gate(spin: Spin, step: Acquire) -> tuple[float, float]:
     return from_s, until_s
 
 
-def _wait_for_gate(stage: Stage, from_s: float) -> None:
+def _wait_for_gate(stage: ExecutionContext, from_s: float) -> None:
     """Let the table settle, then drop what the streams have buffered meanwhile, unless the gate is open already."""
     stage.pass_time(from_s - LEAD_S - stage.clock.now_s(), pausing=False)
     if stage.clock.now_s() >= from_s:
         return
     for name, gyro in stage.bench.gyros.items():
-        stage.watch.heard(name, gyro, gyro.glance())
+        stage.watch.heard(name, gyro, gyro.read_latest())
 
 
-def _header(stage: Stage, step: Acquire, spin: Spin, gate: tuple[float, float]) -> DataSetHeader:
+def _header(stage: ExecutionContext, step: Acquire, spin: Spin, gate: tuple[float, float]) -> DataSetHeader:
     return DataSetHeader(
         step=step,
         rate_dps=spin.rate_dps,
@@ -132,23 +134,25 @@ def _header(stage: Stage, step: Acquire, spin: Spin, gate: tuple[float, float]) 
     )
 
 
-def _read_gate(stage: Stage, number: int, gate: tuple[float, float], tallies: dict[str, Tally]) -> None:
+def _read_gate(
+    stage: ExecutionContext, number: int, gate: tuple[float, float], tallies: dict[str, ReadingCounts]
+) -> None:
     gyros = stage.bench.gyros
     block_s = BLOCK_S if len(gyros) == 1 else SHARED_BLOCK_S
     while (left_s := gate[1] - stage.clock.now_s()) > 0:
         _read_round(stage, number, gate, tallies, min(block_s, left_s) / len(gyros))
         if stage.watch.due(within_s=block_s):
-            stage.look(glance=False)
+            stage.look(read_latest=False)
         else:
-            heed(stage.watch.judge())
+            raise_violation(stage.watch.judge())
         stage.checkpoint()
     if len(gyros) > 1:  # whoever was read first in the last round still has the end of the gate in its buffer
         _read_round(stage, number, gate, tallies, 0.0)
-        heed(stage.watch.judge())
+        raise_violation(stage.watch.judge())
 
 
 def _read_round(
-    stage: Stage, number: int, gate: tuple[float, float], tallies: dict[str, Tally], slice_s: float
+    stage: ExecutionContext, number: int, gate: tuple[float, float], tallies: dict[str, ReadingCounts], slice_s: float
 ) -> None:
     """Read every unit once and write down what falls into the gate."""
     for name, gyro in stage.bench.gyros.items():
@@ -171,7 +175,7 @@ def cut(readings: Readings, gate: tuple[float, float], start_s: float) -> Readin
     return Readings(t_s[inside] - start_s, raw, readings.valid[inside], readings.lost, readings.damaged)
 
 
-def _demand_readings(tallies: dict[str, Tally]) -> None:
+def _demand_readings(tallies: dict[str, ReadingCounts]) -> None:
     for name, tally in tallies.items():
         if tally.valid + tally.invalid == 0:
             raise BadData(

@@ -9,16 +9,16 @@ from dataclasses import dataclass, field
 
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
-from procedures.contracts.active_bench import Crew
+from procedures.contracts.active_bench import ActiveBench
 from procedures.contracts.bench import Bench
 from procedures.contracts.control import Control
 from procedures.contracts.errors import Aborted, Interrupted, StepFailed, Unanswered
 from procedures.contracts.journal import CampaignState, Event
 from procedures.contracts.operator import Answer, Operator, Prompt
 from procedures.contracts.steps import Soak
-from procedures.monitoring.guards import Trip
-from procedures.monitoring.monitor import Watch
-from procedures.monitoring.recorder import Logbook, warning
+from procedures.monitoring.guards import GuardViolation
+from procedures.monitoring.monitor import BenchMonitor
+from procedures.monitoring.recorder import CampaignRecorder, warning
 from procedures.recipe.recipe import Recipe
 
 CHECK_S = 1.0  #: how long the clock runs at most between two looks at what a person wants
@@ -29,17 +29,17 @@ UNIT_FAULTS = {"stale", "damaged_readings", "invalid_readings"}  #: a trip that 
 
 
 @dataclass
-class Stage:
+class ExecutionContext:
     """Everything a step handler may touch."""
 
     recipe: Recipe
-    bench: Crew
+    bench: ActiveBench
     whole: Bench  #: with the units that dropped out
     clock: Clock
     operator: Operator
     control: Control
-    log: Logbook
-    watch: Watch
+    log: CampaignRecorder
+    watch: BenchMonitor
     added_runs: int = 0  #: powered sessions more than the plan has
     paused_s: float = 0.0  #: how long the campaign was paused so far
     soaked: Soak | None = None  #: the soak that still holds: its temperature has not been left since
@@ -79,12 +79,12 @@ class Stage:
             self.pass_time(min(LOOK_S, left_s))
             self.look()
 
-    def look(self, *, glance: bool = True) -> None:
+    def look(self, *, read_latest: bool = True) -> None:
         """Look at the bench once. Raises GuardTripped for a limit that does more than warn, and InstrumentError."""
-        trips = self.watch.look(LOOK_S, glance=glance)
-        heed(trips if self.watch.taking else self.without_dropouts(trips))
+        trips = self.watch.look(LOOK_S, read_latest=read_latest)
+        raise_violation(trips if self.watch.taking else self.without_dropouts(trips))
 
-    def without_dropouts(self, trips: list[Trip]) -> list[Trip]:
+    def without_dropouts(self, trips: list[GuardViolation]) -> list[GuardViolation]:
         """Let units drop out whose readings failed while others go on; returns the other trips."""
         left = []
         for trip in trips:
@@ -178,7 +178,7 @@ class Stage:
         return f"{self.clock.utc():%Y%m%dT%H%M%S.%f}-{self._questions}"
 
 
-def heed(trips: list[Trip]) -> None:
+def raise_violation(trips: list[GuardViolation]) -> None:
     """Raise GuardTripped for the first limit that does more than warn; one that fails goes before one that suspends."""
     serious = [trip for trip in trips if trip.action != "warn"]
     if serious:

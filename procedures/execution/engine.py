@@ -6,23 +6,23 @@ from dataclasses import dataclass
 
 from instruments.clock import Clock
 from instruments.errors import InstrumentError, LinkError
-from procedures.contracts.active_bench import Crew
+from procedures.contracts.active_bench import ActiveBench
 from procedures.contracts.bench import Bench
 from procedures.contracts.control import Control
 from procedures.contracts.errors import Aborted, GuardTripped, Interrupted, ProcedureError, StepFailed, Unanswered
 from procedures.contracts.journal import NOT_SAFE, CampaignState, Event, Journal
 from procedures.contracts.operator import Operator
 from procedures.contracts.steps import Acquire, Mount, SafeState, Soak, Step, StepResult
-from procedures.execution.context import LOOK_S, Stage
-from procedures.execution.reconnect import mend, mendable
+from procedures.execution.context import LOOK_S, ExecutionContext
+from procedures.execution.reconnect import is_reconnectable, reconnect
 from procedures.execution.resume import Restart, take_up
 from procedures.execution.safe_state import make_safe
-from procedures.execution.signals import uninterrupted
+from procedures.execution.signals import ignore_signals
 from procedures.execution.step_handlers import HANDLERS, Figures
 from procedures.monitoring.guards import Guards
-from procedures.monitoring.monitor import Watch
-from procedures.monitoring.progress import Board, Observer, Progress
-from procedures.monitoring.recorder import Logbook, warning
+from procedures.monitoring.monitor import BenchMonitor
+from procedures.monitoring.progress import Observer, Progress, ProgressTracker
+from procedures.monitoring.recorder import CampaignRecorder, warning
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan
 
@@ -59,17 +59,17 @@ class Engine:
     ) -> None:
         self.plan = plan
         self.control = control or Control()
-        self._board = Board(plan, clock, observer)
-        self._log = Logbook(journal, clock, self._board, clock.now_s() if start_s is None else start_s)
+        self._board = ProgressTracker(plan, clock, observer)
+        self._log = CampaignRecorder(journal, clock, self._board, clock.now_s() if start_s is None else start_s)
         self._start_is_now = start_s is None
         self.complaints: tuple[str, ...] = ()  #: what the last safe state could not confirm
         self._whole = bench
-        self._crew = Crew.of(bench)
+        self._crew = ActiveBench.of(bench)
         guards = guards or Guards(
             plan.recipe.guards, lambda: BenchLimits.of(bench), bench.chamber.name, bench.table.name
         )
-        watch = Watch(self._crew, guards, self._log)
-        self._stage = Stage(plan.recipe, self._crew, bench, clock, operator, self.control, self._log, watch)
+        watch = BenchMonitor(self._crew, guards, self._log)
+        self._stage = ExecutionContext(plan.recipe, self._crew, bench, clock, operator, self.control, self._log, watch)
         self._safe = False
         self._left_out: set[int] = set()  #: steps that an unanswered mounting takes with it
         self._owed: Soak | None = None  #: to be done again before the next data set
@@ -115,7 +115,7 @@ class Engine:
         if start_at == 0 and restart is None:
             self._log.change_state(CampaignState.RUNNING, "started")
             self._stage.watch.begin()
-            self._stage.look(glance=False)
+            self._stage.look(read_latest=False)
             return
         restart = restart or Restart()
         for name in restart.dropped.keys() & self._crew.gyros.keys():
@@ -174,7 +174,7 @@ class Engine:
     def _mends(self, index: int, error: BaseException) -> bool:
         """Return whether a step is begun again once a silent instrument answers."""
         may = self._silences + 1 < self.plan.recipe.on_failure.link_attempts
-        return isinstance(error, LinkError) and may and mendable(self._stage, self.plan.steps[index], error)
+        return isinstance(error, LinkError) and may and is_reconnectable(self._stage, self.plan.steps[index], error)
 
     def _leaves_out(self, index: int) -> bool:
         """Return whether a mounting that nobody does is left out."""
@@ -231,7 +231,7 @@ class Engine:
         """Reach an instrument again; a soak is owed if the air left its band meanwhile."""
         soaked = self._stage.soaked
         with self._stage.watch.telling(self._stage.notice_leaving):
-            mend(self._stage, error)
+            reconnect(self._stage, error)
         if soaked is not None and self._stage.soaked is None:
             self._owed = soaked
 
@@ -262,7 +262,7 @@ class Engine:
         """End the campaign, whoever interrupts; what was interrupted before the shield was up is begun again."""
         while True:
             try:
-                with uninterrupted(self._hold_on):
+                with ignore_signals(self._hold_on):
                     return self._end(state, reason)
             except KeyboardInterrupt:
                 continue

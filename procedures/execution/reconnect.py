@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from instruments.errors import Garbled, InstrumentError, LinkError, NoReply
+from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply
 from procedures.contracts.steps import Acquire, Home, MoveChamber, Rest, Soak, Step
-from procedures.execution.context import LOOK_S, Stage, heed
+from procedures.execution.context import LOOK_S, ExecutionContext, raise_violation
 
 PAUSES_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 STANDSTILL_S = 60.0
@@ -12,7 +12,7 @@ STANDSTILL_S = 60.0
 REPEATABLE = (Home, MoveChamber, Soak, Acquire, Rest)
 
 
-def mendable(stage: Stage, step: Step, error: LinkError) -> bool:
+def is_reconnectable(stage: ExecutionContext, step: Step, error: LinkError) -> bool:
     """Return whether a step may be begun again once its instrument answers.
 
     A table that is silent or talks nonsense in the middle of a move may have lost steps or time, and a person has to
@@ -20,17 +20,19 @@ def mendable(stage: Stage, step: Step, error: LinkError) -> bool:
     """
     if not isinstance(step, REPEATABLE):
         return False
-    return error.device != stage.bench.table.name or not isinstance(error, NoReply | Garbled)
+    return error.device != stage.bench.table.name or not isinstance(error, NoReply | MalformedReply)
 
 
-def mend(stage: Stage, error: LinkError) -> None:
+def reconnect(stage: ExecutionContext, error: LinkError) -> None:
     """Wait until an instrument answers again. Raises the error when it stays silent, and GuardTripped."""
     device = error.device
     stage.watch.link(device, "degraded", f"{error}; it is tried again, {len(PAUSES_S)} times")
     for pause_s in PAUSES_S:
         stage.pass_time(pause_s, pausing=False)
         trips = stage.without_dropouts(stage.watch.look(LOOK_S))
-        heed([trip for trip in trips if trip.action == "fail"])  # what suspends is seen again when the step begins
+        raise_violation(
+            [trip for trip in trips if trip.action == "fail"]
+        )  # what suspends is seen again when the step begins
         try:
             _reach(stage, device)
         except InstrumentError:
@@ -41,7 +43,7 @@ def mend(stage: Stage, error: LinkError) -> None:
     raise error
 
 
-def _reach(stage: Stage, device: str) -> None:
+def _reach(stage: ExecutionContext, device: str) -> None:
     bench = stage.bench
     if device == bench.table.name:
         bench.table.stop()
@@ -54,4 +56,4 @@ def _reach(stage: Stage, device: str) -> None:
     elif device in bench.gyros:
         bench.gyros[device].stop()
         bench.gyros[device].start()
-        bench.gyros[device].glance()
+        bench.gyros[device].read_latest()

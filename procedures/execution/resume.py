@@ -10,7 +10,7 @@ from procedures.contracts.errors import StepFailed
 from procedures.contracts.journal import Event
 from procedures.contracts.operator import Prompt
 from procedures.contracts.steps import Acquire, Soak, Step
-from procedures.execution.context import Stage
+from procedures.execution.context import ExecutionContext
 from procedures.execution.safe_state import make_safe
 from procedures.execution.step_handlers import open_streams
 from procedures.planning.plan import Plan
@@ -38,7 +38,9 @@ def soak_matters_after_s(rules: ResumeRules, band_c: float, ramp_c_per_min: floa
     return 60.0 * 2.0 * band_c / ramp_c_per_min
 
 
-def take_up(stage: Stage, plan: Plan, start_at: int, restart: Restart, carry_out: Callable[[Step], object]) -> None:
+def take_up(
+    stage: ExecutionContext, plan: Plan, start_at: int, restart: Restart, carry_out: Callable[[Step], object]
+) -> None:
     """Make the bench what step `start_at` relies on.
 
     Raises StepFailed when it cannot be made safe first, and what steps raise.
@@ -47,7 +49,7 @@ def take_up(stage: Stage, plan: Plan, start_at: int, restart: Restart, carry_out
     stage.watch.begin()
     left_c = _Furthest(plan, start_at)
     with stage.watch.telling(left_c.add):
-        stage.look(glance=False)
+        stage.look(read_latest=False)
         if not any(isinstance(step, Acquire) for step in plan.steps[start_at:]):
             return
         if run := plan.run_at(start_at, restart.skipped):
@@ -62,7 +64,7 @@ def take_up(stage: Stage, plan: Plan, start_at: int, restart: Restart, carry_out
     stage.log.event(Event("lead_in_done", f"ready for step {start_at + 1}"))
 
 
-def _safe_first(stage: Stage) -> None:
+def _safe_first(stage: ExecutionContext) -> None:
     """Bring the bench to its safe state, trying again while instruments start up."""
     until_s = stage.clock.now_s() + stage.recipe.resume.instruments_within_s
     pause_s = FIRST_PAUSE_S
@@ -86,7 +88,7 @@ class _Furthest:
             self.most = max(self.most, abs(chamber_c - self._soak.temperature_c))
 
 
-def _switch_on(stage: Stage, run: int, restart: Restart) -> None:
+def _switch_on(stage: ExecutionContext, run: int, restart: Restart) -> None:
     """Have the units on, streams open. After a power cut they come back by themselves, or a person is asked."""
     if not restart.power_lost:
         open_streams(stage, run)
@@ -107,13 +109,18 @@ def _switch_on(stage: Stage, run: int, restart: Restart) -> None:
     stage.watch_for(stage.recipe.warm_up_s)
 
 
-def _again(stage: Stage, step: Step, start_at: int, carry_out: Callable[[Step], object]) -> None:
+def _again(stage: ExecutionContext, step: Step, start_at: int, carry_out: Callable[[Step], object]) -> None:
     stage.log.event(Event("lead_in", f"done again before step {start_at + 1}: {step.kind}"))
     carry_out(step)
 
 
 def _soak_if_it_matters(
-    stage: Stage, soak: Soak, start_at: int, restart: Restart, left_c: float, carry_out: Callable[[Step], object]
+    stage: ExecutionContext,
+    soak: Soak,
+    start_at: int,
+    restart: Restart,
+    left_c: float,
+    carry_out: Callable[[Step], object],
 ) -> None:
     limit_s = soak_matters_after_s(stage.recipe.resume, soak.band_c, stage.bench.chamber.limits.ramp_c_per_min)
     if restart.power_lost or restart.gap_s > limit_s or left_c > soak.band_c:

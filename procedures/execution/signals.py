@@ -11,7 +11,7 @@ from typing import Any
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def told_first(noted: Callable[[], None]) -> None:
+def add_shutdown_hook(noted: Callable[[], None]) -> None:
     """Let `noted` hear of each signal to end before whoever handles it now; it may neither block nor raise.
 
     Nothing happens outside a process's main thread, or where nobody handles them.
@@ -32,7 +32,7 @@ def told_first(noted: Callable[[], None]) -> None:
 
 
 @contextmanager
-def uninterrupted(noted: Callable[[int], None] = lambda _: None) -> Iterator[None]:
+def ignore_signals(noted: Callable[[int], None] = lambda _: None) -> Iterator[None]:
     """Let nobody interrupt the block by Ctrl-C or a signal; `noted` hears of each.
 
     Every part of the safe state has an end of its own, so the block ends. Only a process's main thread gets signals;
@@ -54,13 +54,13 @@ def uninterrupted(noted: Callable[[int], None] = lambda _: None) -> Iterator[Non
 
 
 @contextmanager
-def afterwards() -> Iterator[None]:
+def defer_signals() -> Iterator[None]:
     """Let Ctrl-C or a signal come only after the block, which has to be short: a write that is torn in the middle
     leaves a connection behind that nobody can write with, and then not even the end can be written.
     """
     heard: list[int] = []
     try:
-        with uninterrupted(heard.append):
+        with ignore_signals(heard.append):
             yield
     finally:
         for number in heard[:1]:

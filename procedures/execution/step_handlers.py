@@ -12,7 +12,7 @@ from procedures.contracts.journal import Event
 from procedures.contracts.operator import Prompt
 from procedures.contracts.steps import Home, Mount, MoveChamber, PowerOff, PowerOn, Rest, SafeState, Soak
 from procedures.execution.acquire import acquire
-from procedures.execution.context import Stage
+from procedures.execution.context import ExecutionContext
 from procedures.execution.safe_state import make_safe
 from procedures.execution.soak import SoakJudge
 
@@ -21,7 +21,7 @@ Figures = dict[str, float]
 STARTING_PAUSES_S = (1.0, 2.0, 4.0)
 
 
-def home(stage: Stage, _step: Home) -> Figures:
+def home(stage: ExecutionContext, _step: Home) -> Figures:
     """Make sure the right instruments answer, and let the table find its home switch."""
     stage.bench.table.identify()
     stage.bench.chamber.identify()
@@ -29,7 +29,7 @@ def home(stage: Stage, _step: Home) -> Figures:
     return {"angle_deg": stage.bench.table.angle_deg()}
 
 
-def power_on(stage: Stage, step: PowerOn) -> Figures:
+def power_on(stage: ExecutionContext, step: PowerOn) -> Figures:
     """Have the units switched on, make sure they are who the bench file says, open their streams, warm up."""
     stage.soaked = None
     run = step.run + stage.added_runs
@@ -40,7 +40,7 @@ def power_on(stage: Stage, step: PowerOn) -> Figures:
     return {"run": float(run)}
 
 
-def open_streams(stage: Stage, run: int, *, dropping: bool = True) -> None:
+def open_streams(stage: ExecutionContext, run: int, *, dropping: bool = True) -> None:
     """Open every unit's stream and begin to watch it. A unit may take a while to start up.
 
     One that stays silent drops out where others go on. Raises InstrumentError.
@@ -55,7 +55,7 @@ def open_streams(stage: Stage, run: int, *, dropping: bool = True) -> None:
     stage.watch.powered(run)
 
 
-def _open_stream(stage: Stage, gyro: Gyro) -> None:
+def _open_stream(stage: ExecutionContext, gyro: Gyro) -> None:
     for pause_s in (*STARTING_PAUSES_S, None):
         try:
             gyro.identify()
@@ -68,7 +68,7 @@ def _open_stream(stage: Stage, gyro: Gyro) -> None:
             return
 
 
-def power_off(stage: Stage, step: PowerOff) -> Figures:
+def power_off(stage: ExecutionContext, step: PowerOff) -> Figures:
     """Close the streams and have the units switched off; the chamber is watched while they are."""
     stage.soaked = None
     if not stage.watch.run:  # the switching-on was left out
@@ -82,7 +82,7 @@ def power_off(stage: Stage, step: PowerOff) -> Figures:
     return {"run": float(run)}
 
 
-def mount(stage: Stage, step: Mount) -> Figures:
+def mount(stage: ExecutionContext, step: Mount) -> Figures:
     """Have a person turn the units."""
     stage.soaked = None
     text = f"turn the units so that body axis {step.position} points up along the table axis"
@@ -90,7 +90,7 @@ def mount(stage: Stage, step: Mount) -> Figures:
     return {"mounting": float(step.mounting)}
 
 
-def move_chamber(stage: Stage, step: MoveChamber) -> Figures:
+def move_chamber(stage: ExecutionContext, step: MoveChamber) -> Figures:
     """Write the set point and wait until the air is in the band. Raises SoakFailed when it does not arrive in time."""
     stage.soaked = None
     set_c = stage.bench.chamber.set_temperature_c(step.temperature_c)
@@ -114,7 +114,7 @@ def move_chamber(stage: Stage, step: MoveChamber) -> Figures:
     return {"setpoint_c": set_c, "chamber_c": stage.watch.chamber_c}
 
 
-def soak(stage: Stage, step: Soak) -> Figures:
+def soak(stage: ExecutionContext, step: Soak) -> Figures:
     """Hold a temperature until the units have taken it. When they do not in time, the recipe says what follows."""
     judge = SoakJudge(step)
     began_s = stage.clock.now_s() - stage.paused_s
@@ -130,7 +130,7 @@ def soak(stage: Stage, step: Soak) -> Figures:
     return judge.figures()
 
 
-def _unsettled(stage: Stage, step: Soak, judge: SoakJudge, took_s: float) -> None:
+def _unsettled(stage: ExecutionContext, step: Soak, judge: SoakJudge, took_s: float) -> None:
     """Do what the recipe says about a soak that does not settle. Raises SoakFailed or GuardTripped, or warns."""
     action = stage.recipe.guards.actions.get("soak", "fail")
     reason = f"the soak at {step.temperature_c:g} deg C did not settle within {step.timeout_s:g} s: {judge.why_not()}"
@@ -142,14 +142,14 @@ def _unsettled(stage: Stage, step: Soak, judge: SoakJudge, took_s: float) -> Non
         raise GuardTripped("soak", action, reason, stage.bench.chamber.name)
 
 
-def rest(stage: Stage, step: Rest) -> Figures:
+def rest(stage: ExecutionContext, step: Rest) -> Figures:
     """Let nothing move for a while."""
     with stage.watch.taking_readings():
         stage.watch_for(step.duration_s)
     return {}
 
 
-def safe_state(stage: Stage, _step: SafeState) -> Figures:
+def safe_state(stage: ExecutionContext, _step: SafeState) -> Figures:
     """Bring the bench to its safe state. Raises StepFailed naming what could not be confirmed."""
     stage.watch.powered(0)
     if complaints := make_safe(stage.whole, stage.clock):
@@ -157,7 +157,7 @@ def safe_state(stage: Stage, _step: SafeState) -> Figures:
     return {}
 
 
-HANDLERS: Mapping[str, Callable[[Stage, Any], Figures]] = {
+HANDLERS: Mapping[str, Callable[[ExecutionContext, Any], Figures]] = {
     "home": home,
     "power_on": power_on,
     "power_off": power_off,

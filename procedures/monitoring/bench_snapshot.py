@@ -9,7 +9,7 @@ from instruments.interfaces.gyro import Gyro, Readings
 
 
 @dataclass
-class Tally:
+class ReadingCounts:
     """How the readings of one unit in one data set came in."""
 
     expected: float  #: by the unit's sample rate and the length of the gate
@@ -31,7 +31,7 @@ class Tally:
 
 
 @dataclass(frozen=True)
-class Situation:
+class BenchSnapshot:
     """The bench at one moment."""
 
     t_s: float  #: campaign time
@@ -43,7 +43,7 @@ class Situation:
     taking_readings: bool = False  #: the air is meant to be at its set point
     asked_dps: float = 0.0
     rate_dps: float = 0.0
-    tallies: Mapping[str, Tally] = field(default_factory=dict)
+    tallies: Mapping[str, ReadingCounts] = field(default_factory=dict)
 
 
 def gyro_temperature_c(gyro: Gyro, readings: Readings) -> float | None:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 from procedures.contracts.errors import GuardTripped
 from procedures.contracts.journal import Event
-from procedures.monitoring.bench_snapshot import Situation
+from procedures.monitoring.bench_snapshot import BenchSnapshot
 from procedures.planning.limits import BenchLimits
 from procedures.recipe.recipe import Action, GuardKind, GuardRules
 
 
 @dataclass(frozen=True)
-class Trip:
+class GuardViolation:
     """A limit that was passed."""
 
     kind: GuardKind
@@ -52,7 +52,7 @@ class Excess:
     text: str
 
 
-Check = Callable[["Guards", Situation], Iterator[Excess]]
+Check = Callable[["Guards", BenchSnapshot], Iterator[Excess]]
 
 
 class Guards:
@@ -77,10 +77,10 @@ class Guards:
             self._limits = self._limits()
         return self._limits
 
-    def check(self, now: Situation) -> list[Trip]:
+    def check(self, now: BenchSnapshot) -> list[GuardViolation]:
         """Return every limit that is passed at this moment."""
         return [
-            Trip(
+            GuardViolation(
                 kind,
                 self.rules.actions.get(kind, "fail"),
                 excess.device,
@@ -99,34 +99,34 @@ def _outside(device: str, value_c: float, low_c: float, high_c: float, text: str
         yield Excess(device, value_c, low_c if value_c < low_c else high_c, "deg C", text)
 
 
-def _chamber_limits(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _chamber_limits(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     limits, margin_c = guards.limits.chamber, guards.rules.chamber_margin_c
     text = "the air is beyond the limits of the chamber"
     return _outside(guards.chamber, now.chamber_c, limits.min_c - margin_c, limits.max_c + margin_c, text)
 
 
-def _unit_air(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _unit_air(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     margin_c = guards.rules.chamber_margin_c
     for name, unit in guards.limits.gyros.items():
         text = f"the air is beyond what unit {name} may be exposed to"
         yield from _outside(guards.chamber, now.chamber_c, unit.min_c - margin_c, unit.max_c + margin_c, text)
 
 
-def _unit_temperature(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _unit_temperature(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     margin_c = guards.rules.gyro_margin_c
     for name, temperature_c in now.gyro_c.items():
         unit = guards.limits.gyros[name]
         yield from _outside(name, temperature_c, unit.min_c - margin_c, unit.max_c + margin_c, "its own thermometer")
 
 
-def _chamber_deviation(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _chamber_deviation(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     off_c = abs(now.chamber_c - now.setpoint_c)
     if now.taking_readings and off_c > guards.rules.chamber_deviation_c:
         text = f"the air left its set point of {now.setpoint_c:g} deg C while readings were taken"
         yield Excess(guards.chamber, off_c, guards.rules.chamber_deviation_c, "deg C", text)
 
 
-def _unit_off_air(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _unit_off_air(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     limit_c = guards.rules.max_gyro_off_air_c
     for name, temperature_c in now.gyro_c.items():
         off_c = abs(temperature_c - now.chamber_c)
@@ -135,23 +135,23 @@ def _unit_off_air(guards: Guards, now: Situation) -> Iterator[Excess]:
             yield Excess(name, off_c, limit_c, "deg C", text)
 
 
-def _chamber_alarm(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _chamber_alarm(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     if now.alarms:
         yield Excess(guards.chamber, float(len(now.alarms)), 0.0, "", f"alarms ({', '.join(now.alarms)})")
 
 
-def _stale(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _stale(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     for device, silent_s in now.silent_s.items():
         if silent_s > guards.rules.stale_s:
             yield Excess(device, silent_s, guards.rules.stale_s, "s", "nothing heard; check cable and power")
 
 
-def _damaged(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _damaged(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     for name, tally in now.tallies.items():
         yield from _fraction(name, tally.damaged, tally.base, guards.rules.max_damaged_fraction, "lost or damaged")
 
 
-def _invalid(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _invalid(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     for name, tally in now.tallies.items():
         yield from _fraction(name, tally.invalid, tally.base, guards.rules.max_invalid_fraction, "marked bad")
 
@@ -161,7 +161,7 @@ def _fraction(name: str, count: int, base: float, limit: float, what: str) -> It
         yield Excess(name, 100 * count / base, 100 * limit, "%", f"readings {what}")
 
 
-def _rate(guards: Guards, now: Situation) -> Iterator[Excess]:
+def _rate(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     limit_dps = guards.rules.max_rate_error_fraction * abs(now.asked_dps)
     off_dps = abs(now.rate_dps - now.asked_dps)
     if off_dps > limit_dps:

@@ -12,9 +12,9 @@ from instruments.interfaces.gyro import Gyro, Readings
 from instruments.interfaces.table import Spin
 from procedures.contracts.bench import Bench
 from procedures.contracts.journal import EnvironmentSample, Event
-from procedures.monitoring.bench_snapshot import Situation, Tally, gyro_temperature_c
-from procedures.monitoring.guards import Guards, Trip
-from procedures.monitoring.recorder import Logbook
+from procedures.monitoring.bench_snapshot import BenchSnapshot, ReadingCounts, gyro_temperature_c
+from procedures.monitoring.guards import Guards, GuardViolation
+from procedures.monitoring.recorder import CampaignRecorder
 
 Listener = Callable[[float, float, Mapping[str, float]], None]  #: campaign time, air and unit temperatures
 
@@ -28,14 +28,14 @@ WHILE_READING = {
 }  #: armed only during a data set
 
 
-class Watch:
+class BenchMonitor:
     """The eyes of a campaign.
 
     A device that is silent for a moment is noted and asked again at the next look; the guard on stale readings ends
     that patience. A limit that is passed is an event once, when it trips, and once more when it holds again.
     """
 
-    def __init__(self, bench: Bench, guards: Guards, log: Logbook) -> None:
+    def __init__(self, bench: Bench, guards: Guards, log: CampaignRecorder) -> None:
         self._bench = bench
         self._guards = guards
         self._log = log
@@ -46,7 +46,7 @@ class Watch:
         self._chamber: ChamberState | None = None
         self._gyro_c: dict[str, float] = {}
         self._spin: Spin | None = None
-        self._tallies: Mapping[str, Tally] = {}
+        self._tallies: Mapping[str, ReadingCounts] = {}
         self._taking_readings = False
         self._next_look_s = 0.0
         self.run = 0  #: powered session; 0 while the units are off
@@ -101,7 +101,9 @@ class Watch:
             self._listeners.remove(listener)
 
     @contextmanager
-    def taking_readings(self, spin: Spin | None = None, tallies: Mapping[str, Tally] | None = None) -> Iterator[None]:
+    def taking_readings(
+        self, spin: Spin | None = None, tallies: Mapping[str, ReadingCounts] | None = None
+    ) -> Iterator[None]:
         """Arm the guards on rate, readings and the air's deviation while the block runs."""
         self._taking_readings, self._spin, self._tallies = True, spin, tallies or {}
         self._log.board.update(rate_dps=spin.rate_dps if spin else 0.0)
@@ -123,11 +125,11 @@ class Watch:
         """Return whether the chamber is to be looked at again within `within_s`."""
         return self._log.t_s() + within_s >= self._next_look_s
 
-    def look(self, every_s: float, *, glance: bool = True) -> list[Trip]:
+    def look(self, every_s: float, *, read_latest: bool = True) -> list[GuardViolation]:
         """Poll the chamber and, unless their streams are being read, the units; returns the limits that are passed."""
         self._next_look_s = self._log.t_s() + every_s
         air_heard = self._poll_chamber()
-        if glance and self.run:
+        if read_latest and self.run:
             self._glance()
         t_s = self._log.t_s()
         self._log.board.update(t_s, chamber_c=self.chamber_c, setpoint_c=self.setpoint_c, gyro_c=dict(self._gyro_c))
@@ -138,7 +140,7 @@ class Watch:
                 listener(t_s, self.chamber_c, self._gyro_c)
         return self.judge()
 
-    def judge(self) -> list[Trip]:
+    def judge(self) -> list[GuardViolation]:
         """Hold what is known now against the guards; writes down what has changed since the last time."""
         trips = self._guards.check(self._situation())
         for trip in trips:
@@ -153,10 +155,10 @@ class Watch:
         self._tripped = tripped
         return trips
 
-    def _situation(self) -> Situation:
+    def _situation(self) -> BenchSnapshot:
         assert self._chamber is not None
         t_s = self._log.t_s()
-        return Situation(
+        return BenchSnapshot(
             t_s=t_s,
             chamber_c=self._chamber.temperature_c,
             setpoint_c=self._chamber.setpoint_c,
@@ -185,7 +187,7 @@ class Watch:
             try:
                 if name in self._links:
                     gyro.start()  # a port that broke is opened again
-                readings = gyro.glance()
+                readings = gyro.read_latest()
             except LinkError as error:
                 self._note_silence(name, error)
                 continue

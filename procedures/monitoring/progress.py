@@ -44,7 +44,7 @@ class Progress:
 Observer = Callable[[Progress], None]
 
 
-class Board:
+class ProgressTracker:
     """Holds the present progress and tells an observer of every change."""
 
     def __init__(self, plan: Plan, clock: Clock, observer: Observer | None = None) -> None:

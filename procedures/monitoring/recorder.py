@@ -5,16 +5,16 @@ from __future__ import annotations
 from instruments.clock import Clock
 from procedures.contracts.journal import CampaignState, Event, Journal
 from procedures.contracts.steps import StepResult
-from procedures.monitoring.progress import Board
+from procedures.monitoring.progress import ProgressTracker
 
 
-class Logbook:
+class CampaignRecorder:
     """Writes to the journal and keeps the progress board in step with it.
 
     Campaign time is clock seconds since `start_s`, the clock's reading when the campaign began.
     """
 
-    def __init__(self, journal: Journal, clock: Clock, board: Board, start_s: float) -> None:
+    def __init__(self, journal: Journal, clock: Clock, board: ProgressTracker, start_s: float) -> None:
         self.journal = journal
         self.clock = clock
         self.board = board

@@ -23,7 +23,7 @@ from procedures.contracts.steps import (
     Step,
 )
 from procedures.planning.limits import BenchLimits, fit_to_bench
-from procedures.planning.point_order import Level, Stay, schedule
+from procedures.planning.point_order import Level, MountingBlock, schedule
 from procedures.recipe.recipe import Recipe
 
 # What is expected of things that have no limit to compute with; only the forecast hangs on them.
@@ -178,7 +178,7 @@ class _Writer:
         self.power_cycles()
         self.steps.append(SafeState())
 
-    def mount(self, stay: Stay) -> None:
+    def mount(self, stay: MountingBlock) -> None:
         """Turn the units: chamber to where it can be opened, off if the recipe says so, turn, on."""
         if (handling_c := self.recipe.mounting.handling_c) is not None:
             self.move_chamber(handling_c)

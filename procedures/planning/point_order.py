@@ -18,7 +18,7 @@ class Level:
 
 
 @dataclass(frozen=True)
-class Stay:
+class MountingBlock:
     """One mounting: what is measured between two turnings of the units."""
 
     position: str
@@ -26,7 +26,7 @@ class Stay:
     same_session: bool = False  #: turned without being switched off, whatever the recipe says of other mountings
 
 
-def schedule(recipe: Recipe) -> list[Stay]:
+def schedule(recipe: Recipe) -> list[MountingBlock]:
     """Return the mountings of a recipe in order, with everything measured in each."""
     return [_with_rates(recipe, stay, number) for number, stay in enumerate(_stays(recipe))]
 
@@ -50,21 +50,21 @@ def temperature_sequence(recipe: Recipe) -> tuple[float, ...]:
     return (*order, order[0]) if recipe.replicates.first_temperature_again else order
 
 
-def _stays(recipe: Recipe) -> list[Stay]:
+def _stays(recipe: Recipe) -> list[MountingBlock]:
     """Return the mountings with the listed rates, not yet in their order within a level."""
     temperatures = temperature_sequence(recipe)
     if recipe.order == "position-major":
         visits = [(position, temperatures) for position in recipe.positions]
     else:
         visits = [(position, (temperature,)) for temperature in temperatures for position in recipe.positions]
-    stays: list[Stay] = []
+    stays: list[MountingBlock] = []
     for position, levels in visits:
-        stays.append(Stay(position, tuple(Level(each, recipe.rates_dps) for each in levels)))
+        stays.append(MountingBlock(position, tuple(Level(each, recipe.rates_dps) for each in levels)))
         stays += _inverted(recipe, position, levels)
     return _merged(stays)
 
 
-def _inverted(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[Stay]:
+def _inverted(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[MountingBlock]:
     """Return the upside-down mounting that follows a mounting, if one does."""
     if recipe.inverted is None:
         return []
@@ -72,21 +72,21 @@ def _inverted(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list
     if recipe.order == "temperature-major":
         wanted = tuple(each for each in wanted if each in visited)
     levels = tuple(Level(each, recipe.inverted.rates_dps) for each in wanted)
-    return [Stay(upside_down(position), levels, same_session=True)] if levels else []
+    return [MountingBlock(upside_down(position), levels, same_session=True)] if levels else []
 
 
-def _merged(stays: list[Stay]) -> list[Stay]:
+def _merged(stays: list[MountingBlock]) -> list[MountingBlock]:
     """Return the mountings with neighbours of one position as one: nobody turns a unit to where it already is."""
-    merged: list[Stay] = []
+    merged: list[MountingBlock] = []
     for stay in stays:
         if merged and merged[-1].position == stay.position:
-            merged[-1] = Stay(stay.position, merged[-1].levels + stay.levels, merged[-1].same_session)
+            merged[-1] = MountingBlock(stay.position, merged[-1].levels + stay.levels, merged[-1].same_session)
         else:
             merged.append(stay)
     return merged
 
 
-def _with_rates(recipe: Recipe, stay: Stay, number: int) -> Stay:
+def _with_rates(recipe: Recipe, stay: MountingBlock, number: int) -> MountingBlock:
     """Return the mounting with each level's rates in their final order; `number` makes each level's lot its own."""
     levels = tuple(
         Level(
@@ -97,7 +97,7 @@ def _with_rates(recipe: Recipe, stay: Stay, number: int) -> Stay:
         )
         for index, level in enumerate(stay.levels)
     )
-    return Stay(stay.position, levels, stay.same_session)
+    return MountingBlock(stay.position, levels, stay.same_session)
 
 
 def level_rates(recipe: Recipe, listed: tuple[float, ...], lot: np.random.Generator) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 from labctl.fitting.criticism import Criticism, criticise
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording
 from studies.campaigns import MODELS, campaign
@@ -34,7 +34,7 @@ SINGLE = (
 
 
 def criticised(protocol: str, recording: Recording) -> Criticism:
-    model, _ = preset_for(MODELS[protocol], []).build(context_of(recording))
+    model, _ = preset_for(MODELS[protocol], []).build(fit_data_of(recording))
     return criticise(recording, model, full=False)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from instruments.errors import Garbled, LimitError, LinkError, NoReply, Refused, WrongInstrument
+from instruments.errors import LimitError, LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.table import Spin
 
 Make = Callable[..., Any]
@@ -122,7 +122,7 @@ def test_a_rate_beyond_the_table_is_refused_before_a_byte_is_sent(c4: Any) -> No
 def test_without_the_manuals_template_there_is_no_constant_rate(stand: Make) -> None:
     s = stand("single-axis-sim", table={"speed_template": None})
     s.bench.table.home()
-    with pytest.raises(Refused, match="speed_template"):
+    with pytest.raises(RequestRejected, match="speed_template"):
         s.bench.table.spin(10.0, 1.0)
     assert s.bench.table.spin(0.0, 1.0).rate_dps == 0
 
@@ -140,7 +140,7 @@ def test_a_table_mounted_the_other_way_turns_the_same_way(stand: Make) -> None:
 
 def test_a_refusal_letter_is_said(c4: Any) -> None:
     c4.faults(URL).arm("refusal", count=1)
-    with pytest.raises(Refused, match="answered 'e'"):
+    with pytest.raises(RequestRejected, match="answered 'e'"):
         c4.table.spin(10.0, 1.0)
 
 
@@ -172,7 +172,7 @@ def test_a_lost_o_is_no_reply_and_a_stall_is_noticed(c4: Any) -> None:
     c4.table.home()
     c4.faults(URL).arm("stall", count=1)
     spin = c4.table.spin(20.0, 30.0)
-    with pytest.raises(Garbled, match="home the table"):
+    with pytest.raises(MalformedReply, match="home the table"):
         c4.table.settle(spin)
 
 

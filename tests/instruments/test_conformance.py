@@ -52,7 +52,7 @@ def talk(s: Any) -> None:
     """Ask something that needs an answer."""
     if s.kind == "gyro":
         s.driver.start()
-        s.driver.glance()
+        s.driver.read_latest()
     else:
         s.driver.identify()
 
@@ -166,6 +166,6 @@ def test_a_gyro_gives_whole_numbers_at_rising_times(one: Any) -> None:
         assert set(part.raw) == names
         assert all(values.dtype == np.int64 for values in part.raw.values())
         assert part.valid.dtype == bool
-    glanced = one.driver.glance()
+    glanced = one.driver.read_latest()
     assert len(glanced) == 1
     assert one.clock.now_s() - glanced.t_s[0] <= 2 / one.driver.sample_rate_hz + 0.1

@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from instruments.drivers.gyrostar import FULL_CODE, RANGES_V, Options, make_channels
-from instruments.errors import Garbled, LinkError, NoReply, Refused, WrongInstrument
+from instruments.errors import LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.simulators.adam6017 import code_of
 
 pytest_plugins = ["tests.instruments.modbus_rig"]
@@ -113,21 +113,21 @@ def test_a_turning_table_is_a_voltage(gyrostar: Any) -> None:
 def test_the_thermometer_on_the_second_input(gyrostar: Any) -> None:
     gyro = gyrostar.driver
     gyrostar.clock.sleep(100.0)
-    glance = gyro.glance()
-    assert len(glance) == 1
-    shown = gyro.channels[1].value(glance.raw["temperature_c"])[0]
+    read_latest = gyro.read_latest()
+    assert len(read_latest) == 1
+    shown = gyro.channels[1].value(read_latest.raw["temperature_c"])[0]
     assert shown == pytest.approx(gyrostar.world.heat.sensor_c("gyrostar", np.array([100.0]))[0], abs=0.15)
 
 
 def test_inputs_anywhere_on_the_module_and_no_thermometer(make_rig: Callable[..., Any]) -> None:
     far = make_rig("gyrostar", options={"channel": 6, "thermometer_channel": 3, "range_code": 0x0142})
     far.driver.identify()
-    raw = far.driver.glance().raw
+    raw = far.driver.read_latest().raw
     assert far.tap.heard[-1][-4:] == bytes.fromhex("0003 0004")
     assert abs(int(raw["gyro_z"][0]) - 49151) < 500
     alone = make_rig("gyrostar", options={"channel": 5, "thermometer_channel": None, "read_function": 3})
     alone.driver.identify()
-    assert set(alone.driver.glance().raw) == {"gyro_z"}
+    assert set(alone.driver.read_latest().raw) == {"gyro_z"}
     assert alone.tap.heard[-1][-5:] == bytes.fromhex("03 0005 0001")
 
 
@@ -137,7 +137,7 @@ def test_codes_at_the_rails_are_no_measurement(gyrostar: Any, channel: int, code
     gyrostar.simulated._sample = lambda _t_s: None
     gyrostar.simulated.codes[:2] = [32768, 32768]
     gyrostar.simulated.codes[channel] = code
-    readings = gyrostar.driver.glance()
+    readings = gyrostar.driver.read_latest()
     assert readings.valid.tolist() == [valid]
     assert readings.raw[gyrostar.driver.channels[channel].name].tolist() == [code]
 
@@ -179,22 +179,25 @@ def test_a_link_that_dies_within_a_read_leaves_what_was_read(gyrostar: Any) -> N
 
 
 @pytest.mark.parametrize(
-    ("kind", "error"), [("silence", NoReply), ("wrong_crc", Garbled), ("dropped_link", LinkError), ("merge", NoReply)]
+    ("kind", "error"),
+    [("silence", NoReply), ("wrong_crc", MalformedReply), ("dropped_link", LinkError), ("merge", NoReply)],
 )
 def test_every_lasting_fault_names_the_unit(gyrostar: Any, kind: Any, error: Any) -> None:
     gyrostar.driver.identify()
     gyrostar.faults.arm(kind)
-    for act in (gyrostar.driver.glance, lambda: gyrostar.driver.read(1.0), gyrostar.driver.identify):
+    for act in (gyrostar.driver.read_latest, lambda: gyrostar.driver.read(1.0), gyrostar.driver.identify):
         with pytest.raises(error, match=r"^gyrostar: "):
             act()
     assert gyrostar.clock.now_s() < 30
     gyrostar.faults.clear()
-    assert len(gyrostar.driver.glance()) == 1
+    assert len(gyrostar.driver.read_latest()) == 1
 
 
 def test_an_exception_of_the_module_is_a_refusal(gyrostar: Any) -> None:
     gyrostar.faults.arm("modbus_exception", value=2)
-    with pytest.raises(Refused, match=r"gyrostar: refused to read module name \(register 210\): Modbus exception 2"):
+    with pytest.raises(
+        RequestRejected, match=r"gyrostar: refused to read module name \(register 210\): Modbus exception 2"
+    ):
         gyrostar.driver.identify()
 
 
@@ -202,7 +205,7 @@ def test_stopping_twice_is_fine(gyrostar: Any) -> None:
     gyrostar.driver.start()
     gyrostar.driver.stop()
     gyrostar.driver.stop()
-    assert len(gyrostar.driver.glance()) == 1
+    assert len(gyrostar.driver.read_latest()) == 1
 
 
 def test_the_same_seed_gives_the_same_bytes(make_rig: Callable[..., Any]) -> None:

@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
-from instruments.errors import Garbled, InstrumentError, LimitError, LinkError, NoReply, Refused
+from instruments.errors import InstrumentError, LimitError, LinkError, MalformedReply, NoReply, RequestRejected
 from instruments.protocols.modbus_registers import Register
 from instruments.simulators.links.faults import Faults, FaultyWire
 from instruments.simulators.links.modbus_device import ModbusDevice, constant, int16
@@ -109,7 +109,7 @@ def test_a_passing_fault_is_survived(bench: Bench, kind: Any, times: int) -> Non
 
 @pytest.mark.parametrize(
     ("kind", "error"),
-    [("wrong_crc", Garbled), ("lost_reply", NoReply), ("merge", NoReply), ("dropped_link", LinkError)],
+    [("wrong_crc", MalformedReply), ("lost_reply", NoReply), ("merge", NoReply), ("dropped_link", LinkError)],
 )
 def test_a_lasting_fault_is_named_and_gone_with_its_cause(bench: Bench, kind: Any, error: type[Exception]) -> None:
     bench.faults.arm(kind)
@@ -134,7 +134,7 @@ def test_an_exception_reply_is_a_refusal_and_not_tried_again(bench: Bench, code:
     with pytest.raises(RefusedRegister, match=rf"refused to read air temperature \(register 100\).*exception {code},"):
         bench.registers.get(AIR)
     assert fault.count == 4
-    assert issubclass(RefusedRegister, Refused)
+    assert issubclass(RefusedRegister, RequestRejected)
 
 
 def test_a_busy_instrument_is_asked_again(bench: Bench) -> None:
@@ -191,16 +191,16 @@ GOOD = "{t} 0000 0005 01 03 02 FF23"
 @pytest.mark.parametrize(
     ("answer", "error"),
     [
-        ("{t} 0000 0007 01 03 04 FF23 0007", Garbled),  # two registers instead of one
-        ("{t} 0000 0005 01 04 02 FF23", Garbled),  # another function
-        ("{t} 0000 0005 01 03 02 FF23 55", Garbled),  # a byte too many: which of them is the noise?
-        ("{t} 0000 0005 02 03 02 FF23", Garbled),  # another unit
-        ("0063 0000 0005 01 03 02 FF23", Garbled),  # another transaction
-        ("{t} 0001 0005 01 03 02 FF23", Garbled),  # another protocol
-        ("{t} 0000 0005 01 03 08 FF23", Garbled),  # promises more than it holds
-        ("{t} 0000 0006 01 06 0064 FF23", Garbled),  # the echo of a write
-        ("{t} 0000 0002 01 03", Garbled),
-        ("{t} 0000 0005 01 03 02", Garbled),
+        ("{t} 0000 0007 01 03 04 FF23 0007", MalformedReply),  # two registers instead of one
+        ("{t} 0000 0005 01 04 02 FF23", MalformedReply),  # another function
+        ("{t} 0000 0005 01 03 02 FF23 55", MalformedReply),  # a byte too many: which of them is the noise?
+        ("{t} 0000 0005 02 03 02 FF23", MalformedReply),  # another unit
+        ("0063 0000 0005 01 03 02 FF23", MalformedReply),  # another transaction
+        ("{t} 0001 0005 01 03 02 FF23", MalformedReply),  # another protocol
+        ("{t} 0000 0005 01 03 08 FF23", MalformedReply),  # promises more than it holds
+        ("{t} 0000 0006 01 06 0064 FF23", MalformedReply),  # the echo of a write
+        ("{t} 0000 0002 01 03", MalformedReply),
+        ("{t} 0000 0005 01 03 02", MalformedReply),
         ("", NoReply),
     ],
 )
@@ -226,7 +226,7 @@ def test_of_two_replies_the_one_with_the_requests_number_counts(make_bench: Call
 def test_a_write_must_be_echoed(make_bench: Callable[..., Bench], answer: str) -> None:
     bench = make_bench("tcp")
     bench.wire = Scripted(*[answer] * 3)
-    with pytest.raises(Garbled, match=r"write set point \(register 300\)"):
+    with pytest.raises(MalformedReply, match=r"write set point \(register 300\)"):
         bench.registers.put(SETPOINT, -221)
 
 
@@ -288,7 +288,7 @@ def test_a_register_to_read_is_not_written(bench: Bench) -> None:
 
 
 def test_a_value_that_cannot_be_is_named_with_its_range(bench: Bench) -> None:
-    with pytest.raises(Garbled, match=r"air \(register 100\) reads -221 counts, possible are 0 to 10"):
+    with pytest.raises(MalformedReply, match=r"air \(register 100\) reads -221 counts, possible are 0 to 10"):
         bench.registers.get(Register(100, "air", "int16", "counts", low=0, high=10))
 
 

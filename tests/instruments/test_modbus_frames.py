@@ -108,7 +108,7 @@ def test_adam_inputs_on_the_wire(gyrostar: Any) -> None:
     ]
     assert [frame[-2:] for frame in rig.tap.said] == [bytes.fromhex(text) for text in ("6017", "0147", "0147")]
     rig.clock.sleep(1.0)
-    readings = gyro.glance()
+    readings = gyro.read_latest()
     assert rig.tap.heard[-1][2:] == bytes.fromhex("0000 0006 01 04 0000 0002")
     rate, temperature = int(readings.raw["gyro_z"][0]), int(readings.raw["temperature_c"][0])
     assert rig.tap.said[-1][2:] == bytes.fromhex(f"0000 0007 01 04 04 {rate:04X} {temperature:04X}")

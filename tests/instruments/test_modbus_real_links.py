@@ -63,7 +63,7 @@ def test_an_f4t_and_an_adam_on_real_tcp(serve: Callable[[str], tuple[BenchFile, 
         with pytest.raises(LinkError):
             chamber.read()
         with pytest.raises(InstrumentError):
-            gyro.glance()
+            gyro.read_latest()
     finally:
         chamber.close()
         gyro.stop()

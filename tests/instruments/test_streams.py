@@ -56,7 +56,7 @@ def test_the_table_rate_is_seen_with_its_sign(streaming: Any) -> None:
     streaming.bench.table.home()
     for asked in (30.0, -30.0):
         spin = streaming.bench.table.spin(asked, 4)
-        streaming.gyro.glance()
+        streaming.gyro.read_latest()
         readings = streaming.gyro.read(3.0)
         streaming.bench.table.settle(spin)
         up = next(c for c in streaming.gyro.channels if c.name == "gyro_z")
@@ -79,7 +79,7 @@ def test_silence_is_an_error_that_names_port_and_remedy(streaming: Any) -> None:
     with pytest.raises(NoReply, match=r"sim://.*check power"):
         streaming.gyro.read(1.0)
     with pytest.raises(NoReply):
-        streaming.gyro.glance()
+        streaming.gyro.read_latest()
 
 
 def test_a_short_silence_is_counted_as_loss(streaming: Any) -> None:
@@ -235,7 +235,7 @@ def test_a_glance_leaves_the_times_without_a_step(streaming: Any) -> None:
     phases = []
     for pause_s in (3.1, 7.77, 0.013, 61.3, 12.345):
         streaming.clock.sleep(pause_s)
-        streaming.gyro.glance()
+        streaming.gyro.read_latest()
         parts = [streaming.gyro.read(1.003) for _ in range(3)]
         times = np.concatenate([part.t_s for part in parts])
         assert np.allclose(np.diff(times), period, rtol=0.02)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from instruments.errors import Garbled, LimitError, LinkError, NoReply, Refused, WrongInstrument
+from instruments.errors import LimitError, LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.chamber import ChamberLimits
 
 pytest_plugins = ["tests.instruments.modbus_rig"]
@@ -101,7 +101,7 @@ def test_what_somebody_changed_at_the_panel_is_set_again(f4: Any) -> None:
 
 def test_a_set_point_that_reads_back_otherwise_is_an_error(f4: Any) -> None:
     f4.simulated.on_run_page = False
-    with pytest.raises(Refused, match=r"40 deg C was written but .*25 deg C read back; .*run page"):
+    with pytest.raises(RequestRejected, match=r"40 deg C was written but .*25 deg C read back; .*run page"):
         f4.driver.set_temperature_c(40.0)
 
 
@@ -117,7 +117,7 @@ def test_the_chamber_follows(f4: Any) -> None:
 @pytest.mark.parametrize("code", [-32000, -32001, -32002, -32768])
 def test_a_code_in_place_of_a_measurement_is_no_temperature(f4: Any, code: int) -> None:
     f4.simulated.sensor_code = code
-    with pytest.raises(Garbled, match=rf"air temperature \(register 100\) reads {code} counts"):
+    with pytest.raises(MalformedReply, match=rf"air temperature \(register 100\) reads {code} counts"):
         f4.driver.read()
 
 
@@ -135,7 +135,7 @@ def test_a_profile_of_somebody_is_not_ended(f4: Any, mode: int) -> None:
     f4.simulated.mode = mode
     f4.simulated.setpoint = 400
     for act in (lambda: f4.driver.set_temperature_c(40.0), f4.driver.make_safe):
-        with pytest.raises(Refused, match="a profile runs or is held"):
+        with pytest.raises(RequestRejected, match="a profile runs or is held"):
             act()
     assert f4.simulated.mode == mode
     assert TERMINATE_FRAME not in sent(f4)
@@ -198,7 +198,8 @@ def test_the_address_of_the_bench_file_goes_on_the_wire(make_rig: Callable[..., 
 
 
 @pytest.mark.parametrize(
-    ("kind", "error"), [("silence", NoReply), ("wrong_crc", Garbled), ("dropped_link", LinkError), ("merge", NoReply)]
+    ("kind", "error"),
+    [("silence", NoReply), ("wrong_crc", MalformedReply), ("dropped_link", LinkError), ("merge", NoReply)],
 )
 def test_every_lasting_fault_names_the_chamber(f4: Any, kind: Any, error: Any) -> None:
     f4.driver.identify()
@@ -221,7 +222,7 @@ def test_every_passing_fault_is_survived(f4: Any, kind: Any) -> None:
 def test_an_exception_of_the_controller_is_a_refusal(f4: Any) -> None:
     f4.driver.identify()
     f4.faults.arm("modbus_exception", value=4, count=1)
-    with pytest.raises(Refused, match=r"refused to read air temperature \(register 100\): Modbus exception 4"):
+    with pytest.raises(RequestRejected, match=r"refused to read air temperature \(register 100\): Modbus exception 4"):
         f4.driver.read()
 
 

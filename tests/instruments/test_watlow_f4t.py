@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from instruments.drivers.watlow_f4t import ALARMS_EVERY_S
-from instruments.errors import Garbled, LimitError, LinkError, NoReply, Refused, WrongInstrument
+from instruments.errors import LimitError, LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.chamber import ChamberLimits
 
 pytest_plugins = ["tests.instruments.modbus_rig"]
@@ -69,7 +69,7 @@ def test_a_set_point_that_reads_back_otherwise_is_an_error(f4t: Any, monkeypatch
     f4t.simulated._cells[2782] = f4t.simulated._cells[2782].__class__(
         f4t.simulated._cells[2782].get, lambda _words, _t_s: True, words=2
     )
-    with pytest.raises(Refused, match="40 deg C was written but 25 deg C read back"):
+    with pytest.raises(RequestRejected, match="40 deg C was written but 25 deg C read back"):
         f4t.driver.set_temperature_c(40.0)
 
 
@@ -77,7 +77,7 @@ def test_words_in_another_order_are_seen_at_once(make_rig: Callable[..., Any]) -
     rig = make_rig("f4t", word_order="big")
     rig.driver._registers._word_order = "little"
     rig.simulated.setpoint_c = 36.6
-    with pytest.raises(Garbled, match="check the sensor, the word order"):
+    with pytest.raises(MalformedReply, match="check the sensor, the word order"):
         rig.driver.read()
 
 
@@ -92,7 +92,7 @@ def test_the_chamber_follows(f4t: Any) -> None:
 @pytest.mark.parametrize(("mode", "text"), [(62, "off"), (54, "manual"), (7, "7")])
 def test_control_that_is_switched_off_is_left_to_the_person(f4t: Any, mode: int, text: str) -> None:
     f4t.simulated.control_mode = mode
-    with pytest.raises(Refused, match=f"mode {text}, not auto"):
+    with pytest.raises(RequestRejected, match=f"mode {text}, not auto"):
         f4t.driver.set_temperature_c(40.0)
     f4t.simulated.setpoint_c = 80.0
     assert f4t.driver.make_safe() == 25.0
@@ -103,7 +103,7 @@ def test_control_that_is_switched_off_is_left_to_the_person(f4t: Any, mode: int,
 def test_a_profile_of_somebody_is_not_ended(f4t: Any, state: int) -> None:
     f4t.simulated.profile_state = state
     for act in (lambda: f4t.driver.set_temperature_c(40.0), f4t.driver.make_safe):
-        with pytest.raises(Refused, match="a profile runs or is held"):
+        with pytest.raises(RequestRejected, match="a profile runs or is held"):
             act()
     assert f4t.simulated.profile_state == state
 
@@ -134,7 +134,8 @@ def test_alarms_are_asked_for_at_first_and_then_twice_a_minute(f4t: Any) -> None
 
 
 @pytest.mark.parametrize(
-    ("kind", "error"), [("silence", NoReply), ("wrong_crc", Garbled), ("dropped_link", LinkError), ("merge", NoReply)]
+    ("kind", "error"),
+    [("silence", NoReply), ("wrong_crc", MalformedReply), ("dropped_link", LinkError), ("merge", NoReply)],
 )
 def test_every_lasting_fault_names_the_chamber(f4t: Any, kind: Any, error: Any) -> None:
     f4t.driver.identify()
@@ -155,7 +156,7 @@ def test_every_passing_fault_is_survived(f4t: Any, kind: Any) -> None:
 
 def test_an_exception_of_the_controller_is_a_refusal(f4t: Any) -> None:
     f4t.faults.arm("modbus_exception", value=2, count=1)
-    with pytest.raises(Refused, match=r"refused to read air temperature \(register 2820\): Modbus exception 2"):
+    with pytest.raises(RequestRejected, match=r"refused to read air temperature \(register 2820\): Modbus exception 2"):
         f4t.driver.read()
 
 

@@ -22,14 +22,14 @@ def stim(port: str, clock: VirtualClock) -> Callable[[], Any]:
         GyroSettings(name="mems", driver="stim300", port=port, serial="S-1", max_rate_dps=400.0), Ports(clock), clock
     )
     unit.start()
-    return unit.glance
+    return unit.read_latest
 
 
 def kvh(port: str, clock: VirtualClock) -> Callable[[], Any]:
     settings = GyroSettings(name="fog", driver="kvh-dsp3000", port=port, serial="F-1", max_rate_dps=100.0)
     unit = KvhDsp3000(settings, Ports(clock), clock)
     unit.start()
-    return unit.glance
+    return unit.read_latest
 
 
 def table(port: str, clock: VirtualClock) -> Callable[[], Any]:

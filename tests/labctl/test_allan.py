@@ -11,8 +11,8 @@ import pytest
 
 from labctl.fitting.criticism.criticise import criticise
 from labctl.fitting.criticism.noise_grid import expected_drift_dps, noise_grid
-from labctl.fitting.criticism.reduction import compress
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.criticism.reduction import reduce_recording
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.static_record import LONG_S, longest_stretch, static_record
 from labctl.fitting.models.presets import preset_for
 from labctl.fitting.numeric.allan import DEG_PER_HOUR, DEG_PER_ROOT_HOUR, Allan, allan, overlapping_variance
@@ -167,7 +167,7 @@ def test_a_long_static_record_replaces_the_data_sheet_and_a_short_one_does_not()
 
 def test_a_long_record_among_short_data_sets_is_taken_in_pieces_of_their_length() -> None:
     recording = with_record_at_rest(30, 2e-3)
-    data = compress(recording)
+    data = reduce_recording(recording)
     assert len(data) == 40 + 18000 // 80
     assert data.weights.shape[1] == len(data)
     assert data.dataset[:40].tolist() == list(range(1, 41))
@@ -182,10 +182,10 @@ def test_a_long_record_among_short_data_sets_is_taken_in_pieces_of_their_length(
 def test_criticism_weighs_with_the_static_record() -> None:
     recording = with_record_at_rest(30, 2e-3)
     recording = replace(recording, info=recording.info.model_copy(update={"datasheet": {"bias_stability_dps": 1e-5}}))
-    model, _ = preset_for(None, ["bias", "scale_factor"]).build(context_of(recording))
+    model, _ = preset_for(None, ["bias", "scale_factor"]).build(fit_data_of(recording))
     found = criticise(recording, model, full=False)
     assert found.data.static is not None
     assert found.weighed is not None
     smallest = min(noise.size_dps for noise in found.weighed.axes["z"].noises)
     assert smallest > 1e-4  # around 1.35 B, not around half of the data sheet's 1e-5
-    assert compress(recording).static is None
+    assert reduce_recording(recording).static is None

@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.services.app import House
+from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
@@ -25,7 +25,7 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 def client(tmp_path: Path) -> Iterator[TestClient]:
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
-    with TestClient(create_app(House(store, SystemClock(), runner))) as opened:
+    with TestClient(create_app(LabService(store, SystemClock(), runner))) as opened:
         yield opened
 
 
@@ -175,13 +175,13 @@ def test_a_service_that_starts_again_says_what_was_left(tmp_path: Path) -> None:
 
     store = Store(Database(location, write=True))
     prepare(store, "short", load_bench("single-axis-sim"), VirtualClock(), clip=False).bench.close()
-    with TestClient(create_app(House(store, SystemClock()))) as client:
+    with TestClient(create_app(LabService(store, SystemClock()))) as client:
         answer = client.get("/api/campaigns").json()
         assert (answer[0]["state"], answer[0]["abandoned"]) == ("planned", True)
         assert "no process runs it any more" in answer[0]["reason"]
     store = Store(Database(location, write=True))
     runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
-    with TestClient(create_app(House(store, SystemClock(), runner))) as client:
+    with TestClient(create_app(LabService(store, SystemClock(), runner))) as client:
         events, _ = followed(client, 1)
         assert "taken_up" in [event["kind"] for event in events]
         assert client.get("/api/campaigns/1").json()["state"] == "done"

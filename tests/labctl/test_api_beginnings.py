@@ -11,12 +11,12 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.services.app import House
+from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import prepare
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.examples import examples
-from labctl.services.simulation.recordings import hiding
+from labctl.services.simulation.recordings import with_hidden_effects
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.labctl.test_api_pages import client  # noqa: F401  a fixture
@@ -51,7 +51,7 @@ def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClien
     (row,) = client.get("/api/recordings").json()
     assert (row["serial"], row["readings"], row["campaign"]) == ("HIDDEN-7", answer["readings"], None)
     assert "simulated: recipe short, seed 7" in row["notes"]
-    store: Store = client.app.state.house.store  # type: ignore[attr-defined]
+    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
     (act,) = store.audit.rows()
     assert act.action == "simulate"
     assert act.detail.items() >= {"hidden": answer["hidden"], "seed": 7, "serial": "HIDDEN-7"}.items()
@@ -94,7 +94,7 @@ def run(client: TestClient, **body: Any) -> int:  # noqa: F811
 def test_a_simulated_campaign_can_hide_an_effect(client: TestClient) -> None:  # noqa: F811
     plain, hidden = run(client), run(client, hide=HIDE)
     assert asymmetry(client, hidden) - asymmetry(client, plain) == pytest.approx(0.04, rel=0.1)
-    store: Store = client.app.state.house.store  # type: ignore[attr-defined]
+    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
     assert store.campaigns.get(1).bench["simulation"]["hidden"] == {}
     assert store.campaigns.get(2).bench["simulation"]["hidden"] == {"scale_factor_asymmetry": 0.02}
     starts = [row.detail for row in store.audit.rows() if row.action == "campaign start"]
@@ -108,7 +108,7 @@ def test_a_simulated_campaign_can_hide_an_effect(client: TestClient) -> None:  #
 def test_nothing_is_hidden_in_a_real_unit(tmp_path: Path) -> None:
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     runner = BenchRunner(store, load_bench("example-real"), VirtualClock)
-    with TestClient(create_app(House(store, SystemClock(), runner))) as real:
+    with TestClient(create_app(LabService(store, SystemClock(), runner))) as real:
         answer = real.post("/api/campaigns", json={"recipe": "short", "hide": HIDE})
         assert answer.status_code == 400
         assert "is not simulated here" in answer.json()["detail"]
@@ -118,7 +118,9 @@ def test_nothing_is_hidden_in_a_real_unit(tmp_path: Path) -> None:
 def test_a_resumed_campaign_goes_on_with_the_same_units(tmp_path: Path) -> None:
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     bench = load_bench("single-axis-sim")
-    prepare(store, "short", hiding(bench, HIDE), VirtualClock(), clip=False).bench.close()  # and the process dies
-    with TestClient(create_app(House(store, SystemClock(), BenchRunner(store, bench, VirtualClock)))) as again:
+    prepare(
+        store, "short", with_hidden_effects(bench, HIDE), VirtualClock(), clip=False
+    ).bench.close()  # and the process dies
+    with TestClient(create_app(LabService(store, SystemClock(), BenchRunner(store, bench, VirtualClock)))) as again:
         assert "campaign done" in again.get("/api/campaigns/1/events").text
         assert asymmetry(again, 1) - asymmetry(again, run(again)) == pytest.approx(0.04, rel=0.1)

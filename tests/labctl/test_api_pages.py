@@ -15,7 +15,7 @@ from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.compensator import Compensator
 from labctl.recording import Recording
-from labctl.services.app import House
+from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.criticism import evaluation
 from labctl.services.planning.loading import load_bench
@@ -30,7 +30,7 @@ FOG = "/api/units/OSU-FOG-2024"
 def client(tmp_path: Path) -> Iterator[TestClient]:
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
-    with TestClient(create_app(House(store, SystemClock(), runner))) as opened:
+    with TestClient(create_app(LabService(store, SystemClock(), runner))) as opened:
         yield opened
 
 
@@ -76,7 +76,7 @@ def test_certifications_are_listed_newest_first(fog: TestClient) -> None:
 
 def taken_in(client: TestClient, recording: Recording) -> int:
     """Take a recording in past the door; returns its number."""
-    store: Store = client.app.state.house.store  # type: ignore[attr-defined]
+    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
     return store.recordings.add_import(recording, recording.info.started_at)
 
 
@@ -95,7 +95,7 @@ def test_residuals_are_the_rows_behind_the_map(
     rows = answer["columns"]
     assert {len(values) for values in rows.values()} == {3 * 630}
     with monkeypatch.context() as patched:  # one work gives both
-        patched.setattr(evaluation, "readings_of", None)
+        patched.setattr(evaluation, "load_reduced_readings", None)
         maps = client.get(f"{path}/1/criticism").json()["maps"]
     cells = by_cell(rows, "residual_dps", "over_floor", "table_rate_dps", "temperature_c", "position")
     for part in maps:
@@ -132,7 +132,7 @@ def test_a_preview_is_what_improve_makes_and_changes_nothing(
     unit = "/api/units/ONE/calibrations"
     client.post(unit, json={"effects": ["bias", "scale_factor"]})
     path, change = f"{unit}/1", {"add": ["scale_factor_asymmetry"]}
-    store: Store = client.app.state.house.store  # type: ignore[attr-defined]
+    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
     before = store.audit.rows()
     preview = client.post(f"{path}/preview", json=change)
     assert preview.status_code == 200, preview.text

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, settings
 
 from instruments.clock import VirtualClock
 from labctl.api import create_app
-from labctl.services.app import House
+from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.commands.protocol import CertifyRequest, FitRequest
 from labctl.services.planning.loading import load_bench
@@ -33,12 +33,12 @@ EXAMPLES_EACH, SEED = 10, 1
 def application(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """The API of a house with a unit, a recording and a calibration in force, and with a bench."""
     store = Store(Database(str(tmp_path_factory.mktemp("api") / "lab.sqlite"), write=True))
-    house = House(store, VirtualClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
-    acts = house.acts()
-    acts.import_recording(EXAMPLES / "osu-fog")
-    acts.fit(UNIT, FitRequest(effects=["bias", "scale_factor"]))
-    acts.certify(UNIT, 1, CertifyRequest(by="A", reason="B"))
-    yield create_app(house)
+    lab_service = LabService(store, VirtualClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
+    commands = lab_service.commands()
+    commands.import_recording(EXAMPLES / "osu-fog")
+    commands.fit(UNIT, FitRequest(effects=["bias", "scale_factor"]))
+    commands.certify(UNIT, 1, CertifyRequest(by="A", reason="B"))
+    yield create_app(lab_service)
     schemathesis.python.asgi.shutdown_lifespans()
 
 

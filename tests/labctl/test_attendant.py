@@ -13,7 +13,7 @@ import pytest
 
 from labctl.actor import Actor, acting, actor
 from labctl.cli import terminal_operator
-from labctl.cli.terminal_operator import Attendant
+from labctl.cli.terminal_operator import TerminalOperator
 from labctl.config import os_user
 from labctl.errors import Stopped
 from labctl.services.campaigns import execution, resume
@@ -21,7 +21,7 @@ from labctl.services.campaigns.execution import StartRequest, run_here
 from labctl.services.campaigns.resume import resume_here
 from labctl.services.commands.protocol import ResumeRequest
 from labctl.store import open_store
-from procedures.contracts.operator import PersonOperator, Prompt
+from procedures.contracts.operator import HumanOperator, Prompt
 
 QUESTION = Prompt("q1", "mount", "turn the units")
 WAIT_S = 30.0
@@ -61,9 +61,9 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], Termin
 
 def test_an_enter_from_before_the_question_is_no_answer_to_it(terminal: Callable[[str], Terminal]) -> None:
     terminal("the key is missing\n").type("\n")
-    operator, noted = PersonOperator(), []
+    operator, noted = HumanOperator(), []
     operator.ask(QUESTION)
-    Attendant._put(operator, QUESTION, noted.append)
+    TerminalOperator._put(operator, QUESTION, noted.append)
     answer = operator.answer("q1")
     assert answer is not None
     assert (answer.confirmed, answer.reason, answer.by) == (False, "the key is missing", os_user())
@@ -72,14 +72,14 @@ def test_an_enter_from_before_the_question_is_no_answer_to_it(terminal: Callable
 
 def test_an_answer_is_noted_in_the_name_of_whoever_gave_the_command(terminal: Callable[[str], Terminal]) -> None:
     terminal("\n")
-    operator, noted, who = PersonOperator(), threading.Event(), []
+    operator, noted, who = HumanOperator(), threading.Event(), []
 
     def note(_: str) -> None:
         who.append(actor().name)
         noted.set()
 
     with acting(Actor("ada", "command line")):
-        Attendant().attend(operator, note)
+        TerminalOperator().answer_prompts(operator, note)
     operator.ask(QUESTION)
     assert noted.wait(WAIT_S)
     assert who == ["ada"]
@@ -90,7 +90,7 @@ def test_answers_and_resumes_at_a_terminal_are_in_the_audit_trail(
 ) -> None:
     location = str(tmp_path / "lab.sqlite")
     for module in (execution, resume):
-        monkeypatch.setattr(module, "operator_of", lambda _: PersonOperator())
+        monkeypatch.setattr(module, "operator_of", lambda _: HumanOperator())
     seen: list[int] = []
 
     def attend(operator: Any, note: Callable[[str], None]) -> None:

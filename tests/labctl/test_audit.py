@@ -22,13 +22,13 @@ from labctl.cli.app import app
 from labctl.config import os_user
 from labctl.errors import BadInput
 from labctl.services.admin.audit import anchor_of, verify_audit
-from labctl.services.app import House
+from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import prepare, run
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import CampaignAnswer
+from labctl.services.schemas.answers import CampaignResponse
 from labctl.store import Store, migrate, open_store
 from labctl.store.connection.database import Database
 
@@ -249,13 +249,13 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
 class AlwaysThere(BenchRunner):
     """A runner for which no campaign is too fast to be paused or to be answered."""
 
-    def pause(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+    def pause(self, campaign: int, request: ReasonRequest) -> CampaignResponse:
         return campaign_status(self._store, campaign)
 
-    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:
         return campaign_status(self._store, campaign)
 
-    def start(self, request: CampaignRequest) -> CampaignAnswer:
+    def start(self, request: CampaignRequest) -> CampaignResponse:
         while self._job is not None:  # the one that was taken up before
             self._job.thread.join()
         return super().start(request)
@@ -265,8 +265,8 @@ def test_every_act_over_http_leaves_its_row(location: str) -> None:
     """A new operation fails this test until it says here which row it leaves."""
     store = Store(Database(location, write=True))
     bench = load_bench("single-axis-sim")
-    house = House(store, SystemClock(), AlwaysThere(store, bench, VirtualClock))
-    application = create_app(house)
+    lab_service = LabService(store, SystemClock(), AlwaysThere(store, bench, VirtualClock))
+    application = create_app(lab_service)
     acting_paths = {path for path, item in application.openapi()["paths"].items() if set(item) - {"get", "head"}}
     assert acting_paths - set(ASKING) == set(ACTS)
     assert set(ASKING) <= acting_paths

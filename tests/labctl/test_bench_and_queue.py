@@ -14,10 +14,10 @@ from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
 from labctl.actor import Actor, acting
 from labctl.api import create_app
-from labctl.api.middleware import Access
+from labctl.api.middleware import AccessPolicy
 from labctl.errors import BenchBusy, Conflict
 from labctl.services.admin.api_keys import KeyRequest, Role, create_key
-from labctl.services.app import House
+from labctl.services.app import LabService
 from labctl.services.benches import lease
 from labctl.services.benches.lease import STOP_S, BenchHold
 from labctl.services.campaigns import execution, resume
@@ -29,7 +29,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import start_status
 from labctl.store import Store
 from labctl.store.connection.database import Database
-from procedures.contracts.operator import PersonOperator
+from procedures.contracts.operator import HumanOperator
 
 BENCH = load_bench("single-axis-sim")
 START = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -44,13 +44,13 @@ class Lab:
         self.hold = BenchHold(self.store, BENCH.name, self.clock)
         self.hold.take()
         self.runner = BenchRunner(self.store, BENCH, VirtualClock, self.hold)
-        self.house = House(self.store, self.clock, self.runner)
-        assert self.house.scheduler is not None
-        self.scheduler = self.house.scheduler
+        self.lab_service = LabService(self.store, self.clock, self.runner)
+        assert self.lab_service.scheduler is not None
+        self.scheduler = self.lab_service.scheduler
 
     def enter(self, **when: Any) -> int:
         request = CampaignRequest.model_validate({"recipe": "short", **when})
-        return self.house.acts().schedule_campaign(request).id
+        return self.lab_service.commands().schedule_campaign(request).id
 
     def tick(self) -> None:
         self.scheduler.tick()
@@ -91,7 +91,7 @@ class Lab:
 def lab(tmp_path: Path) -> Iterator[Lab]:
     made = Lab(str(tmp_path / "lab.sqlite"))
     yield made
-    made.house.close()
+    made.lab_service.close()
 
 
 @pytest.fixture
@@ -163,7 +163,7 @@ def test_a_campaign_whose_bench_was_lost_is_taken_up_before_the_queue_goes_on(la
 def test_a_campaign_that_waits_keeps_its_bench_and_lets_it_go_when_it_is_lost(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(execution, "operator_of", lambda _: PersonOperator())
+    monkeypatch.setattr(execution, "operator_of", lambda _: HumanOperator())
     seen: list[str] = []
 
     def heard() -> None:
@@ -197,7 +197,7 @@ def test_without_the_lease_nothing_is_taken_up_and_nothing_moves(tmp_path: Path,
     first.hold.renew()
     first.tick()
     assert first.states() == ["done"]
-    first.house.close()
+    first.lab_service.close()
 
 
 def test_a_command_that_takes_a_campaign_up_needs_the_lease_too(
@@ -206,7 +206,7 @@ def test_a_command_that_takes_a_campaign_up_needs_the_lease_too(
     location = str(tmp_path / "lab.sqlite")
     lab = Lab(location)
     lab.begin_and_lose(at=200)
-    lab.house.close()
+    lab.lab_service.close()
     moves.clear()
 
     def taken(*_: Any) -> None:
@@ -225,17 +225,17 @@ def test_a_service_takes_up_what_was_left_before_its_queue(tmp_path: Path) -> No
     first = Lab(location)
     first.begin_and_lose(at=200)
     due = first.enter(at="now")
-    first.house.close()
+    first.lab_service.close()
     second = Lab(location)
     second.clock.sleep(3600)
     second.hold.renew()
-    second.house.start()
+    second.lab_service.start()
     second.rest()
     assert second.states()[-1] == "done"
     second.tick()
     assert second.event(due)[0] == "started"
     second.rest()
-    second.house.close()
+    second.lab_service.close()
 
 
 def test_what_cannot_be_taken_up_waits_for_a_person_and_the_queue_goes_on(
@@ -262,7 +262,7 @@ def test_entries_and_what_became_of_them_are_in_the_audit_trail(lab: Lab) -> Non
         lab.enter(at="now")
         cancelled = lab.enter(cron="0 2 * * *", time_zone="UTC")
         lab.enter(at="2026-01-05T08:01Z", late_limit_s=0)
-        lab.house.acts().cancel_start(cancelled)
+        lab.lab_service.commands().cancel_start(cancelled)
     lab.tick()
     lab.clock.sleep(3600)
     lab.hold.renew()
@@ -286,8 +286,8 @@ def test_entries_and_what_became_of_them_are_in_the_audit_trail(lab: Lab) -> Non
 def test_the_schedule_is_for_operators(tmp_path: Path) -> None:
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     keys = {role: create_key(store, KeyRequest(name=role.value, role=role), START).key for role in Role}
-    house = House(store, SystemClock(), BenchRunner(store, BENCH, VirtualClock))
-    with TestClient(create_app(house, Access(keys=True))) as client:
+    lab_service = LabService(store, SystemClock(), BenchRunner(store, BENCH, VirtualClock))
+    with TestClient(create_app(lab_service, AccessPolicy(keys=True))) as client:
 
         def ask(role: Role, method: str, path: str, body: Any = None) -> int:
             headers = {"Authorization": f"Bearer {keys[role]}"}

@@ -15,7 +15,7 @@ import pytest
 
 from labctl.errors import BadInput
 from labctl.fitting.criticism import Criticism, criticise
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, formulas
 from labctl.fitting.effects.formula import Formula
 from labctl.fitting.models.presets import preset_for
@@ -45,7 +45,7 @@ def three_axes(seed: int = 1, **hidden: float) -> Recording:
 
 
 def held(recording: Recording, model: str = "ojeda2000", catalogue: Any = CATALOGUE, full: bool = False) -> Criticism:
-    fitted, _ = preset_for(model, []).build(context_of(recording))
+    fitted, _ = preset_for(model, []).build(fit_data_of(recording))
     return criticise(recording, fitted, catalogue, full=full)
 
 

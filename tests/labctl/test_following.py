@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from labctl.services.campaigns.event_stream import Followers, Glances
+from labctl.services.campaigns.event_stream import CampaignEventStream, StatusCache
 
 Loop = Callable[[Any], Any]
 
@@ -18,7 +18,7 @@ def test_a_moment_is_looked_up_once_for_all_who_ask(in_a_loop: Loop) -> None:
     asked: list[str] = []
 
     async def crowd() -> list[int]:
-        glances = Glances()
+        glances = StatusCache()
         return await asyncio.gather(*(glances.at("it", lambda: asked.append("it") or 7) for _ in range(50)))
 
     assert in_a_loop(crowd()) == [7] * 50
@@ -29,7 +29,7 @@ def test_after_the_bell_everybody_looks_anew(in_a_loop: Loop) -> None:
     state = ["running"]
 
     async def two() -> tuple[str, str]:
-        glances = Glances()
+        glances = StatusCache()
         before = await glances.at("it", lambda: state[0])
         state[0] = "done"
         glances.ring()
@@ -40,7 +40,7 @@ def test_after_the_bell_everybody_looks_anew(in_a_loop: Loop) -> None:
 
 def test_one_who_leaves_takes_nothing_from_the_others(in_a_loop: Loop) -> None:
     async def leaving() -> int:
-        glances, may = Glances(), asyncio.Event()
+        glances, may = StatusCache(), asyncio.Event()
         loop = asyncio.get_running_loop()
 
         def look() -> int:
@@ -62,7 +62,7 @@ def test_what_cannot_be_read_is_said_to_everybody(in_a_loop: Loop) -> None:
         raise OSError("no disk")
 
     async def both() -> list[Any]:
-        glances = Glances()
+        glances = StatusCache()
         return await asyncio.gather(glances.at("it", look), glances.at("it", look), return_exceptions=True)
 
     assert [str(each) for each in in_a_loop(both())] == ["no disk", "no disk"]
@@ -89,7 +89,7 @@ def test_the_store_is_read_as_often_for_many_as_for_one(
         return lambda: bells.remove(bell)
 
     async def watched() -> list[list[int]]:
-        followers = Followers(store, lambda campaign: (campaign, state[0]), listen)  # type: ignore[arg-type,return-value]
+        followers = CampaignEventStream(store, lambda campaign: (campaign, state[0]), listen)  # type: ignore[arg-type,return-value]
 
         async def one() -> list[int]:
             return [told.id async for told in followers.follow(1, 0, lambda: False) if hasattr(told, "id")]

@@ -12,7 +12,7 @@ from labctl.compensator import Compensator
 from labctl.errors import BadInput
 from labctl.fitting import FitResult
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Reference, Term, formulas
 from labctl.fitting.estimation.fit import fit_context
 from labctl.fitting.models.presets import changed, preset_for
@@ -34,7 +34,7 @@ def supplied(seed: int) -> Recording:
 
 def fitted_with(recording: Recording, text: str) -> FitResult:
     (formula,) = formulas(text)
-    context = context_of(recording)
+    context = fit_data_of(recording)
     model, _ = preset_for("bias_scale", []).build(context)
     return fit_context(context, changed(model, (Term(formula.id, formula=formula.text),)))
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from labctl.services import cache as keeping
-from labctl.services.cache import kept, kept_among
+from labctl.services.cache import cached, cached_group
 from labctl.services.criticism import evaluation
-from labctl.services.schemas.answers import Answer, Certified, LadderAnswer
+from labctl.services.schemas.answers import CertificationResponse, LadderResponse, ResponseModel
 from labctl.store import open_store
 from tests.labctl.test_cli import Lab
 from tests.labctl.test_criticism import single_axis
@@ -26,9 +26,9 @@ class Work:
     def __init__(self) -> None:
         self.times = 0
 
-    def __call__(self) -> LadderAnswer:
+    def __call__(self) -> LadderResponse:
         self.times += 1
-        return LadderAnswer(serial="A", steps=[], noise_floor_dps=1 / 3)
+        return LadderResponse(serial="A", steps=[], noise_floor_dps=1 / 3)
 
 
 @pytest.fixture
@@ -37,11 +37,11 @@ def work() -> Work:
 
 
 @pytest.fixture
-def ask(work: Work) -> Callable[..., LadderAnswer]:
-    return lambda **question: kept(LadderAnswer, question, work)
+def ask(work: Work) -> Callable[..., LadderResponse]:
+    return lambda **question: cached(LadderResponse, question, work)
 
 
-def test_the_same_question_is_answered_once(work: Work, ask: Callable[..., LadderAnswer]) -> None:
+def test_the_same_question_is_answered_once(work: Work, ask: Callable[..., LadderResponse]) -> None:
     first = ask(version=1)
     assert ask(version=1) == first
     assert work.times == 1
@@ -52,29 +52,34 @@ def test_the_same_question_is_answered_once(work: Work, ask: Callable[..., Ladde
 def test_whoever_asks_the_same_meanwhile_waits_for_the_answer() -> None:
     begun, go_on, times = threading.Event(), threading.Event(), []
 
-    def work() -> list[Answer]:
+    def work() -> list[ResponseModel]:
         times.append(1)
         begun.set()
         go_on.wait(30)
-        return [LadderAnswer(serial="A", steps=[], noise_floor_dps=1.0), Certified.model_validate(CERTIFIED)]
+        return [
+            LadderResponse(serial="A", steps=[], noise_floor_dps=1.0),
+            CertificationResponse.model_validate(CERTIFIED),
+        ]
 
     with ThreadPoolExecutor(2) as pool:
-        first = pool.submit(kept_among, LadderAnswer, {"version": 1}, work)
+        first = pool.submit(cached_group, LadderResponse, {"version": 1}, work)
         assert begun.wait(30)
-        second = pool.submit(kept_among, Certified, {"version": 1}, work)
+        second = pool.submit(cached_group, CertificationResponse, {"version": 1}, work)
         go_on.set()
         assert (first.result().serial, second.result().by) == ("A", "B")
     assert len(times) == 1
 
 
-def test_other_code_answers_anew(work: Work, ask: Callable[..., LadderAnswer], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_code_answers_anew(
+    work: Work, ask: Callable[..., LadderResponse], monkeypatch: pytest.MonkeyPatch
+) -> None:
     ask(version=1)
     monkeypatch.setattr(keeping, "code_digest", lambda: "changed")
     ask(version=1)
     assert work.times == 2
 
 
-def test_a_damaged_answer_is_worked_out_again(work: Work, ask: Callable[..., LadderAnswer], cache: Path) -> None:
+def test_a_damaged_answer_is_worked_out_again(work: Work, ask: Callable[..., LadderResponse], cache: Path) -> None:
     first = ask(version=1)
     (file,) = cache.rglob("*.json")
     file.write_bytes(file.read_bytes()[:20])
@@ -85,7 +90,7 @@ def test_a_damaged_answer_is_worked_out_again(work: Work, ask: Callable[..., Lad
 
 
 def test_a_cache_that_cannot_be_written_costs_only_time(
-    work: Work, ask: Callable[..., LadderAnswer], cache: Path, monkeypatch: pytest.MonkeyPatch
+    work: Work, ask: Callable[..., LadderResponse], cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (cache / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache / "file"))
@@ -93,7 +98,7 @@ def test_a_cache_that_cannot_be_written_costs_only_time(
     assert work.times == 2
 
 
-def test_the_oldest_go(ask: Callable[..., LadderAnswer], cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_oldest_go(ask: Callable[..., LadderResponse], cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(keeping, "MOST", 3)
     for version in range(6):
         ask(version=version)
@@ -123,7 +128,7 @@ def test_criticise_looks_at_the_readings_once(tmp_path: Path, monkeypatch: pytes
     def never(*_: object) -> None:
         raise AssertionError("read again")
 
-    monkeypatch.setattr(evaluation, "readings_of", never)
+    monkeypatch.setattr(evaluation, "load_reduced_readings", never)
     assert lab.json("criticise", "FOG-0001") == first
     with pytest.raises(AssertionError, match="read again"):
         lab.run("criticise", "FOG-0001", "--formula", "wet: supply_v - 5")

@@ -13,10 +13,10 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock
 from labctl import web
 from labctl.api import create_app
-from labctl.api.middleware import ASKING, LOOPBACK_NAMES, Access
+from labctl.api.middleware import ASKING, LOOPBACK_NAMES, AccessPolicy
 from labctl.errors import BadInput, Conflict, NotFound
-from labctl.services.admin.api_keys import KeyRequest, Role, create_key, digest_of, refuse_open_doors, revoke_key
-from labctl.services.app import House
+from labctl.services.admin.api_keys import KeyRequest, Role, create_key, digest_of, require_an_api_key, revoke_key
+from labctl.services.app import LabService
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 
@@ -71,7 +71,7 @@ class Guarded:
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
     store = Store(Database(str(tmp_path_factory.mktemp("guarded") / "lab.sqlite"), write=True))
-    with TestClient(create_app(House(store, CLOCK), Access(keys=True))) as client:
+    with TestClient(create_app(LabService(store, CLOCK), AccessPolicy(keys=True))) as client:
         yield Guarded(store, client)
 
 
@@ -168,12 +168,12 @@ def test_keys_over_http_and_in_the_audit_trail(guarded: Guarded) -> None:
 def test_any_other_address_needs_a_key_first(tmp_path: Path) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         with pytest.raises(BadInput, match=r"--host 0\.0\.0\.0, .* labctl key create"):
-            refuse_open_doors(store, "--host 0.0.0.0")
+            require_an_api_key(store, "--host 0.0.0.0")
         create_key(store, KeyRequest(name="only", role=Role.VIEWER), CLOCK.utc())
-        refuse_open_doors(store, "--host 0.0.0.0")
+        require_an_api_key(store, "--host 0.0.0.0")
         revoke_key(store, "only", "x", CLOCK.utc())
         with pytest.raises(BadInput, match="no key"):
-            refuse_open_doors(store, "--host 0.0.0.0")
+            require_an_api_key(store, "--host 0.0.0.0")
 
 
 Ask = Callable[..., Any]
@@ -182,8 +182,8 @@ Ask = Callable[..., Any]
 @pytest.fixture
 def loopback(tmp_path: Path) -> Iterator[Ask]:
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
-    access = Access(hosts=LOOPBACK_NAMES)
-    with TestClient(create_app(House(store, CLOCK), access), base_url="http://127.0.0.1:8420") as client:
+    access = AccessPolicy(hosts=LOOPBACK_NAMES)
+    with TestClient(create_app(LabService(store, CLOCK), access), base_url="http://127.0.0.1:8420") as client:
 
         def ask(method: str = "get", path: str = "/api/units", json: Any = None, **headers: str) -> Any:
             named = {name.replace("_", "-"): value for name, value in headers.items()}
@@ -267,7 +267,7 @@ def test_the_service_tells_its_manager(
         manager.bind(address)
         manager.settimeout(5)
         store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
-        with TestClient(create_app(House(store, CLOCK))):
+        with TestClient(create_app(LabService(store, CLOCK))):
             assert manager.recv(100) == b"READY=1"
             in_a_loop(systemd.alive())
             assert manager.recv(100) == b"WATCHDOG=1"

@@ -17,15 +17,15 @@ from typer.testing import CliRunner
 from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
-from labctl.api.server import ServeRequest, open_house
+from labctl.api.server import ServeRequest, create_service
 from labctl.cli.app import app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
-from labctl.services.app import House
+from labctl.services.app import LabService
 from labctl.services.campaigns import bench_runner, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
 from labctl.services.campaigns.status import campaign_status, list_campaigns
-from labctl.services.commands.local import LocalActs
+from labctl.services.commands.local import LocalCommands
 from labctl.services.commands.protocol import CampaignRequest
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.transfer import newest_recording
@@ -134,13 +134,13 @@ def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say
 @pytest.mark.usefixtures("real")
 def test_ending_by_hand_what_no_process_runs_says_that_nobody_made_the_bench_safe(store: Store) -> None:
     campaign = left_running(store)
-    answer = LocalActs(store, VirtualClock()).abort_campaign(campaign, "the computer died")
+    answer = LocalCommands(store, VirtualClock()).abort_campaign(campaign, "the computer died")
     assert (answer.state, "Nobody has made bench" in answer.reason) == ("aborted", True)
     assert f"campaign {campaign} ended before" in store.benches.unconfirmed(BENCH.name)
 
 
 def test_a_simulated_bench_ended_with_its_process(store: Store) -> None:
-    answer = LocalActs(store, VirtualClock()).abort_campaign(left_running(store), "enough")
+    answer = LocalCommands(store, VirtualClock()).abort_campaign(left_running(store), "enough")
     assert (answer.state, store.benches.unconfirmed(BENCH.name)) == ("aborted", "")
 
 
@@ -252,15 +252,15 @@ def test_an_interrupt_waits_for_the_end_of_a_write_and_is_not_lost_when_that_fai
 
 
 def test_a_bench_that_was_not_used_is_not_called_safe(store: Store) -> None:
-    house = House(store, SystemClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
-    house.close()
-    assert house.left == "bench single-axis-sim was not used"
+    lab_service = LabService(store, SystemClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
+    lab_service.close()
+    assert lab_service.left == "bench single-axis-sim was not used"
 
 
 def test_simulate_never_takes_a_real_bench(tmp_path: Path) -> None:
     asked = ServeRequest(bench="example-real", simulate=True, database=str(tmp_path / "lab.sqlite"))
     with pytest.raises(BadInput, match="--simulate with --bench example-real: that bench has real instruments"):
-        open_house(asked, None)
+        create_service(asked, None)
 
 
 def labctl(location: str, *arguments: str) -> Any:

@@ -15,8 +15,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.api.middleware import Access
-from labctl.services.app import House
+from labctl.api.middleware import AccessPolicy
+from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.commands.protocol import FitRequest
 from labctl.services.planning.loading import load_bench
@@ -31,10 +31,10 @@ UNIT = "OSU-FOG-2024"
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     store = Store(Database(str(tmp_path_factory.mktemp("limits") / "lab.sqlite"), write=True))
-    house = House(store, SystemClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
-    house.acts().import_recording(EXAMPLES / "osu-fog")
-    house.acts().fit(UNIT, FitRequest(effects=["bias", "scale_factor"]))
-    with TestClient(create_app(house, Access(body_bytes=BODY, upload_bytes=UPLOAD))) as opened:
+    lab_service = LabService(store, SystemClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
+    lab_service.commands().import_recording(EXAMPLES / "osu-fog")
+    lab_service.commands().fit(UNIT, FitRequest(effects=["bias", "scale_factor"]))
+    with TestClient(create_app(lab_service, AccessPolicy(body_bytes=BODY, upload_bytes=UPLOAD))) as opened:
         yield opened
 
 

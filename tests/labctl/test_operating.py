@@ -17,13 +17,13 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.errors import Conflict, StoreError
-from labctl.services.app import House
+from labctl.services.app import LabService
 from labctl.services.campaigns import execution
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
-from procedures.contracts.operator import PersonOperator
+from procedures.contracts.operator import HumanOperator
 
 PATIENCE = 2000  #: looks at a campaign before a test gives up
 WAIT_S = 60.0  #: for the next sign of life
@@ -32,21 +32,21 @@ WAIT_S = 60.0  #: for the next sign of life
 @pytest.fixture
 def runner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> BenchRunner:
     """A bench on which a person turns and switches the units."""
-    monkeypatch.setattr(execution, "operator_of", lambda _: PersonOperator())
+    monkeypatch.setattr(execution, "operator_of", lambda _: HumanOperator())
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     return BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
 
 
 @pytest.fixture
 def client(runner: BenchRunner) -> Iterator[TestClient]:
-    with TestClient(create_app(House(runner._store, SystemClock(), runner))) as opened:
+    with TestClient(create_app(LabService(runner._store, SystemClock(), runner))) as opened:
         yield opened
 
 
 def until(client: TestClient, wanted: Any) -> Any:
     """Look at campaign 1, whenever its runner says that something happened, until it is as wanted."""
     happened = threading.Event()
-    stop = client.app.state.house.bench_runner().listen(happened.set)  # type: ignore[attr-defined]
+    stop = client.app.state.lab_service.bench_runner().listen(happened.set)  # type: ignore[attr-defined]
     try:
         for _ in range(PATIENCE):
             happened.clear()

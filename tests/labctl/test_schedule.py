@@ -12,13 +12,13 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull
-from labctl.services.app import House
+from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.commands.protocol import CampaignRequest
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import add_start, cancel_start, is_scheduled, list_starts, start_status
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.answers import CampaignAnswer
+from labctl.services.schemas.answers import CampaignResponse
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.errors import PlanRefused
@@ -45,7 +45,7 @@ class Lab:
     def take_up_cut_short(self) -> None:
         self.went_on += 1
 
-    def start(self, request: CampaignRequest) -> CampaignAnswer:
+    def start(self, request: CampaignRequest) -> CampaignResponse:
         if self.refusal is not None:
             raise self.refusal
         self.begun.append((self.clock.utc(), request.recipe))
@@ -290,9 +290,9 @@ class Served:
         self.clock = VirtualClock(START)
         self.store = Store(Database(location, write=True))
         self.runner = BenchRunner(self.store, BENCH, VirtualClock)
-        self.house = House(self.store, self.clock, self.runner)
-        assert self.house.scheduler is not None
-        self.scheduler = self.house.scheduler
+        self.lab_service = LabService(self.store, self.clock, self.runner)
+        assert self.lab_service.scheduler is not None
+        self.scheduler = self.lab_service.scheduler
 
     def rest(self) -> None:
         job = self.runner._job
@@ -304,7 +304,7 @@ def test_a_scheduled_campaign_runs_and_a_restart_begins_it_no_second_time(tmp_pa
     location = str(tmp_path / "lab.sqlite")
     first = Served(location)
     request = CampaignRequest(recipe="short", at="2026-01-05T10:00Z")
-    entry = first.house.acts().schedule_campaign(request)
+    entry = first.lab_service.commands().schedule_campaign(request)
     first.scheduler.tick()
     assert first.store.campaigns.all() == []
     first.clock.sleep(7200)
@@ -329,8 +329,8 @@ def test_a_scheduled_campaign_runs_and_a_restart_begins_it_no_second_time(tmp_pa
 
 def test_the_schedule_over_http(tmp_path: Path) -> None:
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
-    house = House(store, SystemClock(), BenchRunner(store, BENCH, VirtualClock))
-    with TestClient(create_app(house)) as client:
+    lab_service = LabService(store, SystemClock(), BenchRunner(store, BENCH, VirtualClock))
+    with TestClient(create_app(lab_service)) as client:
         body = {"recipe": "short", "cron": "30 2 * * *", "time_zone": "Europe/Berlin", "priority": 3}
         made = client.post("/api/campaigns", json=body)
         assert made.status_code == 202
@@ -347,7 +347,7 @@ def test_the_schedule_over_http(tmp_path: Path) -> None:
         for wrong in ({"at": "never"}, {"cron": "* *"}, {"at": "now", "cron": "0 2 * * *"}, {"priority": 1}):
             answer = client.post("/api/campaigns", json={"recipe": "short", **wrong})
             assert (answer.status_code, answer.json()["type"]) == (400, "urn:labctl:problem:bad-input"), wrong
-        assert house.scheduler is not None
+        assert lab_service.scheduler is not None
         now = client.post("/api/campaigns", json={"recipe": "short", "at": "now"}).json()["id"]
-        house.scheduler.tick()
+        lab_service.scheduler.tick()
         assert client.get(f"/api/schedule/{now}").json()["history"][0]["outcome"] == "started"

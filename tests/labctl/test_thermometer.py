@@ -15,8 +15,8 @@ from labctl.compensator import Compensator
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting import fit
 from labctl.fitting.criticism import criticise
-from labctl.fitting.criticism.reduction import compress
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.criticism.reduction import reduce_recording
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.static_record import static_record
 from labctl.fitting.data.temperature_channel import with_temperature
 from labctl.fitting.data.temperature_history import past_of
@@ -66,7 +66,7 @@ def test_where_a_unit_has_no_thermometer_the_chambers_stands_in(
 
 def test_criticism_and_the_static_record_go_by_the_chamber_too() -> None:
     recording = by_chamber(at_rest(LOOP_S, 5.0, 45.0, datasets=240))
-    model, _ = preset_for(None, ["bias"]).build(context_of(recording))
+    model, _ = preset_for(None, ["bias"]).build(fit_data_of(recording))
     assert criticise(recording, model).verdict.named == ("bias_temperature",)
     found, expected = static_record(recording), static_record(at_rest(LOOP_S, 5.0, 45.0, datasets=240))
     assert found is not None
@@ -87,7 +87,7 @@ def test_the_history_goes_by_the_same_thermometer() -> None:
 def test_without_either_temperature_one_line_says_so() -> None:
     recording = at_rest(600, 20.0, 30.0, datasets=10)
     bare = replace(recording, columns={n: v for n, v in recording.columns.items() if n != "temperature_c"})
-    model, _ = preset_for(None, ["bias"]).build(context_of(recording))
+    model, _ = preset_for(None, ["bias"]).build(fit_data_of(recording))
     for act in (lambda: fit(bare, None, ["bias"]), lambda: criticise(bare, model)):
         with pytest.raises(NotEnoughData, match="REST: column 'temperature_c' is missing, and so is 'chamber_c'"):
             act()
@@ -109,13 +109,13 @@ def test_a_temperature_loop_in_one_data_set_is_as_good_as_one_in_many(
     fitted = result.fitted.axes["z"]
     assert fitted.values[:, 0] == pytest.approx([0.02, 0.003, 1e-4], abs=5e-4)
     assert fitted.values == pytest.approx(expected.fitted.axes["z"].values, abs=1e-5)
-    model, _ = preset_for(None, ["bias"]).build(context_of(one))
+    model, _ = preset_for(None, ["bias"]).build(fit_data_of(one))
     assert criticise(one, model).verdict.named == ("bias_temperature",)
 
 
 def test_fit_and_criticism_see_the_same_rows_under_the_data_sets_number() -> None:
     recording = at_rest(LOOP_S, 5.0, 45.0)
-    points, data = to_points(recording), compress(recording)
+    points, data = to_points(recording), reduce_recording(recording)
     assert len(points) == len(data) == 240
     assert set(points.columns["dataset"].tolist()) == set(data.dataset.tolist()) == {1}
     assert points.columns["n"].sum() == LOOP_S
@@ -131,7 +131,7 @@ def test_what_is_short_or_at_one_temperature_stays_one_point(n: int, low_c: floa
     noisy = recording.columns["temperature_c"] + np.random.default_rng(2).normal(0.0, 0.3, n)
     recording = replace(recording, columns={**recording.columns, "temperature_c": noisy})
     assert np.ptp(noisy) > 1.5
-    assert len(to_points(recording)) == len(compress(recording)) == 1
+    assert len(to_points(recording)) == len(reduce_recording(recording)) == 1
 
 
 def test_the_invalid_and_the_lost_do_not_move_a_piece() -> None:

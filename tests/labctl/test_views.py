@@ -15,10 +15,10 @@ from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.diagnostics import VIEWS, draws_of, views_of
 from labctl.fitting.criticism.diagnostics.channels import groups_of, runs_test
 from labctl.fitting.criticism.diagnostics.repeatability import legs_of
-from labctl.fitting.criticism.model_comparison import weigh
-from labctl.fitting.criticism.reduction import compress
+from labctl.fitting.criticism.model_comparison import compare_models
+from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.criticism.residuals import residuals_of
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, formulas
 from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording, read_recording
@@ -30,10 +30,10 @@ ROOT = Path(__file__).parents[2]
 
 def views(recording: Recording, model: str | None = "ojeda2000", effects: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the views alone: nothing competes but one effect."""
-    context = context_of(recording)
+    context = fit_data_of(recording)
     fitted, _ = preset_for(model, list(effects)).build(context)
     forward, _ = changed(fitted).build(context)
-    weighed = weigh(compress(recording), forward, {"bias_drift": CATALOGUE["bias_drift"]})
+    weighed = compare_models(reduce_recording(recording), forward, {"bias_drift": CATALOGUE["bias_drift"]})
     return views_of(weighed, residuals_of(weighed), recording, CATALOGUE)
 
 
@@ -219,7 +219,7 @@ def test_too_little_data_has_no_views() -> None:
     recording = single_axis(5)
     few = np.asarray(recording.columns["dataset"]) <= 2
     short = replace(recording, columns={k: v[few] for k, v in recording.columns.items()})
-    model, _ = preset_for(None, ["bias", "scale_factor"]).build(context_of(short))
+    model, _ = preset_for(None, ["bias", "scale_factor"]).build(fit_data_of(short))
     found = criticise(short, model)
     assert found.verdict.form == "insufficient_data"
     assert found.views == {}

@@ -15,7 +15,7 @@ from instruments.interfaces.chamber import ChamberLimits, ChamberState
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.interfaces.table import Spin, TableLimits
 from procedures.contracts.control import Control
-from procedures.contracts.operator import HandOperator
+from procedures.contracts.operator import UnitHandlerOperator
 from procedures.execution.engine import Engine
 from procedures.execution.resume import Restart
 from procedures.planning.limits import BenchLimits
@@ -180,8 +180,8 @@ class FakeGyro(Fake):
         self.clock.sleep(duration_s)
         return self._readings(0 if self.silent else max(self._index() - self.next_sample, 0))
 
-    def glance(self) -> Readings:
-        self.called("glance")
+    def read_latest(self) -> Readings:
+        self.called("read_latest")
         self.clock.sleep(1 / self.sample_rate_hz)
         self.next_sample = self._index() - 1
         return self._readings(1)
@@ -281,11 +281,11 @@ class Rig:
         self.imu = self.gyros[gyros[0]]
         self.journal = RecordingJournal(self.trace)
         self.control = Control()
-        self.hand = SimpleNamespace(
+        self.unit_handler = SimpleNamespace(
             mount=lambda position: self.trace.append(f"hand.mount {position}"),
             power=lambda on: self.trace.append(f"hand.power {on}"),
         )
-        self.operator: Any = HandOperator(self.hand)
+        self.operator: Any = UnitHandlerOperator(self.unit_handler)
         self.engine: Any = None
 
     def recipe(self, **changes: Any) -> Recipe:

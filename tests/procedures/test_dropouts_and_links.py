@@ -8,7 +8,7 @@ import pytest
 
 from instruments.errors import LinkError, NoReply
 from procedures.contracts.journal import CampaignState
-from procedures.contracts.operator import PersonOperator
+from procedures.contracts.operator import HumanOperator
 
 
 def gyros_of(rig: Any) -> list[tuple[int, tuple[str, ...]]]:
@@ -31,7 +31,7 @@ def test_a_unit_whose_readings_fail_drops_out_and_the_others_go_on(two_units: An
 
 def test_a_unit_that_is_silent_in_a_soak_drops_out(two_units: Any) -> None:
     rig = two_units
-    rig.when_step("soak", lambda: rig.gyros["fog"].fail("glance", NoReply("fog", "gone")))
+    rig.when_step("soak", lambda: rig.gyros["fog"].fail("read_latest", NoReply("fog", "gone")))
     assert rig.run().state == CampaignState.DONE
     assert [name for name, _ in rig.journal.dropped] == ["fog"]
     assert "nothing heard" in rig.journal.dropped[0][1]
@@ -50,7 +50,7 @@ def test_a_unit_that_never_starts_drops_out(two_units: Any) -> None:
 def test_the_last_unit_ends_the_campaign(two_units: Any) -> None:
     rig = two_units
     for name, gyro in rig.gyros.items():
-        gyro.fail("glance", NoReply(name, "gone"))
+        gyro.fail("read_latest", NoReply(name, "gone"))
     outcome = rig.run()
     assert outcome.state == CampaignState.FAILED
     assert len(rig.journal.dropped) == 1
@@ -62,11 +62,11 @@ def test_a_stream_that_broke_is_opened_again(rig: Any) -> None:
 
     def breaks() -> None:
         began.append(rig.trace.count("imu.start"))
-        rig.imu.fail("glance", LinkError("imu", "unplugged"), times=1)
+        rig.imu.fail("read_latest", LinkError("imu", "unplugged"), times=1)
 
     rig.when_step("soak", breaks)
     assert rig.run().state == CampaignState.DONE
-    first = rig.trace.index("journal.event", rig.trace.index("imu.glance"))
+    first = rig.trace.index("journal.event", rig.trace.index("imu.read_latest"))
     assert "imu.start" in rig.trace[first : first + 12]
     assert "link.well" in rig.journal.kinds()
     assert rig.engine.progress.links == {}
@@ -105,7 +105,7 @@ def test_a_chamber_that_answers_late_is_asked_again_and_not_for_ever(rig: Any) -
 
 
 def never(rig: Any, **rules: Any) -> Any:
-    rig.operator = PersonOperator()
+    rig.operator = HumanOperator()
     return rig.recipe(on_failure={"operator_timeout_s": 900, **rules})
 
 

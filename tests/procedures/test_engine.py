@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from procedures.contracts.journal import CampaignState
-from procedures.contracts.operator import PersonOperator
+from procedures.contracts.operator import HumanOperator
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import make_plan
 
@@ -29,7 +29,7 @@ def test_the_order_of_events_in_one_data_set(rig: Any) -> None:
     first = rig.trace.index("table.spin")
     order = [entry for entry in rig.trace[first:] if not entry.startswith(("chamber.", "journal.environment"))]
     end = order.index("journal.step_ended")
-    assert order[:5] == ["table.spin", "imu.glance", "imu.glance", "journal.dataset_opened", "imu.read"]
+    assert order[:5] == ["table.spin", "imu.read_latest", "imu.read_latest", "journal.dataset_opened", "imu.read"]
     assert order[5:7] == ["journal.readings", "imu.read"]
     assert order[end - 3 : end + 1] == [
         "journal.readings",
@@ -170,7 +170,7 @@ def test_a_pause_during_a_soak_does_not_eat_its_time_out(rig: Any) -> None:
 
 
 def test_a_question_waits_for_its_answer_and_is_seen_from_outside(rig: Any) -> None:
-    rig.operator = PersonOperator()
+    rig.operator = HumanOperator()
     seen: list[str] = []
 
     def answer_after_a_minute(progress: Any) -> None:

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from instruments.errors import Garbled, NoReply, Refused
+from instruments.errors import MalformedReply, NoReply, RequestRejected
 from procedures.contracts.errors import BadData
 from procedures.contracts.journal import CampaignState
-from procedures.contracts.operator import Answer, PersonOperator
+from procedures.contracts.operator import Answer, HumanOperator
 
 STEP_KINDS = ["home", "move_chamber", "mount", "power_on", "soak", "acquire", "power_off", "safe_state"]
 
@@ -23,11 +23,11 @@ CALLS = [
     ("power_on", "imu", "identify"),
     ("power_on", "imu", "start"),
     ("soak", "chamber", "read"),
-    ("soak", "imu", "glance"),
+    ("soak", "imu", "read_latest"),
     ("acquire", "table", "spin"),
     ("acquire", "table", "settle"),
     ("acquire", "imu", "read"),
-    ("acquire", "imu", "glance"),
+    ("acquire", "imu", "read_latest"),
     ("acquire", "chamber", "read"),
     ("power_off", "imu", "stop"),
 ]
@@ -38,7 +38,7 @@ def device(rig: Any, name: str) -> Any:
 
 
 @pytest.mark.parametrize(("kind", "name", "method"), CALLS)
-@pytest.mark.parametrize("error", [NoReply, Refused])
+@pytest.mark.parametrize("error", [NoReply, RequestRejected])
 def test_a_device_that_fails_for_good_ends_the_campaign_safely(
     rig: Any, kind: str, name: str, method: str, error: Any
 ) -> None:
@@ -130,7 +130,7 @@ def test_every_part_of_the_safe_state_is_tried_and_what_failed_is_said(
         if ending == "aborted":
             rig.control.abort()
         elif ending == "failed":
-            rig.table.fail("spin", Refused("table", "no"))
+            rig.table.fail("spin", RequestRejected("table", "no"))
 
     rig.when_step("safe_state" if ending == "done" else "acquire", break_it)
     outcome = rig.run()
@@ -220,12 +220,12 @@ def test_a_set_point_that_is_not_taken_is_a_failure(rig: Any) -> None:
 
 
 def test_a_short_silence_is_noted_and_forgiven(rig: Any) -> None:
-    rig.when_step("soak", lambda: rig.imu.fail("glance", NoReply("imu", "nothing in 0.5 s"), times=2))
+    rig.when_step("soak", lambda: rig.imu.fail("read_latest", NoReply("imu", "nothing in 0.5 s"), times=2))
     assert rig.run().state == CampaignState.DONE
     assert rig.journal.kinds().count("link.degraded") == 1
 
 
-@pytest.mark.parametrize("error", [NoReply("imu", "gone"), Garbled("imu", "noise"), BadData("imu", "odd")])
+@pytest.mark.parametrize("error", [NoReply("imu", "gone"), MalformedReply("imu", "noise"), BadData("imu", "odd")])
 def test_a_data_set_whose_readings_failed_is_taken_once_more(rig: Any, error: Exception) -> None:
     rig.when_step("acquire", lambda: rig.imu.fail("read", error, times=1))
     assert rig.run().state == CampaignState.DONE
@@ -263,7 +263,7 @@ def test_a_person_who_declines_ends_the_campaign(rig: Any) -> None:
 
 
 def test_nobody_answers(rig: Any) -> None:
-    rig.operator = PersonOperator()
+    rig.operator = HumanOperator()
     outcome = rig.run(rig.recipe(on_failure={"operator_timeout_s": 900}))
     assert outcome.state == CampaignState.FAILED
     assert "nobody answered within 900 s: turn the units" in outcome.reason
@@ -271,7 +271,7 @@ def test_nobody_answers(rig: Any) -> None:
 
 
 def test_abort_while_a_question_waits(rig: Any) -> None:
-    rig.operator = PersonOperator()
+    rig.operator = HumanOperator()
 
     def hook(what: str, detail: Any) -> None:
         if what == "state" and detail == CampaignState.WAITING:

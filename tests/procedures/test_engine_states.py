@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from instruments.errors import NoReply, Refused
+from instruments.errors import NoReply, RequestRejected
 from procedures.contracts.control import Control
 from procedures.contracts.journal import NEXT, CampaignState
 from procedures.execution.resume import Restart
@@ -38,7 +38,7 @@ class Campaign(RuleBasedStateMachine):
         self.killed = False
         self.told = [CampaignState.PLANNED]
 
-    def leg(self, **acts: Any) -> None:
+    def leg(self, **commands: Any) -> None:
         """Run from where the campaign stands; `acts` are done at the n-th entry of the journal, counted from here."""
         rig = self.rig
         rig.trace.clear()
@@ -58,7 +58,7 @@ class Campaign(RuleBasedStateMachine):
                 self.complete[rig.journal.headers[-1].step.dataset] += 1
                 self.finished.add(rig.journal.steps[-1][1])  # as the database does: the data set is there
             seen[0] += 1
-            for at, act in acts.get("at", ()):
+            for at, act in commands.get("at", ()):
                 if seen[0] == at + 1:
                     act()
 
@@ -80,7 +80,7 @@ class Campaign(RuleBasedStateMachine):
             raise Killed
 
         for device in (self.rig.table, self.rig.chamber, *self.rig.gyros.values()):
-            for method in ("stop", "make_safe", "read", "glance", "spin", "settle", "start", "home", "identify"):
+            for method in ("stop", "make_safe", "read", "read_latest", "spin", "settle", "start", "home", "identify"):
                 device.faults[method] = dead
         self.rig.journal.hooks.insert(0, lambda *_: dead())
         raise Killed
@@ -128,7 +128,7 @@ class Campaign(RuleBasedStateMachine):
         def fail() -> None:
             broken = self.rig.gyros.get(device) or getattr(self.rig, device)
             method = {"table": "spin", "chamber": "read"}.get(device, "read")
-            error = Refused if device == "table" else NoReply
+            error = RequestRejected if device == "table" else NoReply
             broken.fail(method, error(device, "broken"), times=times)
 
         self.leg(at=[(at, fail)])

@@ -8,14 +8,14 @@ import pytest
 
 from procedures.contracts.control import Control
 from procedures.contracts.errors import StalePrompt
-from procedures.contracts.operator import HandOperator, PersonOperator, Prompt
+from procedures.contracts.operator import HumanOperator, Prompt, UnitHandlerOperator
 
 FIRST = Prompt("1", "mount", "turn x up", "x")
 SECOND = Prompt("2", "mount", "turn y up", "y")
 
 
 def test_a_person_answers_the_open_question() -> None:
-    person = PersonOperator()
+    person = HumanOperator()
     assert person.pending is None
     person.ask(FIRST)
     assert person.pending == FIRST
@@ -28,7 +28,7 @@ def test_a_person_answers_the_open_question() -> None:
 
 
 def test_an_answer_to_an_old_question_is_refused() -> None:
-    person = PersonOperator()
+    person = HumanOperator()
     with pytest.raises(StalePrompt, match="no question is open"):
         person.confirm("1", by="Ada")
     person.ask(FIRST)
@@ -42,7 +42,7 @@ def test_an_answer_to_an_old_question_is_refused() -> None:
 
 
 def test_a_question_can_be_taken_back() -> None:
-    person = PersonOperator()
+    person = HumanOperator()
     person.ask(FIRST)
     person.withdraw("2")
     assert person.pending == FIRST
@@ -52,11 +52,11 @@ def test_a_question_can_be_taken_back() -> None:
 
 
 def test_a_hand_does_at_once_what_is_asked(rig: Any) -> None:
-    hand = HandOperator(rig.hand)
+    unit_handler = UnitHandlerOperator(rig.unit_handler)
     for kind in ("mount", "power_on", "power_off"):
         prompt = Prompt("1", kind, "", "-x")  # type: ignore[arg-type]  a loop over the three literals
-        hand.ask(prompt)
-        answer = hand.answer("1")
+        unit_handler.ask(prompt)
+        answer = unit_handler.answer("1")
         assert answer is not None
         assert answer.confirmed
     assert rig.trace == ["hand.mount -x", "hand.power True", "hand.power False"]

@@ -8,7 +8,7 @@ import pytest
 
 from instruments.errors import NoReply
 from procedures.contracts.journal import CampaignState
-from procedures.contracts.operator import PersonOperator
+from procedures.contracts.operator import HumanOperator
 from procedures.execution.resume import Restart, soak_matters_after_s
 from procedures.recipe.recipe import ResumeRules
 
@@ -86,7 +86,7 @@ def test_after_a_power_cut_a_new_session_is_recorded_and_everything_is_soaked(ri
 def test_after_a_power_cut_a_person_is_asked_only_when_a_unit_stays_silent(rig: Any) -> None:
     for silent in (False, True):
         each = type(rig)()
-        each.operator = PersonOperator()
+        each.operator = HumanOperator()
         asked: list[str] = []
 
         def answer(progress: Any, each: Any = each, asked: list[str] = asked) -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from labctl.fitting.criticism.evidence import Design
 from labctl.fitting.criticism.model_comparison import design_of
-from labctl.fitting.criticism.reduction import Compressed, compress
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.models.presets import changed, preset_for
 from studies import baselines
 from studies.baselines import Table, entries, table_of
@@ -24,11 +24,11 @@ HIDDEN = {"scale_factor_asymmetry": 1e-3}
 
 
 @lru_cache(maxsize=1)
-def small() -> tuple[Compressed, Design]:
+def small() -> tuple[ReducedRecording, Design]:
     recording = campaign("O", 3, HIDDEN)
-    context = context_of(recording)
+    context = fit_data_of(recording)
     model, _ = changed(preset_for("ojeda2000", []).build(context)[0]).build(context)
-    data = compress(recording)
+    data = reduce_recording(recording)
     return data, design_of(data, model, "z")
 
 

@@ -17,8 +17,8 @@ import uvicorn
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.api.middleware import Access
-from labctl.services.app import House
+from labctl.api.middleware import AccessPolicy
+from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
@@ -46,19 +46,19 @@ class Service:
     keys: bool = False
     port: int = 0
     url: str = ""
-    house: House = field(init=False)
+    lab_service: LabService = field(init=False)
 
     def start(self) -> None:
         """Begin to answer."""
         store = Store(Database(str(self.folder / "lab.sqlite"), write=True))
         runner = BenchRunner(store, load_bench(self.bench), VirtualClock) if self.bench else None
-        self.house = House(store, SystemClock(), runner)
+        self.lab_service = LabService(store, SystemClock(), runner)
         listener = socket.socket()
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(("127.0.0.1", self.port))
         self.port = listener.getsockname()[1]
         self.url = f"http://127.0.0.1:{self.port}"
-        app = create_app(self.house, Access(keys=self.keys))
+        app = create_app(self.lab_service, AccessPolicy(keys=self.keys))
         self._server = uvicorn.Server(
             uvicorn.Config(app, log_level="error", lifespan="on", timeout_graceful_shutdown=1)
         )

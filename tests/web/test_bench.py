@@ -10,7 +10,7 @@ import pytest
 
 from instruments.clock import SystemClock
 from labctl.services.campaigns import execution
-from procedures.contracts.operator import PersonOperator
+from procedures.contracts.operator import HumanOperator
 from tests.web.conftest import Faults, Service
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.timeout(300)
 @pytest.fixture
 def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     """A bench on which a person turns and switches the units."""
-    monkeypatch.setattr(execution, "operator_of", lambda _: PersonOperator())
+    monkeypatch.setattr(execution, "operator_of", lambda _: HumanOperator())
     serving = Service(tmp_path)
     serving.start()
     yield serving
@@ -121,7 +121,7 @@ def test_a_bench_that_was_not_confirmed_safe_is_told_and_cleared_by_a_person(
 
     start(service)
     service.post("/api/campaigns/1/abort", {"reason": "enough", "by": "Ann"})
-    store, bench = service.house.store, "single-axis-sim"
+    store, bench = service.lab_service.store, "single-axis-sim"
     store.benches.mark(bench, "the chamber did not answer: its set point is not known", SystemClock().utc())
     page = visit("/bench")
     told = page.get_by_text(f"Bench {bench} was not confirmed safe")

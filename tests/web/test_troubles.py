@@ -101,7 +101,7 @@ def guarded(tmp_path: Path) -> Iterator[tuple[Service, str, str]]:
     service = Service(tmp_path, keys=True)
     service.start()
     made = [
-        service.house.acts().create_key(KeyRequest(name=role.name.lower(), role=role)).key
+        service.lab_service.commands().create_key(KeyRequest(name=role.name.lower(), role=role)).key
         for role in (Role.VIEWER, Role.OPERATOR)
     ]
     headers = {"Authorization": f"Bearer {made[1]}"}

@@ -7,45 +7,45 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from labctl.api.dependencies import HouseOf
+from labctl.api.dependencies import ServiceDep
 from labctl.api.middleware import NEEDS_APPROVER
-from labctl.services.admin.api_keys import KeyAnswer, KeyRequest, NewKeyAnswer, list_keys
-from labctl.services.admin.audit import AuditAnswer, list_audit
+from labctl.services.admin.api_keys import KeyRequest, KeyResponse, NewKeyResponse, list_keys
+from labctl.services.admin.audit import AuditResponse, list_audit
 from labctl.services.commands.protocol import BackupNote, ReasonRequest
 
 router = APIRouter(prefix="/api", tags=["keys and audit"])
 
 
 @router.get("/keys", summary="All keys", dependencies=[NEEDS_APPROVER])
-def keys(house: HouseOf) -> list[KeyAnswer]:
+def keys(service: ServiceDep) -> list[KeyResponse]:
     """Every key that was made, with its role; the keys themselves are kept nowhere. Asks for an approver."""
-    return list_keys(house.store)
+    return list_keys(service.store)
 
 
 @router.post("/keys", summary="Make a key", status_code=201, dependencies=[NEEDS_APPROVER])
-def create_key(request: KeyRequest, house: HouseOf) -> NewKeyAnswer:
+def create_key(request: KeyRequest, service: ServiceDep) -> NewKeyResponse:
     """Make a key. The answer is the only place where it is ever shown. Asks for an approver."""
-    return house.acts().create_key(request)
+    return service.commands().create_key(request)
 
 
 @router.post("/keys/{name}/revoke", summary="Revoke a key", dependencies=[NEEDS_APPROVER])
-def revoke_key(name: str, request: ReasonRequest, house: HouseOf) -> KeyAnswer:
+def revoke_key(name: str, request: ReasonRequest, service: ServiceDep) -> KeyResponse:
     """Take a key's power away, at once. Asks for an approver."""
-    return house.acts().revoke_key(name, request.reason)
+    return service.commands().revoke_key(name, request.reason)
 
 
 @router.get("/audit", summary="The audit trail")
 def audit(
-    house: HouseOf,
+    service: ServiceDep,
     since: Annotated[datetime | None, Query(description="From this instant on; without a zone: UTC.")] = None,
     after: Annotated[int, Query(ge=0, le=2**63 - 1, description="Rows with a number above this one.")] = 0,
     limit: Annotated[int, Query(ge=1, le=10_000, description="At most this many rows.")] = 1000,
-) -> list[AuditAnswer]:
+) -> list[AuditResponse]:
     """Who did what, when and why, in order; each row's hash covers it and the row before."""
-    return list_audit(house.store, since, after, limit)
+    return list_audit(service.store, since, after, limit)
 
 
 @router.post("/backups", summary="Note a backup", status_code=204)
-def note_backup(note: BackupNote, house: HouseOf) -> None:
+def note_backup(note: BackupNote, service: ServiceDep) -> None:
     """Write down in the audit trail that a backup was made; `labctl backup` sends it."""
-    house.acts().note_backup(note)
+    service.commands().note_backup(note)

@@ -6,24 +6,24 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
 
-from labctl.api.dependencies import HouseOf
+from labctl.api.dependencies import ServiceDep
 from labctl.api.middleware import NEEDS_APPROVER
 from labctl.fitting.effects import read_formula
 from labctl.services.calibrations import fitting as services
-from labctl.services.calibrations.revision import PreviewAnswer, preview_unit
-from labctl.services.calibrations.surface import SurfaceAnswer, surface_of
-from labctl.services.calibrations.uncertainty import UncertaintyAnswer, uncertainty_at
+from labctl.services.calibrations.revision import PreviewResponse, preview_unit
+from labctl.services.calibrations.surface import SurfaceResponse, surface_of
+from labctl.services.calibrations.uncertainty import UncertaintyResponse, uncertainty_at
 from labctl.services.commands.protocol import CertifyRequest, FitRequest, ImproveRequest
 from labctl.services.criticism import criticise as criticism_services
-from labctl.services.criticism.plots import PictureAnswer, pictures_unit
+from labctl.services.criticism.plots import PictureResponse, pictures_unit
 from labctl.services.schemas.answers import (
     CalibrationRow,
-    Certified,
-    CriticismAnswer,
-    FitAnswer,
-    LadderAnswer,
-    ResidualsAnswer,
-    VersionAnswer,
+    CertificationResponse,
+    CriticismResponse,
+    FitResponse,
+    LadderResponse,
+    ResidualsResponse,
+    VersionResponse,
 )
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
@@ -34,7 +34,7 @@ RecordingNumber = Annotated[int | None, Query(description="Recording; default: t
 @router.get("/calibration", summary="The calibration to use", response_class=Response)
 async def calibration(
     serial: str,
-    house: HouseOf,
+    service: ServiceDep,
     version: Annotated[int | None, Query(description="A version; default: the certified one (404 without).")] = None,
     format: Annotated[str, Query(description="json, c ...")] = "json",  # noqa: A002  the contract's name
     if_none_match: Annotated[str | None, Header()] = None,
@@ -43,7 +43,7 @@ async def calibration(
 
     A point read of tens of microseconds: it runs in the event loop, without a hand-over to a thread.
     """
-    file = services.calibration_file(house.store, serial, version, format)
+    file = services.calibration_file(service.store, serial, version, format)
     headers = {"ETag": f'"{file.etag}"', "Cache-Control": "no-cache"}
     if if_none_match and f'"{file.etag}"' in if_none_match:
         return Response(status_code=304, headers=headers)
@@ -52,107 +52,109 @@ async def calibration(
 
 @router.head("/calibrations", include_in_schema=False)
 @router.get("/calibrations", summary="All versions")
-def calibrations(serial: str, house: HouseOf) -> list[CalibrationRow]:
+def calibrations(serial: str, service: ServiceDep) -> list[CalibrationRow]:
     """Every version of the unit, newest first, with its error figures."""
-    return services.list_calibrations(house.store, serial)
+    return services.list_calibrations(service.store, serial)
 
 
 @router.post("/calibrations", summary="Fit a model", status_code=201)
-def fit(serial: str, request: FitRequest, house: HouseOf) -> FitAnswer:
+def fit(serial: str, request: FitRequest, service: ServiceDep) -> FitResponse:
     """Fit a model to a recording; it becomes the unit's next version."""
-    return house.acts().fit(serial, request)
+    return service.commands().fit(serial, request)
 
 
 @router.post("/calibrations/{version}/improve", summary="Change a model", status_code=201)
-def improve(serial: str, version: int, request: ImproveRequest, house: HouseOf) -> FitAnswer:
+def improve(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> FitResponse:
     """Add effects to a version, or take some out, and fit everything again; it becomes the unit's next version."""
-    return house.acts().improve(serial, request.model_copy(update={"version": version}))
+    return service.commands().improve(serial, request.model_copy(update={"version": version}))
 
 
 @router.get("/calibrations/{version}", summary="One version")
-def one_version(serial: str, version: int, house: HouseOf) -> VersionAnswer:
+def one_version(serial: str, version: int, service: ServiceDep) -> VersionResponse:
     """The version as its fit answered, when and from what it was made, and whether it is in force."""
-    return services.one_version(house.store, serial, version)
+    return services.one_version(service.store, serial, version)
 
 
 @router.get("/certifications", summary="What was certified and revoked")
-def certifications(serial: str, house: HouseOf) -> list[Certified]:
+def certifications(serial: str, service: ServiceDep) -> list[CertificationResponse]:
     """Every act of certifying and revoking a version of the unit, newest first: who, why, when, and due when."""
-    return services.list_certifications(house.store, serial)
+    return services.list_certifications(service.store, serial)
 
 
 @router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")
 def criticism(
     serial: str,
     version: int,
-    house: HouseOf,
+    service: ServiceDep,
     recording: RecordingNumber = None,
     formula: Annotated[list[str] | None, Query(description="Effects of your own that compete: 'name: expr'.")] = None,
-) -> CriticismAnswer:
+) -> CriticismResponse:
     """What the model leaves, where, which effect may be missing, and what this recording cannot say."""
     competing = [read_formula(line) for line in formula or []]
-    return criticism_services.criticise_unit(house.store, serial, version, recording, competing)
+    return criticism_services.criticise_unit(service.store, serial, version, recording, competing)
 
 
 @router.get("/calibrations/{version}/residuals", summary="What a model leaves, data set by data set")
-def residuals(serial: str, version: int, house: HouseOf, recording: RecordingNumber = None) -> ResidualsAnswer:
+def residuals(serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None) -> ResidualsResponse:
     """The rows behind the map of the criticism, one per data set and axis: measured, modelled, and what is left."""
-    return criticism_services.residuals_unit(house.store, serial, version, recording)
+    return criticism_services.residuals_unit(service.store, serial, version, recording)
 
 
 @router.get("/calibrations/{version}/pictures", summary="The pictures of a criticism")
-def pictures(serial: str, version: int, house: HouseOf, recording: RecordingNumber = None) -> list[PictureAnswer]:
+def pictures(
+    serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None
+) -> list[PictureResponse]:
     """Every picture that there is something to draw in, as a Plotly figure, with how to read it."""
-    return pictures_unit(house.store, serial, version, recording)
+    return pictures_unit(service.store, serial, version, recording)
 
 
 @router.get("/calibrations/{version}/surface", summary="The modelled error over rate and temperature")
 def surface(
     serial: str,
     version: int,
-    house: HouseOf,
+    service: ServiceDep,
     rate_points: Annotated[int, Query(ge=2, le=401)] = 41,
     temperature_points: Annotated[int, Query(ge=2, le=201)] = 25,
-) -> SurfaceAnswer:
+) -> SurfaceResponse:
     """What the calibration takes off each axis, turned about itself, on a grid over what was calibrated."""
-    return surface_of(house.store, serial, version, rate_points, temperature_points)
+    return surface_of(service.store, serial, version, rate_points, temperature_points)
 
 
 @router.post("/calibrations/{version}/preview", summary="What a changed model would be")
-def preview(serial: str, version: int, request: ImproveRequest, house: HouseOf) -> PreviewAnswer:
+def preview(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> PreviewResponse:
     """The same change as `improve` makes, fitted, with its errors before and after; nothing is kept."""
-    return preview_unit(house.store, serial, request.model_copy(update={"version": version}))
+    return preview_unit(service.store, serial, request.model_copy(update={"version": version}))
 
 
 @router.get("/calibrations/{version}/uncertainty", summary="How far a corrected rate may be off")
 def uncertainty(
     serial: str,
     version: int,
-    house: HouseOf,
+    service: ServiceDep,
     rate_dps: Annotated[float, Query(description="True rate about each axis in turn, deg/s.")],
     temperature_c: Annotated[float, Query(description="The gyro's thermometer, deg C.")],
-) -> UncertaintyAnswer:
+) -> UncertaintyResponse:
     """GUM components of a corrected rate at one rate and temperature, and whether that was calibrated at all."""
-    return uncertainty_at(house.store, serial, version, rate_dps, temperature_c)
+    return uncertainty_at(service.store, serial, version, rate_dps, temperature_c)
 
 
 @router.head("/ladder", include_in_schema=False)
 @router.get("/ladder", summary="The error, version by version")
-def ladder(serial: str, house: HouseOf) -> LadderAnswer:
+def ladder(serial: str, service: ServiceDep) -> LadderResponse:
     """Every version's errors, oldest first, down to the noise floor."""
-    return criticism_services.ladder(house.store, serial)
+    return criticism_services.ladder(service.store, serial)
 
 
 @router.post("/calibrations/{version}/certify", summary="Make a version current", dependencies=[NEEDS_APPROVER])
-def certify(serial: str, version: int, request: CertifyRequest, house: HouseOf) -> Certified:
+def certify(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
     """Make a version the one in force: who, why, and when it is due again. An older version again is a rollback.
 
     Asks for an approver.
     """
-    return house.acts().certify(serial, version, request)
+    return service.commands().certify(serial, version, request)
 
 
 @router.post("/calibrations/{version}/revoke", summary="Take a version out of force", dependencies=[NEEDS_APPROVER])
-def revoke(serial: str, version: int, request: CertifyRequest, house: HouseOf) -> Certified:
+def revoke(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
     """Take the version out of force; the unit then has no certified calibration. Asks for an approver."""
-    return house.acts().revoke(serial, version, request)
+    return service.commands().revoke(serial, version, request)

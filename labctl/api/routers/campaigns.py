@@ -8,72 +8,72 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
-from labctl.api.dependencies import HouseOf
+from labctl.api.dependencies import ServiceDep
 from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
-from labctl.services.planning.planner import CampaignPlanAnswer, campaign_plan
+from labctl.services.planning.planner import CampaignPlanResponse, campaign_plan
 from labctl.services.schedule.queue import is_scheduled
-from labctl.services.schemas.answers import CampaignAnswer, ScheduledAnswer
+from labctl.services.schemas.answers import CampaignResponse, ScheduledResponse
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
 
 
-@router.post("", summary="Run a recipe", status_code=201, responses={202: {"model": ScheduledAnswer}})
-def start(request: CampaignRequest, house: HouseOf, response: Response) -> CampaignAnswer | ScheduledAnswer:
+@router.post("", summary="Run a recipe", status_code=201, responses={202: {"model": ScheduledResponse}})
+def start(request: CampaignRequest, service: ServiceDep, response: Response) -> CampaignResponse | ScheduledResponse:
     """Run a recipe on this service's bench, now (201) or, with `at` or `cron`, later (202: an entry of the schedule).
 
     Refused when the bench or a unit cannot do it, naming the limit.
     """
     if is_scheduled(request):
         response.status_code = 202
-        return house.acts().schedule_campaign(request)
-    return house.bench_runner().start(request)
+        return service.commands().schedule_campaign(request)
+    return service.bench_runner().start(request)
 
 
 @router.get("", summary="All campaigns")
-def campaigns(house: HouseOf) -> list[CampaignAnswer]:
+def campaigns(service: ServiceDep) -> list[CampaignResponse]:
     """Every campaign, newest first."""
-    return house.campaigns()
+    return service.campaigns()
 
 
 @router.get("/{campaign}", summary="One campaign")
-def campaign(campaign: int, house: HouseOf) -> CampaignAnswer:
+def campaign(campaign: int, service: ServiceDep) -> CampaignResponse:
     """State, step, progress, expected end, temperatures, rate and last fault."""
-    return house.status(campaign)
+    return service.status(campaign)
 
 
 @router.get("/{campaign}/plan", summary="Its steps")
-def plan(campaign: int, house: HouseOf) -> CampaignPlanAnswer:
+def plan(campaign: int, service: ServiceDep) -> CampaignPlanResponse:
     """The whole plan as it was written down, with what became of each step."""
-    return campaign_plan(house.store, campaign)
+    return campaign_plan(service.store, campaign)
 
 
 @router.post("/{campaign}/abort", summary="End a campaign")
-def abort(campaign: int, request: ReasonRequest, house: HouseOf) -> CampaignAnswer:
+def abort(campaign: int, request: ReasonRequest, service: ServiceDep) -> CampaignResponse:
     """End a running campaign now, in the safe state. What was measured is kept."""
-    return house.acts().abort_campaign(campaign, request.text)
+    return service.commands().abort_campaign(campaign, request.text)
 
 
 @router.post("/{campaign}/pause", summary="Hold a campaign")
-def pause(campaign: int, request: ReasonRequest, house: HouseOf) -> CampaignAnswer:
+def pause(campaign: int, request: ReasonRequest, service: ServiceDep) -> CampaignResponse:
     """Hold after the present data set. `wish` says that it was asked; `state` becomes `paused` when it holds."""
-    return house.acts().pause_campaign(campaign, request)
+    return service.commands().pause_campaign(campaign, request)
 
 
 @router.post("/{campaign}/resume", summary="Let a campaign go on")
-def resume(campaign: int, request: ResumeRequest, house: HouseOf) -> CampaignAnswer:
+def resume(campaign: int, request: ResumeRequest, service: ServiceDep) -> CampaignResponse:
     """Let a paused campaign go on, or take up one that was interrupted, failed or aborted, safe state first."""
-    return house.acts().resume_campaign(campaign, request)
+    return service.commands().resume_campaign(campaign, request)
 
 
 @router.post("/{campaign}/confirm", summary="Answer a campaign's question")
-def confirm(campaign: int, request: ConfirmRequest, house: HouseOf) -> CampaignAnswer:
+def confirm(campaign: int, request: ConfirmRequest, service: ServiceDep) -> CampaignResponse:
     """Answer the question with this id; an answer to an older one is refused."""
-    return house.acts().confirm(campaign, request)
+    return service.commands().confirm(campaign, request)
 
 
 @router.get("/{campaign}/events", summary="Follow a campaign", response_class=StreamingResponse)
 async def events(
-    campaign: int, house: HouseOf, last_event_id: Annotated[int | None, Header()] = None
+    campaign: int, service: ServiceDep, last_event_id: Annotated[int | None, Header()] = None
 ) -> StreamingResponse:
     """Server-sent events from the first or, with `Last-Event-ID`, from the one after it, until the campaign ends.
 
@@ -81,13 +81,13 @@ async def events(
     """
 
     async def stream() -> AsyncIterator[bytes]:
-        async for told in house.follow(campaign, after=last_event_id or 0):
+        async for told in service.follow(campaign, after=last_event_id or 0):
             if told is None:
                 yield b": alive\n\n"
-            elif isinstance(told, CampaignAnswer):  # no id: it is not resumed from
+            elif isinstance(told, CampaignResponse):  # no id: it is not resumed from
                 yield f"event: progress\ndata: {told.model_dump_json()}\n\n".encode()
             else:
                 yield f"id: {told.id}\nevent: {told.kind}\ndata: {told.model_dump_json()}\n\n".encode()
 
-    house.status(campaign)
+    service.status(campaign)
     return StreamingResponse(stream(), media_type="text/event-stream", headers={"Cache-Control": "no-cache"})

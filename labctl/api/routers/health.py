@@ -7,18 +7,18 @@ from typing import Any
 from fastapi import APIRouter, Request
 from fastapi.responses import PlainTextResponse
 
-from labctl.api.dependencies import HouseOf
+from labctl.api.dependencies import ServiceDep
 
 router = APIRouter(tags=["service"])
 
 
 @router.get("/health", summary="Is the service well?")
-def health(house: HouseOf, request: Request) -> dict[str, Any]:
+def health(service: ServiceDep, request: Request) -> dict[str, Any]:
     """Whether the service answers and in which version; to those who may read, also the database and the bench."""
-    return house.health() if request.state.caller is not None else house.pulse()
+    return service.health() if request.state.caller is not None else service.pulse()
 
 
 @router.get("/metrics", summary="Figures for a monitor", response_class=PlainTextResponse)
-def metrics(house: HouseOf) -> str:
+def metrics(service: ServiceDep) -> str:
     """Counts in the text format that Prometheus reads."""
-    return "".join(f"# TYPE {name} gauge\n{name} {value}\n" for name, value in house.metrics().items())
+    return "".join(f"# TYPE {name} gauge\n{name} {value}\n" for name, value in service.metrics().items())

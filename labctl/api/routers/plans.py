@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from labctl.api.dependencies import HouseOf
+from labctl.api.dependencies import ServiceDep
 from labctl.services.commands.protocol import PlanRequest
 from labctl.services.planning import planner as services
-from labctl.services.planning.planner import PlannedAnswer, RecipeAnswer
+from labctl.services.planning.planner import PlannedResponse, RecipeResponse
 
 router = APIRouter(prefix="/api", tags=["campaigns"])
 
 
 @router.get("/recipes", summary="The recipes that come with labctl")
-def recipes(house: HouseOf) -> list[RecipeAnswer]:
+def recipes(service: ServiceDep) -> list[RecipeResponse]:
     """Each with its text, and what it would take on this service's bench, or why it cannot be done there.
 
     A service without a bench says it for the simulated one that fits the recipe best.
     """
-    return services.list_recipes(house.bench)
+    return services.list_recipes(service.bench)
 
 
 @router.post("/plans", summary="Plan a recipe")
-def plan(request: PlanRequest, house: HouseOf) -> PlannedAnswer:
+def plan(request: PlanRequest, service: ServiceDep) -> PlannedResponse:
     """What a campaign would do, step by step, and what it could find. Nothing moves, nothing is kept."""
-    return services.plan_steps(request, house.bench)
+    return services.plan_steps(request, service.bench)

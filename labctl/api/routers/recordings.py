@@ -7,93 +7,93 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Query, UploadFile
 from fastapi.responses import StreamingResponse
 
-from labctl.api.dependencies import HouseOf
+from labctl.api.dependencies import ServiceDep
 from labctl.services.commands.protocol import ExampleRequest, SimulatedRequest
 from labctl.services.recordings import catalogue
 from labctl.services.recordings import transfer as services
-from labctl.services.recordings.allan import AllanAnswer, allan_unit
-from labctl.services.recordings.catalogue import DataSetsAnswer, RecordingAnswer
+from labctl.services.recordings.allan import AllanResponse, allan_unit
+from labctl.services.recordings.catalogue import DataSetsResponse, RecordingResponse
 from labctl.services.recordings.downloads import zip_recording
-from labctl.services.recordings.examples import SimulatedRecording
-from labctl.services.recordings.traces import TraceAnswer
+from labctl.services.recordings.examples import SimulatedRecordingResponse
+from labctl.services.recordings.traces import TraceResponse
 from labctl.services.recordings.traces import trace as trace_of
-from labctl.services.schemas.answers import Imported
+from labctl.services.schemas.answers import ImportResponse
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
 
 @router.post("", summary="Import a recording", status_code=201)
-def import_recording(files: list[UploadFile], house: HouseOf) -> Imported:
+def import_recording(files: list[UploadFile], service: ServiceDep) -> ImportResponse:
     """Take in a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
     environment file, as parts of one multipart form. All of it or nothing; an error names file, column and row."""
-    return services.import_files(house.acts(), [(file.filename or "", file.file) for file in files])
+    return services.import_files(service.commands(), [(file.filename or "", file.file) for file in files])
 
 
 @router.post("/simulated", summary="Simulate a recording", status_code=201)
-def simulated(request: SimulatedRequest, house: HouseOf) -> SimulatedRecording:
+def simulated(request: SimulatedRequest, service: ServiceDep) -> SimulatedRecordingResponse:
     """Walk through a recipe in simulation, with effects hidden in the unit, and take in what it would have given."""
-    return house.acts().simulate_recording(request)
+    return service.commands().simulate_recording(request)
 
 
 @router.post("/example", summary="Take in an example", status_code=201)
-def example(request: ExampleRequest, house: HouseOf) -> Imported:
+def example(request: ExampleRequest, service: ServiceDep) -> ImportResponse:
     """Take in one of the recordings of real gyros that come with labctl."""
-    return house.acts().import_example(request)
+    return service.commands().import_example(request)
 
 
 @router.get("", summary="All recordings")
-def all_recordings(house: HouseOf) -> list[RecordingAnswer]:
+def all_recordings(service: ServiceDep) -> list[RecordingResponse]:
     """Every recording, newest first."""
-    return catalogue.list_recordings(house.store)
+    return catalogue.list_recordings(service.store)
 
 
 @router.get("/{recording}", summary="One recording")
 def recording(
     recording: int,
-    house: HouseOf,
+    service: ServiceDep,
     points: Annotated[bool, Query(description="With the means of its data sets.")] = True,
 ) -> dict[str, Any]:
     """What the recording is: unit, axes, channels, data sets."""
-    return services.describe_recording(house.store, recording, points=points)
+    return services.describe_recording(service.store, recording, points=points)
 
 
 @router.get("/{recording}/datasets", summary="Its data sets")
-def datasets(recording: int, house: HouseOf) -> DataSetsAnswer:
+def datasets(recording: int, service: ServiceDep) -> DataSetsResponse:
     """One row per data set, as columns, with mean and standard deviation of every channel; also incomplete ones."""
-    return catalogue.data_sets(house.store, recording)
+    return catalogue.data_sets(service.store, recording)
 
 
 @router.get("/{recording}/trace", summary="A channel over time")
 def trace(
     recording: int,
-    house: HouseOf,
+    service: ServiceDep,
     channel: Annotated[str, Query(description="Such as gyro_x or temperature_c.", max_length=60)],
     from_s: Annotated[float | None, Query(description="Window, in seconds of the recording; default: all.")] = None,
     until_s: Annotated[float | None, Query(description="Its end.")] = None,
     points: Annotated[int, Query(ge=1, le=20_000, description="At most this many bins.")] = 2000,
-) -> TraceAnswer:
+) -> TraceResponse:
     """Least, largest and mean reading of a channel in bins of equal time, only those that hold readings."""
-    return trace_of(house.store, recording, channel, from_s, until_s, points)
+    return trace_of(service.store, recording, channel, from_s, until_s, points)
 
 
 @router.get("/{recording}/allan", summary="Its noise at rest")
 def allan(
     recording: int,
-    house: HouseOf,
+    service: ServiceDep,
     dataset: Annotated[int | None, Query(description="A data set; default: the longest stretch at rest.")] = None,
-) -> AllanAnswer:
+) -> AllanResponse:
     """The overlapping Allan deviation of each axis with 95 % intervals, and N, B and K as far as they show."""
-    return allan_unit(house.store, recording, dataset)
+    return allan_unit(service.store, recording, dataset)
 
 
 @router.get("/{recording}/file", summary="The recording to take away", response_class=StreamingResponse)
 def file(
     recording: int,
-    house: HouseOf,
+    service: ServiceDep,
     format: Annotated[Literal["parquet", "csv"], Query(description="Of its tables.")] = "parquet",  # noqa: A002
 ) -> StreamingResponse:
     """The recording in the interchange format, every reading, as one zip; it imports again."""
-    made = zip_recording(house.store, recording, format)
+    made = zip_recording(service.store, recording, format)
     headers = {"Content-Disposition": f'attachment; filename="{made.name}"', "Content-Length": str(made.size)}
     return StreamingResponse(made.chunks(), media_type="application/zip", headers=headers)
 
@@ -101,9 +101,9 @@ def file(
 @router.get("/{recording}/samples", summary="Readings of one data set")
 def samples(
     recording: int,
-    house: HouseOf,
+    service: ServiceDep,
     dataset: Annotated[int, Query(description="Number of the data set.")],
     limit: Annotated[int, Query(ge=1, le=100_000, description="At most this many readings.")] = 10_000,
 ) -> dict[str, Any]:
     """The readings of one data set, column by column, in the units named beside them."""
-    return services.dataset_samples(house.store, recording, dataset, limit)
+    return services.dataset_samples(service.store, recording, dataset, limit)

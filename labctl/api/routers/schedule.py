@@ -6,28 +6,28 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from labctl.api.dependencies import HouseOf
+from labctl.api.dependencies import ServiceDep
 from labctl.services.schedule import queue
-from labctl.services.schemas.answers import ScheduledAnswer
+from labctl.services.schemas.answers import ScheduledResponse
 
 router = APIRouter(prefix="/api/schedule", tags=["campaigns"])
 
 
 @router.get("", summary="What begins when")
 def schedule(
-    house: HouseOf, ended: Annotated[bool, Query(description="Also entries that are over.")] = False
-) -> list[ScheduledAnswer]:
+    service: ServiceDep, ended: Annotated[bool, Query(description="Also entries that are over.")] = False
+) -> list[ScheduledResponse]:
     """Every entry that waits, next first, with what became of its starts."""
-    return queue.list_starts(house.store, ended=ended)
+    return queue.list_starts(service.store, ended=ended)
 
 
 @router.get("/{start}", summary="One entry")
-def start(start: int, house: HouseOf) -> ScheduledAnswer:
+def start(start: int, service: ServiceDep) -> ScheduledResponse:
     """When it begins next, and what became of each start that fell due."""
-    return queue.start_status(house.store, start)
+    return queue.start_status(service.store, start)
 
 
 @router.delete("/{start}", summary="Cancel an entry")
-def cancel(start: int, house: HouseOf) -> ScheduledAnswer:
+def cancel(start: int, service: ServiceDep) -> ScheduledResponse:
     """Take an entry out of the schedule. A campaign that it has begun runs on."""
-    return house.acts().cancel_start(start)
+    return service.commands().cancel_start(start)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from instruments.clock import VirtualClock
-from labctl.cli.demo.runner import Stage
+from labctl.cli.demo.runner import DemoRunner
 from labctl.services.recordings.examples import example
 from labctl.services.recordings.transfer import import_folder
 
 
-def play(stage: Stage) -> None:
+def play(stage: DemoRunner) -> None:
     """Import both and fit them."""
     stage.title("(c) Vibrating gyro: the published table of the Weiss report")
     table = import_folder(stage.store, example("weiss-gyrostar"), VirtualClock().utc())

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from instruments.clock import VirtualClock
 from labctl.cli.criticism import ladder_lines
-from labctl.cli.demo.runner import Stage
+from labctl.cli.demo.runner import DemoRunner
 from labctl.services.calibrations.revision import improve_unit
 from labctl.services.commands.protocol import ImproveRequest
 from labctl.services.criticism.criticise import criticise_unit, ladder
-from labctl.services.schemas.answers import CriticismAnswer
+from labctl.services.schemas.answers import CriticismResponse
 
 SERIAL = "FOG-0002"
 HIDDEN = {"scale_factor_asymmetry": 2e-4}
 
 
-def play(stage: Stage, real_serial: str) -> None:
+def play(stage: DemoRunner, real_serial: str) -> None:
     """Tell both walks; what is said comes from the criticism alone."""
     stage.title("(e) What is missing? A gyro with something hidden in it")
     campaign = stage.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
@@ -28,7 +28,7 @@ def play(stage: Stage, real_serial: str) -> None:
     stage.figures["real_walk"] = {"named": answer.named, "verdict": answer.verdict}
 
 
-def _walk(stage: Stage, serial: str) -> CriticismAnswer:
+def _walk(stage: DemoRunner, serial: str) -> CriticismResponse:
     answer = criticise_unit(stage.store, serial, None, None, [])
     for sentence in answer.text:
         stage.say(sentence)

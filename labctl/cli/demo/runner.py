@@ -13,19 +13,19 @@ from rich.console import Console
 from instruments.bench_config import SimulationSettings
 from instruments.clock import VirtualClock
 from labctl.cli.progress_bar import CampaignProgress
-from labctl.fitting import Context, context_of
+from labctl.fitting import FitData, fit_data_of
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.campaigns.execution import prepare, run
 from labctl.services.campaigns.status import answer_of
 from labctl.services.commands.protocol import FitRequest
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import CampaignAnswer, FitAnswer
+from labctl.services.schemas.answers import CampaignResponse, FitResponse
 from labctl.store import Store
 from procedures.monitoring.progress import Progress
 
 
 @dataclass
-class Stage:
+class DemoRunner:
     """Where the demo plays, and what it has found so far."""
 
     store: Store
@@ -50,7 +50,7 @@ class Stage:
         noise_seed: int = 0,
         hidden: dict[str, float] | None = None,
         serial: str | None = None,
-    ) -> CampaignAnswer:
+    ) -> CampaignResponse:
         """Run a recipe on a simulated bench in virtual time, with progress and time left."""
         settings = load_bench(bench)
         simulation = (settings.simulation or SimulationSettings()).model_copy(
@@ -78,7 +78,7 @@ class Stage:
         )
         return answer
 
-    def fit(self, serial: str, model: str, recording: int) -> FitAnswer:
+    def fit(self, serial: str, model: str, recording: int) -> FitResponse:
         """Fit a model and say how well it does."""
         answer = fit_unit(self.store, serial, FitRequest(recording=recording, model=model), VirtualClock().utc())
         e = answer.error
@@ -90,9 +90,9 @@ class Stage:
         )
         return answer
 
-    def context(self, recording: int) -> Context:
+    def context(self, recording: int) -> FitData:
         """Return the data sets of a recording."""
-        return context_of(self.store.recordings.points(recording))
+        return fit_data_of(self.store.recordings.points(recording))
 
 
 @contextmanager

@@ -8,13 +8,13 @@ import sys
 import httpx
 import numpy as np
 
-from labctl.cli.demo.runner import Stage
+from labctl.cli.demo.runner import DemoRunner
 from labctl.compensator import Compensator
 
 READY_S = 60.0
 
 
-def play(stage: Stage, serials: list[str]) -> None:
+def play(stage: DemoRunner, serials: list[str]) -> None:
     """Serve the demo's database on a free loopback port and load from it what a robot would load."""
     stage.title("Served over HTTP, fetched back and applied")
     command = [sys.executable, "-m", "labctl", "serve", "--port", "0", "--json", "--database", stage.store.location]

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from labctl.cli.demo.runner import Stage
+from labctl.cli.demo.runner import DemoRunner
 from labctl.cli.output import table
-from labctl.fitting import context_of, fit
+from labctl.fitting import fit, fit_data_of
 from labctl.turn_error import LEAST_RATE_DPS, error_per_turn
 
 SERIAL = "FOG-0001"
 
 
-def play(stage: Stage) -> None:
+def play(stage: DemoRunner) -> None:
     """Measure, fit, and show what is left per rate and per turn of 360 deg."""
     stage.title("(b) Fibre-optic gyro: 21 rates x 11 temperatures on a single-axis table")
     answer = stage.campaign("ojeda2000", "single-axis-sim")
     recording = answer.recordings[SERIAL]
     fitted = stage.fit(SERIAL, "ojeda2000", recording)
     points = stage.store.recordings.points(recording)
-    context, result = context_of(points), fit(points, "ojeda2000")
+    context, result = fit_data_of(points), fit(points, "ojeda2000")
     rate = np.asarray(points.columns["table_rate_dps"])
     raw = context.outputs["z"] - context.true_rate_dps("z")
     at_rest = np.abs(rate) < 1e-9

@@ -8,7 +8,7 @@ from typing import Any
 
 from instruments.clock import VirtualClock
 from labctl.cli.demo import example_data, find_missing_effect, serve_calibrations, single_axis, triaxial
-from labctl.cli.demo.runner import Stage, maybe_silent
+from labctl.cli.demo.runner import DemoRunner, maybe_silent
 from labctl.errors import BadInput
 from labctl.services.calibrations.fitting import certify
 from labctl.services.commands.protocol import CertifyRequest
@@ -21,7 +21,7 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
     """Play the whole story into `folder`; returns its figures, each computed in this run."""
     location = database or str(_fresh(folder) / DATABASE)
     with maybe_silent(quiet) as console, open_store(location, write=True) as store:
-        stage = Stage(store, folder, console, quiet)
+        stage = DemoRunner(store, folder, console, quiet)
         triaxial.play(stage, quick=quick)
         single_axis.play(stage)
         example_data.play(stage)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from labctl.calibration import read_calibration
-from labctl.cli.demo.runner import Stage
+from labctl.cli.demo.runner import DemoRunner
 from labctl.cli.output import table
-from labctl.fitting import Context, Spread, by_turning_axis, fit_turning, residuals
+from labctl.fitting import FitData, Spread, by_turning_axis, fit_turning, residuals
 
 SERIAL = "STIM-0001"
 
 
-def play(stage: Stage, *, quick: bool) -> None:
+def play(stage: DemoRunner, *, quick: bool) -> None:
     """Measure, fit two models, measure again, and compare."""
     size = "a small campaign, 20 min soaks" if quick else "10 temperatures x 21 rates x 3 positions, 1 h soaks"
     stage.title(f"(a) Tri-axial MEMS gyro: {size}")
@@ -42,13 +42,13 @@ def play(stage: Stage, *, quick: bool) -> None:
     stage.say(f"yang2018 on the unseen campaign, RMS over noise floor: {ratios}  (1 is perfect)")
 
 
-def _gains(context: Context, errors: dict[str, dict[str, np.ndarray]]) -> dict[str, float]:
+def _gains(context: FitData, errors: dict[str, dict[str, np.ndarray]]) -> dict[str, float]:
     """Return raw over compensated RMS for the two large cross axes: x turning seen in y, and y turning seen in x."""
     raw, left = by_turning_axis(context, errors["raw"]), by_turning_axis(context, errors["yang2018"])
     return {f"{a}->{b}": raw[a][b].rms_dps / left[a][b].rms_dps for a, b in (("x", "y"), ("y", "x"))}
 
 
-def print_tables(stage: Stage, context: Context, errors: dict[str, dict[str, np.ndarray]]) -> None:
+def print_tables(stage: DemoRunner, context: FitData, errors: dict[str, dict[str, np.ndarray]]) -> None:
     """Print what is shaped like the paper's Tables 3 and 4: by turning axis and output axis."""
     split = {name: by_turning_axis(context, values) for name, values in errors.items()}
     third = table(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.reduction import Compressed
+from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.channels import Array
 from labctl.fitting.data.earth import turning_size_dps
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
@@ -51,7 +51,7 @@ class Option:
         return self.term is None
 
 
-def span_of(data: Compressed) -> Span:
+def span_of(data: ReducedRecording) -> Span:
     """Return what a recording covers."""
     rates = np.unique(np.round(np.abs(data.at_sets(data.nodes.table_rate_dps())), 3))
     moving = rates[rates > 0]
@@ -64,7 +64,7 @@ def span_of(data: Compressed) -> Span:
     )
 
 
-def untestable_channels(data: Compressed, catalogue: Mapping[str, Effect] = CATALOGUE) -> dict[str, list[str]]:
+def untestable_channels(data: ReducedRecording, catalogue: Mapping[str, Effect] = CATALOGUE) -> dict[str, list[str]]:
     """Return effects whose channels are not logged, with the channels."""
     found: dict[str, list[str]] = {}
     for kind in catalogue.values():
@@ -74,7 +74,7 @@ def untestable_channels(data: Compressed, catalogue: Mapping[str, Effect] = CATA
     return found
 
 
-def base_rows(data: Compressed, model: ErrorModel, axis: str) -> tuple[NDArray[np.float64], list[str], Array]:
+def base_rows(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArray[np.float64], list[str], Array]:
     """Return the base's coordinates (R, m, k), its columns' names, and the prior precision of each (k,).
 
     The base is the model in its forward form, and the Earth's rate that goes round where the latitude is known.
@@ -98,7 +98,7 @@ def base_rows(data: Compressed, model: ErrorModel, axis: str) -> tuple[NDArray[n
     return whole, names, np.concatenate(precision)
 
 
-def _over_temperature(data: Compressed, column: Column, basis: Array) -> NDArray[np.float64]:
+def _over_temperature(data: ReducedRecording, column: Column, basis: Array) -> NDArray[np.float64]:
     """Return the coordinates of a column times each function of temperature, (R, m, k)."""
     if column.carrier is None or column.carrier not in data.waves:
         return data.rows_of(expand(column.values[:, None], basis))
@@ -106,7 +106,7 @@ def _over_temperature(data: Compressed, column: Column, basis: Array) -> NDArray
     return np.stack([values * data.waves[column.carrier] for values in slow], axis=2)
 
 
-def _turning(data: Compressed, axis: str) -> list[Column]:
+def _turning(data: ReducedRecording, axis: str) -> list[Column]:
     if data.info.latitude_deg is None or "table_angle_deg" not in data.nodes:
         return []
     return [
@@ -118,7 +118,7 @@ def _turning(data: Compressed, axis: str) -> list[Column]:
 
 
 def options_of(
-    data: Compressed, axis: str, reference: Reference, catalogue: Mapping[str, Effect] = CATALOGUE
+    data: ReducedRecording, axis: str, reference: Reference, catalogue: Mapping[str, Effect] = CATALOGUE
 ) -> list[Option]:
     """Return every shape of every testable effect on one axis, and a smooth function of every channel."""
     span, absent = span_of(data), untestable_channels(data, catalogue)
@@ -131,7 +131,7 @@ def options_of(
     return found + _smooth_options(data, axis)
 
 
-def option_of(data: Compressed, axis: str, reference: Reference, kind: Effect, term: Term) -> Option | None:
+def option_of(data: ReducedRecording, axis: str, reference: Reference, kind: Effect, term: Term) -> Option | None:
     """Return one shape of an effect on one axis, or None where it does not touch the axis."""
     columns = [c for c in kind.columns(data.nodes, axis, term, reference) if np.any(c.values)]
     if not columns:
@@ -140,12 +140,12 @@ def option_of(data: Compressed, axis: str, reference: Reference, kind: Effect, t
     return Option(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
 
 
-def _is_known(data: Compressed, effect_id: str) -> bool:
+def _is_known(data: ReducedRecording, effect_id: str) -> bool:
     """Whether an effect is taken off already: the Earth's rate where the latitude is known."""
     return effect_id == "earth_rate" and data.info.latitude_deg is not None
 
 
-def smooth_channels(data: Compressed, axis: str) -> dict[str, Array]:
+def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
     """Return the channels that may be held against the residual, at the nodes; constant ones are left out."""
     channels = {
         name: np.asarray(values, dtype=np.float64)
@@ -156,7 +156,7 @@ def smooth_channels(data: Compressed, axis: str) -> dict[str, Array]:
     return {name: v for name, v in channels.items() if np.all(np.isfinite(v)) and np.ptp(v) > 1e-9 * (1 + abs(v[0]))}
 
 
-def _smooth_options(data: Compressed, axis: str) -> list[Option]:
+def _smooth_options(data: ReducedRecording, axis: str) -> list[Option]:
     found = []
     for name, values in smooth_channels(data, axis).items():
         distinct = np.unique(np.round(values, 9))
@@ -168,7 +168,7 @@ def _smooth_options(data: Compressed, axis: str) -> list[Option]:
     return found
 
 
-def _steps(data: Compressed, name: str, values: Array, places: Array) -> list[Option]:
+def _steps(data: ReducedRecording, name: str, values: Array, places: Array) -> list[Option]:
     half = SPREAD * np.ptp(values) / 2
     return [
         Option(
@@ -179,7 +179,7 @@ def _steps(data: Compressed, name: str, values: Array, places: Array) -> list[Op
     ]  # fmt: skip
 
 
-def _waves(data: Compressed, name: str, values: Array) -> list[Option]:
+def _waves(data: ReducedRecording, name: str, values: Array) -> list[Option]:
     phase = 2 * np.pi * (values - values.min()) / np.ptp(values)
     names, units = (f"cos {name}", f"sin {name}"), ("deg/s", "deg/s")
     return [
@@ -188,7 +188,7 @@ def _waves(data: Compressed, name: str, values: Array) -> list[Option]:
     ]
 
 
-def _smooth(data: Compressed, name: str, values: Array, knots: Array) -> list[Option]:
+def _smooth(data: ReducedRecording, name: str, values: Array, knots: Array) -> list[Option]:
     if len(knots) < 3:
         return []
     hats = np.column_stack([np.interp(values, knots, np.eye(len(knots))[k]) for k in range(1, len(knots))])

@@ -13,11 +13,11 @@ from labctl.errors import LabctlError
 from labctl.fitting.criticism.candidates import untestable_channels
 from labctl.fitting.criticism.diagnostics import views_of
 from labctl.fitting.criticism.evidence import visible_share
-from labctl.fitting.criticism.model_comparison import Candidate, Weighed, weigh, with_noise_of
-from labctl.fitting.criticism.reduction import Compressed, compress
+from labctl.fitting.criticism.model_comparison import Candidate, Comparison, compare_models, with_noise_of
+from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.criticism.refine import refined
 from labctl.fitting.criticism.residuals import Residuals, maps, residuals_of, where_it_fails, worst_data_sets
-from labctl.fitting.criticism.stepwise_search import ask
+from labctl.fitting.criticism.stepwise_search import search_stepwise
 from labctl.fitting.criticism.verdict import (
     ENOUGH,
     Verdict,
@@ -26,7 +26,7 @@ from labctl.fitting.criticism.verdict import (
     probabilities,
     share_removed,
 )
-from labctl.fitting.data.fit_data import Context, context_of
+from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.static_record import LONG_S, static_record
 from labctl.fitting.data.temperature_channel import with_temperature
 from labctl.fitting.effects import CATALOGUE, Effect
@@ -64,10 +64,10 @@ class Criticism:
     """The whole answer."""
 
     verdict: Verdict
-    data: Compressed
+    data: ReducedRecording
     base: FitResult | None
     direct_rms_dps: float | None
-    weighed: Weighed | None
+    weighed: Comparison | None
     residuals: Mapping[str, Residuals] = field(default_factory=dict)
     suspects: tuple[Suspect, ...] = ()
     not_testable: tuple[Mapping[str, Any], ...] = ()
@@ -101,16 +101,16 @@ def criticise(
     Raises NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict.
     """
     recording = with_temperature(recording)
-    data = replace(compress(recording), static=static_record(recording, 0.0 if full else LONG_S))
-    context = context_of(points or recording)
+    data = replace(reduce_recording(recording), static=static_record(recording, 0.0 if full else LONG_S))
+    context = fit_data_of(points or recording)
     if shape_only:
         return Criticism(_shapes(data, changed(model).build(context)[0], catalogue), data, None, None, None)
     base = fit_context(context, changed(model)) if full else None
     forward, _ = changed(model).build(context)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, base, None, None)
-    weighed = weigh(data, forward, catalogue)
-    verdict, begun, last = ask(weighed, catalogue)
+    weighed = compare_models(data, forward, catalogue)
+    verdict, begun, last = search_stepwise(weighed, catalogue)
     if not full:
         return Criticism(verdict, data, None, None, weighed)
     assert base is not None
@@ -127,8 +127,8 @@ def criticise(
     )  # fmt: skip
 
 
-def _shapes(data: Compressed, model: ErrorModel, catalogue: Mapping[str, Effect]) -> Verdict:
-    weighed = weigh(data, model, catalogue)
+def _shapes(data: ReducedRecording, model: ErrorModel, catalogue: Mapping[str, Effect]) -> Verdict:
+    weighed = compare_models(data, model, catalogue)
     terms = {c.id: refined(weighed, c) for c in weighed.candidates if not c.smooth and c.term is not None}
     return Verdict("adequate", terms=terms)
 
@@ -139,7 +139,7 @@ def _direct(model: ErrorModel) -> Any:
     return Preset(model.name, lambda context: (model, np.ones(len(context), dtype=bool)))
 
 
-def _too_little(data: Compressed, model: ErrorModel) -> str | None:
+def _too_little(data: ReducedRecording, model: ErrorModel) -> str | None:
     """Say what is missing for a verdict, or None."""
     axis = data.info.axes[0]
     columns = sum(1 for _, c in model.columns(data.nodes, axis) if np.any(c.values))
@@ -153,7 +153,7 @@ def _too_little(data: Compressed, model: ErrorModel) -> str | None:
     return None
 
 
-def _explained(first: Weighed) -> float:
+def _explained(first: Comparison) -> float:
     """Return which share of the raw excess the base explains, 0 to 1."""
     excess = raw = 0.0
     for axis, found in first.axes.items():
@@ -165,7 +165,9 @@ def _explained(first: Weighed) -> float:
     return float(np.clip(1.0 - excess / max(raw, 1e-12), 0.0, 1.0))
 
 
-def _suspects(weighed: Weighed, seen: Weighed, context: Context, model: ErrorModel, verdict: Verdict) -> list[Suspect]:
+def _suspects(
+    weighed: Comparison, seen: Comparison, context: FitData, model: ErrorModel, verdict: Verdict
+) -> list[Suspect]:
     """Return what may be missing, best first: ranked as weighed, with sizes as `seen` with the noise that remains."""
     chance = probabilities(weighed.candidates)
     effects = [c for c in weighed.candidates if not c.smooth][:SHOWN]
@@ -197,7 +199,7 @@ def _suspects(weighed: Weighed, seen: Weighed, context: Context, model: ErrorMod
     return found
 
 
-def _not_testable(weighed: Weighed, catalogue: Mapping[str, Effect]) -> list[Mapping[str, Any]]:
+def _not_testable(weighed: Comparison, catalogue: Mapping[str, Effect]) -> list[Mapping[str, Any]]:
     """Return what this recording cannot say anything about: a channel is missing, or the schedule hides it."""
     absent = untestable_channels(weighed.data, catalogue)
     found: list[Mapping[str, Any]] = [
@@ -212,7 +214,7 @@ def _not_testable(weighed: Weighed, catalogue: Mapping[str, Effect]) -> list[Map
     return found
 
 
-def visible_shares(weighed: Weighed) -> dict[str, float]:
+def visible_shares(weighed: Comparison) -> dict[str, float]:
     """Return how much of each effect this schedule lets be seen beside the base, 0 to 1, in its most visible shape."""
     shares: dict[str, float] = {}
     for axis, design in weighed.designs.items():

@@ -36,7 +36,7 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Schur:
+class EliminatedBase:
     """What the base leaves: Gram matrix of all option columns and the data, at one noise."""
 
     noise: Noise
@@ -52,7 +52,7 @@ class AxisEvidence:
     """The evidence on one axis."""
 
     log_bf: Array  #: (options,), averaged over the noise
-    best: Schur  #: at the noise that the base finds likeliest
+    best: EliminatedBase  #: at the noise that the base finds likeliest
     gain: Array  #: (options,) chi2 that each option takes off, at that noise
     dimensions: NDArray[np.int64]  #: (options,) directions that each has beyond the base
     slices: list[slice]
@@ -69,7 +69,7 @@ def stack(rows: NDArray[np.float64], scale: NDArray[np.float64], present: NDArra
 
 
 @dataclass(frozen=True)
-class Others:
+class NonMeanProducts:
     """Inner products over the coordinates besides the means, which no drift joins: the same for every noise."""
 
     of_base: NDArray[np.float64]  #: (kb, kb), with the base's prior
@@ -77,10 +77,10 @@ class Others:
     own: NDArray[np.float64]  #: (k, k)
 
 
-def others_of(design: Design, rows: NDArray[np.float64], scale: NDArray[np.float64]) -> Others:
+def non_mean_products(design: Design, rows: NDArray[np.float64], scale: NDArray[np.float64]) -> NonMeanProducts:
     """Return the inner products of the base and of rows (R, m, k), scaled by (R, m)."""
     base, own = stack(design.base, scale, design.present), stack(rows, scale, design.present)
-    return Others(base.T @ base + np.diag(design.precision), base.T @ own, own.T @ own)
+    return NonMeanProducts(base.T @ base + np.diag(design.precision), base.T @ own, own.T @ own)
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Base:
         self._blocks, self._log_det = factors(noise, white_var, design.t_s, design.run)
         self._means = whiten(self._blocks, design.base[0])
 
-    def _left(self, means: NDArray[np.float64], others: Others) -> _Left:
+    def _left(self, means: NDArray[np.float64], others: NonMeanProducts) -> _Left:
         whitened = whiten(self._blocks, means)
         crossed = self._means.T @ whitened + others.crossed
         of_base = self._means.T @ self._means + others.of_base
@@ -130,15 +130,15 @@ class Base:
             log_det += 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum())
         return _Left(whitened, crossed, others.own, log_det)
 
-    def taken_out_of(self, means: NDArray[np.float64], others: Others) -> Schur:
+    def taken_out_of(self, means: NDArray[np.float64], others: NonMeanProducts) -> EliminatedBase:
         """Return what is left of means (m, k), the last of which are the data, beside the base."""
         left = self._left(means, others)
         gram = left.between(slice(None), slice(None))
         chi2 = float(gram[-1, -1])
-        return Schur(self.noise, self._log_p(left, chi2), gram[:-1, :-1], left.whole[:-1], gram[:-1, -1], chi2)
+        return EliminatedBase(self.noise, self._log_p(left, chi2), gram[:-1, :-1], left.whole[:-1], gram[:-1, -1], chi2)
 
     def gains(
-        self, means: NDArray[np.float64], others: Others, slices: list[slice]
+        self, means: NDArray[np.float64], others: NonMeanProducts, slices: list[slice]
     ) -> tuple[float, Array, NDArray[np.int64]]:
         """Return the log likelihood, what each option takes off the chi2, and how many directions it has.
 
@@ -153,12 +153,12 @@ class Base:
         return -0.5 * (left.log_det + chi2) + self.noise.log_prior
 
 
-def schur(
+def eliminate_base(
     design: Design, y: NDArray[np.float64], white_var: Array, scale: NDArray[np.float64], noises: list[Noise]
-) -> list[Schur]:
+) -> list[EliminatedBase]:
     """Eliminate the base from options and data (R, m), for every noise. `scale` (R, m): of coordinates but the mean."""
     everything = np.concatenate([*(o.rows for o in design.options), y[:, :, None]], axis=2)
-    others = others_of(design, everything, scale)
+    others = non_mean_products(design, everything, scale)
     return [Base(design, white_var, noise).taken_out_of(everything[0], others) for noise in noises]
 
 
@@ -168,7 +168,7 @@ def evidence(
     """Weigh every option by every noise; `y` (R, m), `white_var` (m,) of the means, `scale` (R, m) of the others."""
     slices = slices_of(design.options)
     everything = np.concatenate([*(o.rows for o in design.options), y[:, :, None]], axis=2)
-    others = others_of(design, everything, scale)
+    others = non_mean_products(design, everything, scale)
     bases = (Base(design, white_var, noise) for noise in noises)
     log_ps, gains, dimensions = zip(*(base.gains(everything[0], others, slices) for base in bases), strict=True)
     log_p, gain, k, g = np.array(log_ps), np.array(gains), np.array(dimensions), float(len(design.t_s))
@@ -188,7 +188,7 @@ def slices_of(options: list[Option]) -> list[slice]:
     return [slice(int(begin), int(end)) for begin, end in pairwise(ends)]
 
 
-def gains_of(left: Schur, slices: list[slice]) -> tuple[Array, NDArray[np.int64]]:
+def gains_of(left: EliminatedBase, slices: list[slice]) -> tuple[Array, NDArray[np.int64]]:
     """Return the chi2 that each option takes off and how many directions it has."""
     return _gains(slices, lambda index: left.gram[index[:, :, None], index[:, None, :]], left.whole, left.with_data)
 
@@ -211,7 +211,7 @@ def _gains(
     return gain, dimensions
 
 
-def solve_option(left: Schur, where: slice) -> tuple[Array, NDArray[np.float64]]:
+def solve_option(left: EliminatedBase, where: slice) -> tuple[Array, NDArray[np.float64]]:
     """Return the coefficients (k,) of an option beside the base, and their covariance (k, k)."""
     size = np.sqrt(np.maximum(left.whole[where], 1e-300))
     values, vectors = np.linalg.eigh(left.gram[where, where] / np.outer(size, size))
@@ -221,19 +221,19 @@ def solve_option(left: Schur, where: slice) -> tuple[Array, NDArray[np.float64]]
     return coefficients, inverse / np.outer(size, size)
 
 
-def visible_share(left: Schur, where: slice) -> float:
+def visible_share(left: EliminatedBase, where: slice) -> float:
     """Return the largest share of an option's columns that the base does not absorb, 0 to 1, in whitened size."""
     shares = np.diag(left.gram)[where] / np.maximum(left.whole[where], 1e-300)
     return float(np.sqrt(np.clip(shares.max(initial=0.0), 0.0, 1.0)))
 
 
-def reproduced(left: Schur, signal: slice, by: slice) -> tuple[float, float]:
+def reproduced(left: EliminatedBase, signal: slice, by: slice) -> tuple[float, float]:
     """Return (how much of the leader's signal another option reproduces, the signal's size), both in chi2."""
     values, _ = solve_option(left, signal)
     return reproduced_of(left, signal, values, by), float(values @ left.gram[signal, signal] @ values)
 
 
-def reproduced_of(left: Schur, signal: slice, values: Array, by: slice) -> float:
+def reproduced_of(left: EliminatedBase, signal: slice, values: Array, by: slice) -> float:
     """Return how much of an option's signal with coefficients (k,) another option reproduces, in chi2."""
     inner = left.gram[by, signal] @ values
     scale = np.sqrt(np.maximum(left.whole[by], 1e-300))

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from labctl.fitting.criticism.candidates import Option, base_rows, options_of
-from labctl.fitting.criticism.evidence import AxisEvidence, Design, evidence, gains_of, schur, solve_option
+from labctl.fitting.criticism.evidence import AxisEvidence, Design, eliminate_base, evidence, gains_of, solve_option
 from labctl.fitting.criticism.noise_grid import Noise, noise_grid
-from labctl.fitting.criticism.reduction import Compressed
+from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.channels import Array
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.models.error_model import ErrorModel
@@ -37,10 +37,10 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Weighed:
+class Comparison:
     """Everything that was weighed."""
 
-    data: Compressed
+    data: ReducedRecording
     model: ErrorModel
     designs: Mapping[str, Design]
     axes: Mapping[str, AxisEvidence]
@@ -54,7 +54,9 @@ class Weighed:
         return next((c for c in self.candidates if c.smooth == smooth), None)
 
 
-def design_of(data: Compressed, model: ErrorModel, axis: str, catalogue: Mapping[str, Effect] = CATALOGUE) -> Design:
+def design_of(
+    data: ReducedRecording, model: ErrorModel, axis: str, catalogue: Mapping[str, Effect] = CATALOGUE
+) -> Design:
     """Return everything about one axis that does not depend on its output."""
     base, _, precision = base_rows(data, model, axis)
     nodes = data.nodes
@@ -70,16 +72,16 @@ def design_of(data: Compressed, model: ErrorModel, axis: str, catalogue: Mapping
     return Design(base, precision, options, data.present, t_s, np.rint(run).astype(np.int64))
 
 
-def weigh_beside(weighed: Weighed, model: ErrorModel, catalogue: Mapping[str, Effect] = CATALOGUE) -> Weighed:
+def weigh_beside(weighed: Comparison, model: ErrorModel, catalogue: Mapping[str, Effect] = CATALOGUE) -> Comparison:
     """Weigh everything again beside a model with other terms: the same candidates, another base."""
     designs = {}
     for axis, design in weighed.designs.items():
         base, _, precision = base_rows(weighed.data, model, axis)
         designs[axis] = replace(design, base=base, precision=precision)
-    return weigh(weighed.data, model, catalogue, designs)
+    return compare_models(weighed.data, model, catalogue, designs)
 
 
-def level_of(base: NDArray[np.float64], data: Compressed) -> NDArray[np.float64] | None:
+def level_of(base: NDArray[np.float64], data: ReducedRecording) -> NDArray[np.float64] | None:
     """Return the coordinates of a constant, (R, m), where the base takes it up whatever it is; None where not."""
     constant = data.rows_of(np.ones((len(data.nodes), 1)))[:, :, 0]
     taken, *_ = np.linalg.lstsq(base[0], constant[0], rcond=1e-9)
@@ -109,21 +111,21 @@ def apart(option: Option, base: NDArray[np.float64]) -> Option:
     return replace(option, rows=rows) if np.linalg.norm(rows) > LEAST_APART * np.linalg.norm(option.rows) else option
 
 
-def weigh(
-    data: Compressed,
+def compare_models(
+    data: ReducedRecording,
     model: ErrorModel,
     catalogue: Mapping[str, Effect] = CATALOGUE,
     designs: Mapping[str, Design] | None = None,
-) -> Weighed:
+) -> Comparison:
     """Weigh every candidate against a model. `designs` may be those of an earlier call for the same model and data."""
     designs = designs or {axis: design_of(data, model, axis, catalogue) for axis in data.info.axes}
     axes, whites, scales = {}, {}, {}
     for axis, design in designs.items():
         axes[axis], whites[axis], scales[axis] = _weigh_axis(data, design, axis)
-    return Weighed(data, model, designs, axes, whites, scales, _rank(designs, axes))
+    return Comparison(data, model, designs, axes, whites, scales, _rank(designs, axes))
 
 
-def with_noise_of(weighed: Weighed, fuller: Weighed) -> Weighed:
+def with_noise_of(weighed: Comparison, fuller: Comparison) -> Comparison:
     """Return what was weighed, seen with the noise that is left beside a fuller model of the same data.
 
     Beside a model that misses an effect, that effect looks like drift. What speaks for each candidate stays as it was.
@@ -132,7 +134,7 @@ def with_noise_of(weighed: Weighed, fuller: Weighed) -> Weighed:
     for axis, design in weighed.designs.items():
         found, other = weighed.axes[axis], fuller.axes[axis]
         y = weighed.data.output[axis] - weighed.data.rows_of(weighed.data.nodes.rate_dps(axis)[:, None])[:, :, 0]
-        (left,) = schur(design, y, fuller.white_var[axis], fuller.scales[axis], [other.best.noise])
+        (left,) = eliminate_base(design, y, fuller.white_var[axis], fuller.scales[axis], [other.best.noise])
         gain, dimensions = gains_of(left, found.slices)
         axes[axis] = replace(
             found, best=left, gain=gain, dimensions=dimensions, weights=other.weights, noises=other.noises
@@ -140,7 +142,7 @@ def with_noise_of(weighed: Weighed, fuller: Weighed) -> Weighed:
     return replace(weighed, axes=axes, white_var=fuller.white_var, scales=fuller.scales)
 
 
-def _weigh_axis(data: Compressed, design: Design, axis: str) -> tuple[AxisEvidence, Array, NDArray[np.float64]]:
+def _weigh_axis(data: ReducedRecording, design: Design, axis: str) -> tuple[AxisEvidence, Array, NDArray[np.float64]]:
     y = data.output[axis] - data.rows_of(data.nodes.rate_dps(axis)[:, None])[:, :, 0]
     white, noises = _noise_of(data, design, y, axis)
     explained = np.zeros_like(y)
@@ -161,7 +163,7 @@ def _explained(design: Design, weighed: AxisEvidence, option: int) -> NDArray[np
     return np.asarray(design.options[option].rows @ coefficients)
 
 
-def _noise_of(data: Compressed, design: Design, y: NDArray[np.float64], axis: str) -> tuple[Array, list[Noise]]:
+def _noise_of(data: ReducedRecording, design: Design, y: NDArray[np.float64], axis: str) -> tuple[Array, list[Noise]]:
     stability = data.info.datasheet.get("bias_stability_dps")
     known = data.white_var
     white = known[axis] if known is not None else np.full(len(data), _floor_squared(design, y))
@@ -206,7 +208,7 @@ def _scales(
 
 
 def _growing(
-    data: Compressed, design: Design, y: NDArray[np.float64], white: Array, explained: NDArray[np.float64]
+    data: ReducedRecording, design: Design, y: NDArray[np.float64], white: Array, explained: NDArray[np.float64]
 ) -> Array:
     """Return the variance of means that grows with the table's rate, (m,): scatter between sets of one rate."""
     rate = data.at_sets(data.nodes.table_rate_dps())

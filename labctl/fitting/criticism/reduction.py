@@ -51,7 +51,7 @@ KINDS = ("mean", "slope", "start", *(f"{wave}{n}" for n in WAVES for wave in ("c
 
 
 @dataclass(frozen=True)
-class Compressed:
+class ReducedRecording:
     """m data sets in R coordinates each; coordinates are scaled so that the first is the mean, in deg/s."""
 
     info: RecordingInfo
@@ -89,7 +89,7 @@ class Compressed:
         return np.einsum("rmb,mbk->rmk", self.weights, values.reshape(len(self), -1, k), optimize=True)
 
 
-def compress(recording: Recording, *, outliers: bool = True) -> Compressed:
+def reduce_recording(recording: Recording, *, outliers: bool = True) -> ReducedRecording:
     """Return a recording compressed; points have their means only. Without `outliers` every reading counts.
 
     Raises NotEnoughData where nothing says how warm the unit was.
@@ -98,13 +98,13 @@ def compress(recording: Recording, *, outliers: bool = True) -> Compressed:
     return _from_samples(recording, outliers) if recording.info.kind == "samples" else _from_points(recording)
 
 
-def _from_points(recording: Recording) -> Compressed:
+def _from_points(recording: Recording) -> ReducedRecording:
     points = to_points(recording)
     channels = channels_of(points, up_rate_dps(points.info))
     m = len(points)
     white = _white_of_points(points)
     dataset = np.asarray(points.columns.get("dataset", np.arange(1, m + 1)), dtype=np.int64)
-    return Compressed(
+    return ReducedRecording(
         points.info, channels, np.ones((1, m, 1)), {}, {a: points.gyro_dps(a)[None, :] for a in points.info.axes},
         np.ones((1, m), dtype=bool), white, dataset,
     )  # fmt: skip
@@ -201,7 +201,7 @@ def thin(recording: Recording) -> Recording:
     return Recording(recording.info, {"dataset": dataset, **numbers, **texts}, recording.environment)
 
 
-def _from_samples(recording: Recording, outliers: bool) -> Compressed:
+def _from_samples(recording: Recording, outliers: bool) -> ReducedRecording:
     numbers, dataset, texts = _decimated(recording)
     padded = _pad(_pieces({"dataset": dataset, **numbers}))
     m = len(padded.there)
@@ -227,7 +227,7 @@ def _from_samples(recording: Recording, outliers: bool) -> Compressed:
             waves["sin", k] = np.einsum("rmn,mn->rm", basis, np.sin(k * angle))
     coordinates = {axis: np.einsum("rmn,mn->rm", basis, outputs[axis]) for axis in axes}
     white = {axis: np.full(m, _white_level(outputs[axis], there) ** 2) / count for axis in axes}
-    return Compressed(
+    return ReducedRecording(
         recording.info, nodes, weights, waves, coordinates, present, white, dataset[begin],
         int(padded.there.sum() - there.sum()),
     )  # fmt: skip

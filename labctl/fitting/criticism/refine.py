@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from labctl.fitting.criticism.candidates import option_of
-from labctl.fitting.criticism.evidence import Base, gains_of, others_of
-from labctl.fitting.criticism.model_comparison import Candidate, Weighed, centred, level_of, weigh
+from labctl.fitting.criticism.evidence import Base, gains_of, non_mean_products
+from labctl.fitting.criticism.model_comparison import Candidate, Comparison, centred, compare_models, level_of
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 
 #: A parameter that is a choice between shapes, and no quantity, is not refined.
@@ -24,7 +24,7 @@ EVALUATIONS = 10
 LEADERS = 5
 
 
-def sharpened(weighed: Weighed, catalogue: Mapping[str, Effect], least: float) -> Weighed:
+def sharpened(weighed: Comparison, catalogue: Mapping[str, Effect], least: float) -> Comparison:
     """Return everything weighed again with the leaders (log evidence at least `least`) in their refined shapes too."""
     leaders = [c for c in weighed.candidates if not c.smooth and c.log_bf >= least][:LEADERS]
     shapes = {c.id: refined(weighed, c) for c in leaders if c.term is not None}
@@ -38,10 +38,10 @@ def sharpened(weighed: Weighed, catalogue: Mapping[str, Effect], least: float) -
         level = level_of(design.base, data)
         more = [centred(option, level) for option in made if option is not None]
         designs[axis] = replace(design, options=[*design.options, *more])
-    return weigh(data, model, catalogue, designs)
+    return compare_models(data, model, catalogue, designs)
 
 
-def refined(weighed: Weighed, candidate: Candidate) -> Term:
+def refined(weighed: Comparison, candidate: Candidate) -> Term:
     """Return the candidate's best shape, each of its parameters refined in turn."""
     term, kind = candidate.term, CATALOGUE.get(candidate.id)
     assert term is not None
@@ -53,7 +53,7 @@ def refined(weighed: Weighed, candidate: Candidate) -> Term:
     return term
 
 
-def _along(weighed: Weighed, candidate: Candidate, kind: Effect, term: Term, name: str) -> Term:
+def _along(weighed: Comparison, candidate: Candidate, kind: Effect, term: Term, name: str) -> Term:
     axis = next(iter(candidate.option))
     options = [o.term for o in weighed.designs[axis].options if o.candidate == candidate.id and o.term is not None]
     grid = sorted({float(option.parameters[name]) for option in options if name in option.parameters})
@@ -72,7 +72,7 @@ def _along(weighed: Weighed, candidate: Candidate, kind: Effect, term: Term, nam
     return with_value(float(found.x)) if -found.fun > gain(term) else term
 
 
-def gain_of(weighed: Weighed, candidate: Candidate, kind: Effect) -> Callable[[Term], float]:
+def gain_of(weighed: Comparison, candidate: Candidate, kind: Effect) -> Callable[[Term], float]:
     """Return how much chi2 a shape of an effect takes off, over the candidate's axes, at the base's likeliest noise."""
     data, reference = weighed.data, weighed.model.reference
     bases = {
@@ -90,7 +90,7 @@ def gain_of(weighed: Weighed, candidate: Candidate, kind: Effect) -> Callable[[T
             if option is None:
                 continue
             rows = np.concatenate([option.rows, outputs[axis][:, :, None]], axis=2)
-            others = others_of(weighed.designs[axis], rows, weighed.scales[axis])
+            others = non_mean_products(weighed.designs[axis], rows, weighed.scales[axis])
             left = base.taken_out_of(rows[0], others)
             total += float(gains_of(left, [slice(0, option.rows.shape[2])])[0][0])
         return total

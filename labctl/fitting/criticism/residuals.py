@@ -12,9 +12,9 @@ from scipy.linalg import solve_triangular
 
 from labctl.fitting.criticism.candidates import smooth_channels
 from labctl.fitting.criticism.evidence import stack
-from labctl.fitting.criticism.model_comparison import Weighed
+from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.noise_grid import factors
-from labctl.fitting.criticism.reduction import KINDS, Compressed
+from labctl.fitting.criticism.reduction import KINDS, ReducedRecording
 from labctl.fitting.data.channels import Array
 
 #: Bins of a channel in which a residual is looked at.
@@ -47,12 +47,12 @@ class Residuals:
         return self.means / self.floor_dps
 
 
-def residuals_of(weighed: Weighed) -> dict[str, Residuals]:
+def residuals_of(weighed: Comparison) -> dict[str, Residuals]:
     """Return what the base leaves on each axis, at the likeliest noise."""
     return {axis: _axis(weighed, axis) for axis in weighed.axes}
 
 
-def _axis(weighed: Weighed, axis: str) -> Residuals:
+def _axis(weighed: Comparison, axis: str) -> Residuals:
     data, design, found = weighed.data, weighed.designs[axis], weighed.axes[axis]
     y = data.output[axis] - data.rows_of(data.nodes.rate_dps(axis)[:, None])[:, :, 0]
     noise, white = found.best.noise, weighed.white_var[axis]
@@ -79,7 +79,7 @@ def _axis(weighed: Weighed, axis: str) -> Residuals:
     )
 
 
-def where_it_fails(data: Compressed, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
+def where_it_fails(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
     """Return the ranges of channels in which the mean residual is far from 0, worst first."""
     found: list[dict[str, Any]] = []
     for axis, residuals in left.items():
@@ -105,7 +105,7 @@ def _bins(values: Array) -> list[tuple[float, float, NDArray[np.int64]]]:
     ]
 
 
-def maps(data: Compressed, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
+def maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
     """Return residual over floor in rate x temperature, one map per axis and position: lists of equal length."""
     rate = data.at_sets(data.nodes.table_rate_dps())
     position = np.asarray(data.nodes["position"]).reshape(len(data), -1)[:, 0]
@@ -128,7 +128,7 @@ def maps(data: Compressed, left: Mapping[str, Residuals]) -> list[dict[str, Any]
     return found
 
 
-def worst_data_sets(data: Compressed, left: Mapping[str, Residuals], most: int = 10) -> list[dict[str, Any]]:
+def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most: int = 10) -> list[dict[str, Any]]:
     """Return the data sets furthest from the model, with the coordinate in which they are."""
     found: list[dict[str, Any]] = []
     for axis, residuals in left.items():
@@ -145,6 +145,6 @@ def worst_data_sets(data: Compressed, left: Mapping[str, Residuals], most: int =
     return sorted(found, key=lambda line: -abs(line["over_floor"]))[:most]
 
 
-def kinds_of(data: Compressed) -> tuple[str, ...]:
+def kinds_of(data: ReducedRecording) -> tuple[str, ...]:
     """Return what the coordinates of this recording are called."""
     return KINDS[: data.present.shape[0]]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.evidence import solve_option
-from labctl.fitting.criticism.model_comparison import Candidate, Weighed, weigh_beside
+from labctl.fitting.criticism.model_comparison import Candidate, Comparison, weigh_beside
 from labctl.fitting.criticism.refine import refined, sharpened
 from labctl.fitting.criticism.verdict import (
     ALIKE,
@@ -41,7 +41,7 @@ SPILLS = 0.05
 
 
 @dataclass(frozen=True)
-class Cause:
+class Finding:
     """What was found missing: the effect that leads, in its best shape, and those that it cannot be told from."""
 
     group: tuple[str, ...]
@@ -49,7 +49,7 @@ class Cause:
     log_bf: float
 
 
-def ask(first: Weighed, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Weighed, Weighed]:
+def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:
     """Ask, add what is named, and ask again, until nothing more is.
 
     Returns the verdict, the first weighing with its leaders' shapes refined, and the last.
@@ -68,15 +68,15 @@ def ask(first: Weighed, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Weigh
     return Verdict(form, tuple(cause.group for cause in causes), kept, terms=terms), begun, last
 
 
-def _form(causes: Sequence[Cause]) -> Form:
+def _form(causes: Sequence[Finding]) -> Form:
     return "missing" if all(len(cause.group) == 1 for cause in causes) else "ambiguous"
 
 
 def _one_by_one(
-    first: Weighed, weighed: Weighed, step: Step, catalogue: Mapping[str, Effect]
-) -> tuple[list[Cause], Weighed]:
+    first: Comparison, weighed: Comparison, step: Step, catalogue: Mapping[str, Effect]
+) -> tuple[list[Finding], Comparison]:
     """Return one cause after the other, each sought beside those before, and what is left beside all."""
-    causes: list[Cause] = []
+    causes: list[Finding] = []
     while (cause := _cause(weighed, step)) is not None and len(causes) < STEPS:
         causes.append(cause)
         before = (weighed, step)
@@ -87,26 +87,28 @@ def _one_by_one(
     return causes, weighed
 
 
-def _cause(weighed: Weighed, step: Step) -> Cause | None:
+def _cause(weighed: Comparison, step: Step) -> Finding | None:
     """Return what one round of asking found; None where that has no name."""
     leader = step.leader
     if step.form not in {"missing", "ambiguous"} or leader is None or leader.term is None:
         return None
-    return Cause(step.group, refined(weighed, leader), leader.log_bf)
+    return Finding(step.group, refined(weighed, leader), leader.log_bf)
 
 
-def _asked_beside(first: Weighed, causes: Sequence[Cause], catalogue: Mapping[str, Effect]) -> tuple[Weighed, Step]:
+def _asked_beside(
+    first: Comparison, causes: Sequence[Finding], catalogue: Mapping[str, Effect]
+) -> tuple[Comparison, Step]:
     """Return everything weighed and judged once more, beside causes that were found."""
     terms = (*first.model.terms, *(replace(cause.term, steady=True) for cause in causes))
     return _judged(weigh_beside(first, first.model.with_terms(terms), catalogue), catalogue, first=False)
 
 
-def _beside(first: Weighed, causes: Sequence[Cause], catalogue: Mapping[str, Effect]) -> Cause | None:
+def _beside(first: Comparison, causes: Sequence[Finding], catalogue: Mapping[str, Effect]) -> Finding | None:
     """Return what is found missing beside other causes; None where nothing is that has a name."""
     return _cause(*_asked_beside(first, causes, catalogue))
 
 
-def _settled(first: Weighed, causes: Sequence[Cause], catalogue: Mapping[str, Effect]) -> list[Cause]:
+def _settled(first: Comparison, causes: Sequence[Finding], catalogue: Mapping[str, Effect]) -> list[Finding]:
     """Return causes each sought again beside the others: the first was found when nothing of them was known."""
     found = list(causes)
     for k in range(len(found)):
@@ -117,7 +119,7 @@ def _settled(first: Weighed, causes: Sequence[Cause], catalogue: Mapping[str, Ef
     return found
 
 
-def _is_shape_error(before: Weighed, named: Step, after: Weighed, step: Step) -> bool:
+def _is_shape_error(before: Comparison, named: Step, after: Comparison, step: Step) -> bool:
     """Whether what leads now may be what the shape of the effect that was just added left.
 
     Held against what that effect did where the new one does most: the wrong shape of a wave within data sets leaves
@@ -132,13 +134,13 @@ def _is_shape_error(before: Weighed, named: Step, after: Weighed, step: Step) ->
     return bool(of_new[there] * step.leader.log_bf < least * could)
 
 
-def _is_one(weighed: Weighed, named: Step) -> bool:
+def _is_one(weighed: Comparison, named: Step) -> bool:
     """Whether a group is one effect, or several of which each would give just what the leader gives."""
     others = [c for c in weighed.candidates if not c.smooth and c.id in named.group[1:]]
     return all(overlap(weighed, named.leader, other) > ALIKE for other in others) if named.leader else False
 
 
-def _within_and_between(weighed: Weighed, candidate: Candidate) -> NDArray[np.float64]:
+def _within_and_between(weighed: Comparison, candidate: Candidate) -> NDArray[np.float64]:
     """Return the shares of a candidate's signal beside the base that lie within data sets, and between them."""
     total = np.zeros(2)
     for axis, index in candidate.option.items():
@@ -156,7 +158,7 @@ def _within_and_between(weighed: Weighed, candidate: Candidate) -> NDArray[np.fl
     return np.asarray(total / max(float(total.sum()), 1e-300))
 
 
-def _judged(weighed: Weighed, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Weighed, Step]:
+def _judged(weighed: Comparison, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Comparison, Step]:
     """Judge, and where the answer is no single name, or hardly, judge again with the leaders' shapes refined."""
     step = judge(weighed, first=first)
     if step.form == "adequate" or (step.form == "missing" and not _has_rival(weighed)):
@@ -165,13 +167,13 @@ def _judged(weighed: Weighed, catalogue: Mapping[str, Effect], *, first: bool = 
     return weighed, judge(weighed, first=first)
 
 
-def _has_rival(weighed: Weighed) -> bool:
+def _has_rival(weighed: Comparison) -> bool:
     """Whether another effect is so near the leader that its shape may decide."""
     effects = [c for c in weighed.candidates if not c.smooth][:2]
     return len(effects) == 2 and effects[1].log_bf > max(NOTICED, effects[0].log_bf - FAR)
 
 
-def _pair(first: Weighed, begun: Weighed, catalogue: Mapping[str, Effect]) -> list[Cause]:
+def _pair(first: Comparison, begun: Comparison, catalogue: Mapping[str, Effect]) -> list[Finding]:
     """Return two effects that explain together what looked like something else, and leave nothing; or none.
 
     The first of a pair need not be the strongest alone: two laws of the rate mix into one that a third resembles.
@@ -181,7 +183,7 @@ def _pair(first: Weighed, begun: Weighed, catalogue: Mapping[str, Effect]) -> li
     for leader in [c for c in begun.candidates if not c.smooth and c.log_bf >= ENOUGH][:LEADERS]:
         if leader.term is None:
             continue
-        one = Cause((leader.id,), refined(begun, leader), leader.log_bf)
+        one = Finding((leader.id,), refined(begun, leader), leader.log_bf)
         other = _beside(first, [one], catalogue)
         if other is not None and leader.id not in other.group:
             pairs.append([one, other])

@@ -14,7 +14,7 @@ import numpy as np
 
 from labctl.fitting.criticism.candidates import TIMES
 from labctl.fitting.criticism.evidence import reproduced, solve_option
-from labctl.fitting.criticism.model_comparison import Candidate, Weighed
+from labctl.fitting.criticism.model_comparison import Candidate, Comparison
 from labctl.fitting.effects import Term
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
@@ -75,7 +75,7 @@ class Verdict:
         return next((group for group in self.groups if len(group) > 1), ())
 
 
-def judge(weighed: Weighed, *, first: bool = True) -> Step:
+def judge(weighed: Comparison, *, first: bool = True) -> Step:
     """Judge one round of evidence: the first, or one beside causes that were found already."""
     enough = ENOUGH if first else ENOUGH_NEXT
     effect, smooth = weighed.leader(smooth=False), weighed.leader(smooth=True)
@@ -94,14 +94,14 @@ def judge(weighed: Weighed, *, first: bool = True) -> Step:
     return Step("missing" if len(group) == 1 else "ambiguous", group, effect, depends, share)
 
 
-def _is_unexplained(weighed: Weighed, effect: Candidate, smooth: Candidate) -> bool:
+def _is_unexplained(weighed: Comparison, effect: Candidate, smooth: Candidate) -> bool:
     if smooth.log_bf <= effect.log_bf + LEAD:
         return False
     limit = EXPLAINED_TIME if smooth.id in TIMES else EXPLAINED
     return overlap(weighed, smooth, effect) < limit
 
 
-def alias_group(weighed: Weighed, leader: Candidate) -> tuple[str, ...]:
+def alias_group(weighed: Comparison, leader: Candidate) -> tuple[str, ...]:
     """Return the leader and the effects that the data cannot tell from it, best first."""
     near = []
     for rival in weighed.candidates:
@@ -115,7 +115,7 @@ def alias_group(weighed: Weighed, leader: Candidate) -> tuple[str, ...]:
     return (leader.id, *(r.id for r in exact), *(r.id for r in others))
 
 
-def _is_untold(weighed: Weighed, leader: Candidate, rival: Candidate) -> bool:
+def _is_untold(weighed: Comparison, leader: Candidate, rival: Candidate) -> bool:
     """Whether a rival would leave hardly anything of the leader's signal, without having bought that dearly.
 
     A rival with more coefficients follows anything; far less evidence counts against it, and it only stays while little
@@ -127,11 +127,11 @@ def _is_untold(weighed: Weighed, leader: Candidate, rival: Candidate) -> bool:
     return rival.log_bf > leader.log_bf - FAR and (1.0 - share) * leader.gain < UNTOLD_CHI2
 
 
-def _directions(weighed: Weighed, candidate: Candidate) -> int:
+def _directions(weighed: Comparison, candidate: Candidate) -> int:
     return sum(int(weighed.axes[axis].dimensions[option]) for axis, option in candidate.option.items())
 
 
-def overlap(weighed: Weighed, leader: Candidate, rival: Candidate) -> float:
+def overlap(weighed: Comparison, leader: Candidate, rival: Candidate) -> float:
     """Return which share of the leader's fitted signal the rival's best shape on each axis reproduces, 0 to 1."""
     part = whole = 0.0
     for axis, option in leader.option.items():
@@ -145,7 +145,7 @@ def overlap(weighed: Weighed, leader: Candidate, rival: Candidate) -> float:
     return part / whole if whole > 0 else 0.0
 
 
-def share_removed(weighed: Weighed, candidate: Candidate) -> float:
+def share_removed(weighed: Comparison, candidate: Candidate) -> float:
     """Return the share of the excess chi2, over all axes, that a candidate takes off."""
     removed, excess = 0.0, 0.0
     for axis, found in weighed.axes.items():
@@ -156,7 +156,7 @@ def share_removed(weighed: Weighed, candidate: Candidate) -> float:
     return removed / max(excess, removed, 1e-12)
 
 
-def channels_behind(weighed: Weighed) -> tuple[str, ...]:
+def channels_behind(weighed: Comparison) -> tuple[str, ...]:
     """Return the channels that the residual hangs on, strongest first."""
     found = [c for c in weighed.candidates if c.smooth and c.log_bf >= ENOUGH]
     temperature = next((c for c in found if c.id == "temperature_c"), None)
@@ -177,7 +177,7 @@ def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
     return {c.id: float(w / total) for c, w in zip(effects, weights, strict=True)}
 
 
-def coefficients_of(weighed: Weighed, candidate: Candidate) -> dict[str, dict[str, dict[str, float | str]]]:
+def coefficients_of(weighed: Comparison, candidate: Candidate) -> dict[str, dict[str, dict[str, float | str]]]:
     """Return axis -> name -> value, standard uncertainty and unit of a candidate's best shape beside the base."""
     found: dict[str, dict[str, dict[str, float | str]]] = {}
     for axis, index in candidate.option.items():

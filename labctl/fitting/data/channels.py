@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.temperature_history import Past, past_of
+from labctl.fitting.data.temperature_history import TemperatureHistory, past_of
 from labctl.recording import Recording
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ class Channels:
 
     columns: Mapping[str, NDArray[Any]]
     rates: Mapping[str, Array]  #: body axis -> (n,) deg/s
-    past: Past = field(default_factory=Past)  #: what was before each row
+    past: TemperatureHistory = field(default_factory=TemperatureHistory)  #: what was before each row
     harmonics: Mapping[Carrier, Array] = field(default_factory=dict)  #: means over each row of waves in the table angle
 
     def __len__(self) -> int:

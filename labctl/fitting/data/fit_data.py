@@ -19,7 +19,7 @@ from labctl.recording import Recording, RecordingInfo, to_points
 
 
 @dataclass(frozen=True)
-class Context:
+class FitData:
     """The m data sets of a recording as a fit sees them."""
 
     info: RecordingInfo
@@ -44,7 +44,7 @@ class Context:
         """Return the true rate along an axis, (m,) deg/s."""
         return self.channels.rate_dps(axis)
 
-    def take(self, rows: NDArray[np.bool_]) -> Context:
+    def take(self, rows: NDArray[np.bool_]) -> FitData:
         """Return the context of some data sets, by mask (m,)."""
         white = None if self.white_var is None else {a: v[rows] for a, v in self.white_var.items()}
         return replace(
@@ -83,7 +83,7 @@ class Context:
         return len(np.unique(np.round(self.temperature_c)))
 
 
-def context_of(recording: Recording) -> Context:
+def fit_data_of(recording: Recording) -> FitData:
     """Return what a fit of this recording works on.
 
     Raises BadInput for coefficients, NotEnoughData when empty or where nothing says how warm the unit was.
@@ -98,7 +98,7 @@ def context_of(recording: Recording) -> Context:
     points = with_temperature(points)
     info = points.info
     outputs: dict[str, Array] = {axis: points.gyro_dps(axis) for axis in info.axes}
-    return Context(info, channels_of(points, up_rate_dps(info)), outputs, _white(points))
+    return FitData(info, channels_of(points, up_rate_dps(info)), outputs, _white(points))
 
 
 def _white(points: Recording) -> dict[str, Array] | None:

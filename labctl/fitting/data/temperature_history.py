@@ -21,7 +21,7 @@ SPACING_S = 10.0
 
 
 @dataclass(frozen=True)
-class Course:
+class TemperatureCourse:
     """The temperature of one powered run, evenly spaced."""
 
     begin_s: float
@@ -34,10 +34,10 @@ class Course:
 
 
 @dataclass(frozen=True, eq=False)
-class Past:
+class TemperatureHistory:
     """The history of a recording; every question is asked for the rows of some channels."""
 
-    courses: Mapping[int, Course] = field(default_factory=dict)  #: by run
+    courses: Mapping[int, TemperatureCourse] = field(default_factory=dict)  #: by run
     counted: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  #: "run", "mounting" -> numbers, rising
     rate_dps: float = 1.0  #: the greatest
     span_c: tuple[float, float] = (0.0, 1.0)
@@ -101,7 +101,7 @@ def _play(temperature_c: Array, width_k: float) -> Array:
     return behind / half
 
 
-def past_of(recording: Recording) -> Past:
+def past_of(recording: Recording) -> TemperatureHistory:
     """Return the history of a recording: from its environment where that was logged, else from its data sets."""
     columns = recording.columns
     environment = recording.environment
@@ -115,11 +115,11 @@ def past_of(recording: Recording) -> Past:
     warm = np.asarray(columns["temperature_c"], dtype=np.float64)
     span = (float(warm.min()), float(warm.max())) if len(warm) else (0.0, 1.0)
     if "t_s" not in columns:
-        return Past({}, counted, rate, span)
-    return Past(_courses(source, columns), counted, rate, span)
+        return TemperatureHistory({}, counted, rate, span)
+    return TemperatureHistory(_courses(source, columns), counted, rate, span)
 
 
-def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int, Course]:
+def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int, TemperatureCourse]:
     t_s = np.asarray(source["t_s"], dtype=np.float64)
     warm = np.asarray(source["temperature_c"], dtype=np.float64)
     there = np.asarray(source["run"]) if "run" in source else np.ones(len(t_s), dtype=np.int64)
@@ -134,5 +134,5 @@ def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int,
         times, values = t_s[here], warm[here]
         order = np.argsort(times, kind="stable")
         grid = np.arange(times[order][0], times[order][-1] + SPACING_S, SPACING_S)
-        found[int(run)] = Course(float(grid[0]), np.interp(grid, times[order], values[order]))
+        found[int(run)] = TemperatureCourse(float(grid[0]), np.interp(grid, times[order], values[order]))
     return found

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from labctl.fitting.data.channels import Array
-from labctl.fitting.data.fit_data import Context
+from labctl.fitting.data.fit_data import FitData
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def rms(errors: Mapping[str, Array]) -> float | None:
     return float(np.sqrt(np.mean(pooled**2))) if len(pooled) else None
 
 
-def by_turning_axis(context: Context, errors: Mapping[str, Array]) -> dict[str, dict[str, Spread]]:
+def by_turning_axis(context: FitData, errors: Mapping[str, Array]) -> dict[str, dict[str, Spread]]:
     """Return the figures by axis that turns and output axis, as in Yang et al. 2018, Tables 3 and 4."""
     turning = np.char.lstrip(np.asarray(context.channels["position"]).astype(np.str_), "-")
     return {
@@ -65,7 +65,7 @@ REPEAT_TEMPERATURE_C = 0.25
 REPEATS_NEEDED = 8
 
 
-def floor_from_repeats(context: Context, residual: Mapping[str, Array]) -> float | None:
+def floor_from_repeats(context: FitData, residual: Mapping[str, Array]) -> float | None:
     """Return the noise of one data set from pairs that repeat a rate and a temperature; None when they are too few."""
     rate = np.asarray(context.channels["table_rate_dps"], dtype=np.float64)
     near_rate = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)

@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.channels import Array
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, up_rate_dps, with_known_size
-from labctl.fitting.data.fit_data import Context, context_of
+from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.temperature_channel import is_chambers
 from labctl.fitting.data.temperature_levels import folds
 from labctl.fitting.effects import kind_of
@@ -88,11 +88,11 @@ def fit(recording: Recording, model: str | None = None, effects: list[str] | Non
         from labctl.fitting.models.coefficient_tables import from_coefficients  # noqa: PLC0415  it builds on FitResult
 
         return from_coefficients(recording)
-    return fit_context(context_of(recording), preset)
+    return fit_context(fit_data_of(recording), preset)
 
 
 @single_threaded
-def fit_context(context: Context, preset: Preset) -> FitResult:
+def fit_context(context: FitData, preset: Preset) -> FitResult:
     """Fit a preset to data sets and judge it, also on temperatures that it has not seen."""
     error_model, rows = preset.build(context)
     used = context.take(rows)
@@ -115,14 +115,14 @@ def fit_context(context: Context, preset: Preset) -> FitResult:
     )
 
 
-def residuals(fitted: FittedModel, context: Context, turning: Mapping[str, Array] | None = None) -> dict[str, Array]:
+def residuals(fitted: FittedModel, context: FitData, turning: Mapping[str, Array] | None = None) -> dict[str, Array]:
     """Return corrected minus true rate, axis -> (m,) deg/s; `turning` holds the fitted once-per-turn Earth rate."""
     outputs = {a: v - _turned(context, a, (turning or {}).get(a)) for a, v in context.outputs.items()}
     corrected = fitted.compensate(outputs, context.channels)
     return {axis: corrected[axis] - context.true_rate_dps(axis) for axis in outputs}
 
 
-def fit_turning(fitted: FittedModel, context: Context) -> dict[str, Array]:
+def fit_turning(fitted: FittedModel, context: FitData) -> dict[str, Array]:
     """Return the once-per-turn Earth rate, axis -> cosine and sine per position, that a recording shows by itself.
 
     For judging a calibration on a recording that it was not fitted to: where north lies there is not known in advance.
@@ -136,7 +136,7 @@ def fit_turning(fitted: FittedModel, context: Context) -> dict[str, Array]:
     return found
 
 
-def _turned(context: Context, axis: str, coefficients: Array | None) -> Array:
+def _turned(context: FitData, axis: str, coefficients: Array | None) -> Array:
     if coefficients is None or len(coefficients) == 0:
         return np.zeros(len(context))
     columns = turning_columns(context.info, context.channels, axis)
@@ -153,7 +153,7 @@ class AxisDesign:
     turning: NDArray[np.float64]  #: the Earth's columns (m, e)
 
 
-def design(context: Context, model: ErrorModel, axis: str) -> AxisDesign:
+def design(context: FitData, model: ErrorModel, axis: str) -> AxisDesign:
     """Return what one axis is fitted by. Columns that are zero throughout were never exercised and are left out."""
     channels = context.channels if model.argument == "rate" else context.channels.with_rates(context.outputs)
     steady = model.steady
@@ -186,7 +186,7 @@ def _is_there(columns: NDArray[np.float64], added: NDArray[np.float64]) -> bool:
 
 
 def _solve_axes(
-    context: Context, model: ErrorModel, fixed: Mapping[str, Solution] | None = None
+    context: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None = None
 ) -> tuple[dict[str, AxisFit], dict[str, Solution], dict[str, Array]]:
     fits, solutions, turning = {}, {}, {}
     for axis in context.outputs:
@@ -216,7 +216,7 @@ def _solve_axes(
     return fits, solutions, turning
 
 
-def _demand(context: Context, model: ErrorModel) -> None:
+def _demand(context: FitData, model: ErrorModel) -> None:
     """Refuse what the recording cannot carry, saying how much more it takes."""
     needs = [(term.effect, *kind_of(term).least(term)) for term in model.terms]
     temperatures, span = context.distinct_temperatures(), float(np.ptp(context.temperature_c))
@@ -245,7 +245,7 @@ def _demand(context: Context, model: ErrorModel) -> None:
             )
 
 
-def _held_out(context: Context, preset: Preset, solutions: Mapping[str, Solution]) -> dict[str, Array]:
+def _held_out(context: FitData, preset: Preset, solutions: Mapping[str, Solution]) -> dict[str, Array]:
     """Return the errors of each temperature under a fit that has not seen it; empty when that is impossible."""
     masks = folds(context.temperature_c)
     if preset.inner_only:
@@ -267,7 +267,7 @@ def _held_out(context: Context, preset: Preset, solutions: Mapping[str, Solution
 
 
 def _floor(
-    context: Context, solutions: Mapping[str, Solution], residual: Mapping[str, Array]
+    context: FitData, solutions: Mapping[str, Solution], residual: Mapping[str, Array]
 ) -> tuple[float | None, str]:
     if all(solution.white_dps is not None for solution in solutions.values()):
         squares = [s.white_dps**2 + s.drift.drift_dps**2 for s in solutions.values() if s.white_dps is not None]
@@ -287,7 +287,7 @@ def _noise_json(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _environment(context: Context, turning: Mapping[str, Array]) -> dict[str, Any]:
+def _environment(context: FitData, turning: Mapping[str, Array]) -> dict[str, Any]:
     info = context.info
     said: dict[str, Any] = {}
     if is_chambers(context.channels.columns):

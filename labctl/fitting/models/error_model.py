@@ -21,7 +21,7 @@ ROUNDS, HALVINGS = 8, 50
 EXPORTED_ORIGINS = frozenset({"sensor", "package"})
 
 
-def leaves_the_house(term: Term) -> bool:
+def is_exported(term: Term) -> bool:
     """Return whether an effect is the unit's own and can be corrected where the unit is used."""
     found = kind_of(term)
     return found.origin in EXPORTED_ORIGINS and found.in_use
@@ -200,11 +200,11 @@ class FittedModel:
 
     def exported(self) -> tuple[FittedModel, list[dict[str, str]]]:
         """Return the part that belongs to the unit, and what was left out with its origin."""
-        kept = tuple(t for t in self.model.terms if leaves_the_house(t))
+        kept = tuple(t for t in self.model.terms if is_exported(t))
         left_out = [
             {"effect": t.effect, "origin": kind_of(t).origin, "term": kind_of(t).term}
             for t in self.model.terms
-            if not leaves_the_house(t)
+            if not is_exported(t)
         ]
         if not left_out:
             return self, []

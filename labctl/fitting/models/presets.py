@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import BadInput, NotEnoughData
-from labctl.fitting.data.fit_data import Context
+from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.temperature_levels import level_means
 from labctl.fitting.effects import Reference, Term, parse_term
 from labctl.fitting.models.error_model import ErrorModel
@@ -24,20 +24,20 @@ class Preset:
     """How to make a model for a recording: its effects, and which data sets it is fitted to."""
 
     name: str
-    build: Callable[[Context], tuple[ErrorModel, Rows]]
+    build: Callable[[FitData], tuple[ErrorModel, Rows]]
     inner_only: bool = False  #: held out: outer temperatures of a table cannot be interpolated
 
 
-def _all(context: Context) -> Rows:
+def _all(context: FitData) -> Rows:
     return np.ones(len(context), dtype=bool)
 
 
-def _centre(context: Context) -> Reference:
+def _centre(context: FitData) -> Reference:
     """Centre on the middle of what was measured, to a whole degree."""
     return Reference(float(np.round((context.temperature_c.min() + context.temperature_c.max()) / 2)))
 
 
-def _nodes(context: Context, points: int, name: str) -> tuple[float, ...]:
+def _nodes(context: FitData, points: int, name: str) -> tuple[float, ...]:
     if context.levels is None:
         raise NotEnoughData(
             f"{context.info.serial}: model {name} needs discrete temperature levels; these temperatures run on from "
@@ -56,17 +56,17 @@ def _nodes(context: Context, points: int, name: str) -> tuple[float, ...]:
 ALIGNED = (Term("bias"), Term("scale_factor"), Term("misalignment"))
 
 
-def _ojeda2000(context: Context) -> tuple[ErrorModel, Rows]:
+def _ojeda2000(context: FitData) -> tuple[ErrorModel, Rows]:
     terms = (Term("rate_temperature_surface", 3), *((Term("misalignment"),) if len(context.info.axes) > 1 else ()))
     return ErrorModel("ojeda2000", terms, "output", reference=_centre(context)), _all(context)
 
 
-def _yang2018(context: Context) -> tuple[ErrorModel, Rows]:
+def _yang2018(context: FitData) -> tuple[ErrorModel, Rows]:
     table = LagrangeTable(_nodes(context, 3, "yang2018"), 3)
     return ErrorModel("yang2018", ALIGNED, "rate", table, _centre(context)), _all(context)
 
 
-def _single_temperature(context: Context) -> tuple[ErrorModel, Rows]:
+def _single_temperature(context: FitData) -> tuple[ErrorModel, Rows]:
     levels = context.levels
     if levels is None:
         raise NotEnoughData(f"{context.info.serial}: model single_temperature needs discrete temperature levels")
@@ -74,13 +74,13 @@ def _single_temperature(context: Context) -> tuple[ErrorModel, Rows]:
     return ErrorModel("single_temperature", ALIGNED, "rate", reference=Reference(25.0)), levels == nearest
 
 
-def _weiss1995(context: Context) -> tuple[ErrorModel, Rows]:
+def _weiss1995(context: FitData) -> tuple[ErrorModel, Rows]:
     table = LagrangeTable(_nodes(context, 2, "weiss1995"), 2)
     terms = (Term("bias"), Term("scale_factor"))
     return ErrorModel("weiss1995", terms, "rate", table, _centre(context)), _all(context)
 
 
-def _bias_scale(context: Context) -> tuple[ErrorModel, Rows]:
+def _bias_scale(context: FitData) -> tuple[ErrorModel, Rows]:
     aligned = (Term("misalignment"),) if len(context.info.axes) > 1 else ()
     terms = (Term("bias"), Term("bias_temperature"), Term("scale_factor"), Term("scale_factor_temperature"), *aligned)
     return ErrorModel("bias_scale", terms, "rate", reference=_centre(context)), _all(context)
@@ -127,7 +127,7 @@ def preset_for(model: str | None, effects: list[str]) -> Preset:
     if not terms:
         return preset
 
-    def extended(context: Context) -> tuple[ErrorModel, Rows]:
+    def extended(context: FitData) -> tuple[ErrorModel, Rows]:
         base, rows = preset.build(context)
         added = tuple(replace(term, steady=True) for term in terms if term.effect not in base.effect_ids)
         return base.with_terms((*base.terms, *added), f"{model}+{'+'.join(t.effect for t in added)}"), rows
@@ -140,7 +140,7 @@ def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ..
     kept = tuple(t for t in model.terms if t.effect not in {*remove, *(term.effect for term in add)})
     name = model.name + "".join(f"+{t.effect}" for t in add) + "".join(f"-{effect_id}" for effect_id in remove)
 
-    def build(context: Context) -> tuple[ErrorModel, Rows]:
+    def build(context: FitData) -> tuple[ErrorModel, Rows]:
         table = model.temperature
         if isinstance(table, LagrangeTable):
             table = LagrangeTable(_nodes(context, table.points, model.name), table.points)
@@ -150,7 +150,7 @@ def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ..
     return Preset(name, build, isinstance(model.temperature, LagrangeTable))
 
 
-def _custom(terms: tuple[Term, ...], context: Context) -> ErrorModel:
+def _custom(terms: tuple[Term, ...], context: FitData) -> ErrorModel:
     return ErrorModel("custom", terms, "rate", reference=_centre(context))
 
 

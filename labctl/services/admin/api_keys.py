@@ -14,7 +14,7 @@ from pydantic import Field, StringConstraints
 
 from labctl.errors import BadInput, NotAllowed, NotIdentified
 from labctl.services.commands.protocol import Request
-from labctl.services.schemas.answers import Answer
+from labctl.services.schemas.answers import ResponseModel
 from labctl.store import KeyRow, Store
 
 PREFIX = "labctl_"
@@ -54,7 +54,7 @@ class KeyRequest(Request):
     role: Role
 
 
-class KeyAnswer(Answer):
+class KeyResponse(ResponseModel):
     """A key as it may be seen later: without the key."""
 
     name: str
@@ -63,31 +63,31 @@ class KeyAnswer(Answer):
     revoked_at: datetime | None
 
 
-class NewKeyAnswer(KeyAnswer):
+class NewKeyResponse(KeyResponse):
     """A key that was just made. This is the only time that it is shown."""
 
     key: str
 
 
-def create_key(store: Store, request: KeyRequest, at: datetime) -> NewKeyAnswer:
+def create_key(store: Store, request: KeyRequest, at: datetime) -> NewKeyResponse:
     """Make a key and keep its digest. Raises Conflict when the name was used before."""
     key = PREFIX + secrets.token_urlsafe(RANDOM_BYTES)
     row = store.keys.add(request.name, request.role.value, digest_of(key), at)
-    return NewKeyAnswer(**_shown(row).model_dump(), key=key)
+    return NewKeyResponse(**_shown(row).model_dump(), key=key)
 
 
-def revoke_key(store: Store, name: str, reason: str, at: datetime) -> KeyAnswer:
+def revoke_key(store: Store, name: str, reason: str, at: datetime) -> KeyResponse:
     """Take a key's power away; the next request with it is refused. Raises NotFound, Conflict."""
     return _shown(store.keys.revoke(name, reason, at))
 
 
-def list_keys(store: Store) -> list[KeyAnswer]:
+def list_keys(store: Store) -> list[KeyResponse]:
     """Return every key that was made, by name."""
     return [_shown(row) for row in store.keys.all()]
 
 
-def _shown(row: KeyRow) -> KeyAnswer:
-    return KeyAnswer(name=row.name, role=Role(row.role), created_at=row.created_at, revoked_at=row.revoked_at)
+def _shown(row: KeyRow) -> KeyResponse:
+    return KeyResponse(name=row.name, role=Role(row.role), created_at=row.created_at, revoked_at=row.revoked_at)
 
 
 def digest_of(key: str) -> str:
@@ -108,13 +108,13 @@ def identify(store: Store, authorization: str) -> Caller:
     return Caller(row.name, Role(row.role), "key")
 
 
-def refuse_beyond(caller: Caller, needed: Role) -> None:
+def require_role(caller: Caller, needed: Role) -> None:
     """Raise NotAllowed when a caller's role does not reach as far as an act needs."""
     if not caller.role.may(needed):
         raise NotAllowed(f"{caller.name} is {caller.role.value}; this asks for the role {needed.value}")
 
 
-def refuse_open_doors(store: Store, why: str) -> None:
+def require_an_api_key(store: Store, why: str) -> None:
     """Raise BadInput when a service has to ask for keys and none is in force; `why` says what makes it ask."""
     if all(row.revoked_at is not None for row in store.keys.all()):
         raise BadInput(f"{why}, and there is no key to ask for; make one first: labctl key create NAME --role operator")

@@ -6,11 +6,11 @@ from datetime import UTC, datetime
 from typing import Any
 
 from labctl.errors import BadInput
-from labctl.services.schemas.answers import Answer
+from labctl.services.schemas.answers import ResponseModel
 from labctl.store import Head, Store
 
 
-class AuditAnswer(Answer):
+class AuditResponse(ResponseModel):
     """One act: who did what, when, and why."""
 
     id: int
@@ -22,7 +22,7 @@ class AuditAnswer(Answer):
     hash: str
 
 
-class Verified(Answer):
+class AuditVerificationResponse(ResponseModel):
     """Whether the trail is whole; the anchor is worth noting down where nobody here can write."""
 
     ok: bool
@@ -32,11 +32,11 @@ class Verified(Answer):
     text: str = ""
 
 
-def list_audit(store: Store, since: datetime | None = None, after: int = 0, limit: int = 1000) -> list[AuditAnswer]:
+def list_audit(store: Store, since: datetime | None = None, after: int = 0, limit: int = 1000) -> list[AuditResponse]:
     """Return acts in order: from an instant on, with a number above `after`, at most `limit`."""
     since = since.replace(tzinfo=UTC) if since is not None and since.tzinfo is None else since
     return [
-        AuditAnswer(
+        AuditResponse(
             id=row.id, at=row.at, who=row.who, action=row.action, subject=row.subject, detail=dict(row.detail),
             hash=row.hash,
         )
@@ -52,12 +52,14 @@ def anchor_of(text: str) -> Head:
     return Head(int(length), digest)
 
 
-def verify_audit(store: Store, anchor: str | None = None) -> Verified:
+def verify_audit(store: Store, anchor: str | None = None) -> AuditVerificationResponse:
     """Hold every row of the trail against its hash, the row before, the head and, if given, an anchor."""
     broken = store.audit.first_broken(anchor_of(anchor) if anchor else None)
     head = store.audit.head()
     rows = head.length if head is not None else 0
     shown = f"{head.length}:{head.hash}" if head is not None and head.length else None
     if broken is None:
-        return Verified(ok=True, rows=rows, anchor=shown)
-    return Verified(ok=False, rows=rows, anchor=None, row=broken.row, text=f"row {broken.row}: {broken.what}")
+        return AuditVerificationResponse(ok=True, rows=rows, anchor=shown)
+    return AuditVerificationResponse(
+        ok=False, rows=rows, anchor=None, row=broken.row, text=f"row {broken.row}: {broken.what}"
+    )

@@ -6,20 +6,20 @@ from pathlib import Path
 
 from labctl.config import default_database
 from labctl.errors import LabctlError
-from labctl.services.commands.local import open_acts
+from labctl.services.commands.local import open_commands
 from labctl.services.commands.protocol import BackupNote
-from labctl.services.schemas.answers import Answer
+from labctl.services.schemas.answers import ResponseModel
 from labctl.store import Progress, check, copy_database
 
 
-class FindingAnswer(Answer):
+class FindingResponse(ResponseModel):
     """Something that is not as it was written."""
 
     part: str
     text: str
 
 
-class CheckAnswer(Answer):
+class CheckResponse(ResponseModel):
     """What was looked at, and what was found."""
 
     ok: bool
@@ -27,10 +27,10 @@ class CheckAnswer(Answer):
     blocks: int
     calibrations: int
     audit_rows: int
-    findings: list[FindingAnswer]
+    findings: list[FindingResponse]
 
 
-class BackupAnswer(Answer):
+class BackupResponse(ResponseModel):
     """A backup that is on the disk."""
 
     file: str
@@ -38,24 +38,24 @@ class BackupAnswer(Answer):
     sha256: str
     noted: bool
     remark: str = ""
-    findings: list[FindingAnswer]
+    findings: list[FindingResponse]
 
 
-def check_database(database: str | None, progress: Progress | None = None) -> CheckAnswer:
+def check_database(database: str | None, progress: Progress | None = None) -> CheckResponse:
     """Look at all of a database: file, schema, readings, calibrations, audit trail. Raises StoreError without one."""
     location = database or default_database()
     found = check(location, progress=progress)
-    return CheckAnswer(
+    return CheckResponse(
         ok=not found.findings,
         database=location,
         blocks=found.blocks,
         calibrations=found.calibrations,
         audit_rows=found.audit_rows,
-        findings=[FindingAnswer(part=each.part, text=each.text) for each in found.findings],
+        findings=[FindingResponse(part=each.part, text=each.text) for each in found.findings],
     )
 
 
-def back_up(database: str | None, target: Path, progress: Progress | None = None) -> BackupAnswer:
+def back_up(database: str | None, target: Path, progress: Progress | None = None) -> BackupResponse:
     """Copy a database, also while a service or a campaign uses it, and check the copy.
 
     A copy in hand is worth more than a row about it: when nobody can write that row now, the copy stays and the answer
@@ -65,11 +65,11 @@ def back_up(database: str | None, target: Path, progress: Progress | None = None
     note = BackupNote(file=target.name, bytes=made.bytes, sha256=made.sha256)
     remark = ""
     try:
-        with open_acts(database) as acts:
-            acts.note_backup(note)
+        with open_commands(database) as commands:
+            commands.note_backup(note)
     except LabctlError as error:
         remark = f"the backup is made, but could not be noted in the audit trail: {error}"
-    return BackupAnswer(
+    return BackupResponse(
         file=str(target),
         bytes=made.bytes,
         sha256=made.sha256,

@@ -12,7 +12,7 @@ from instruments.bench_config import shipped_benches
 from instruments.clock import ScaledClock, SystemClock, VirtualClock
 from instruments.transport.factory import serve_simulation
 from labctl.errors import BadInput
-from labctl.services.campaigns.status import cut_short, left_behind, outlives_its_process
+from labctl.services.campaigns.status import abandoned_campaigns, describe_interrupted, outlives_its_process
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.answers import BenchStatus, DeviceCheck
 from labctl.store import BenchRow, Store
@@ -46,9 +46,9 @@ def bench_statuses(store: Store) -> list[BenchStatus]:
     Those of simulated benches are left out: such a bench ended with its process.
     """
     left: dict[str, list[str]] = {}
-    for answer in left_behind(store):
+    for answer in abandoned_campaigns(store):
         if outlives_its_process(store.campaigns.get(answer.id)):
-            left.setdefault(answer.bench, []).append(cut_short(answer))
+            left.setdefault(answer.bench, []).append(describe_interrupted(answer))
     return [bench_status(row).model_copy(update={"left": left.get(row.name, [])}) for row in store.benches.all()]
 
 

@@ -25,7 +25,7 @@ from labctl.errors import BenchBusy, Conflict, LabctlError
 from labctl.services.benches.host import boot_id
 from labctl.store import LeaseRow, Store, open_store
 from labctl.store.connection.database import Database
-from procedures.contracts.control import Control, Wish
+from procedures.contracts.control import Control, ControlRequest
 
 TERM_S = 120.0
 RENEW_S = 10.0
@@ -149,7 +149,7 @@ class _FencedControl(Control):
         self._hold = hold
 
     @property
-    def wish(self) -> Wish:
+    def wish(self) -> ControlRequest:
         """The present wish."""
         if not self._hold.held:
             self.interrupt(f"the bench may no longer be driven from here: {self._hold.why_not}")

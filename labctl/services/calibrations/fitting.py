@@ -12,7 +12,7 @@ from labctl.exports import export_calibration
 from labctl.fitting import fit
 from labctl.services.commands.protocol import CertifyRequest, FitRequest
 from labctl.services.recordings.transfer import newest_recording, points_of
-from labctl.services.schemas.answers import CalibrationRow, Certified, FitAnswer, VersionAnswer
+from labctl.services.schemas.answers import CalibrationRow, CertificationResponse, FitResponse, VersionResponse
 from labctl.store import CertificationRow, NewCalibration, Store
 
 
@@ -25,7 +25,7 @@ class CalibrationFile:
     etag: str
 
 
-def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> FitAnswer:
+def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> FitResponse:
     """Fit a model to a unit's recording and keep it as the next version.
 
     Raises NotFound, BadInput for an unknown model or effect, NotEnoughData.
@@ -51,7 +51,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
         )
 
     kept = store.calibrations.add(serial, at, build)
-    return FitAnswer.model_validate(dict(kept.answer))
+    return FitResponse.model_validate(dict(kept.answer))
 
 
 def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
@@ -73,7 +73,7 @@ def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
     ]
 
 
-def one_version(store: Store, serial: str, version: int) -> VersionAnswer:
+def one_version(store: Store, serial: str, version: int) -> VersionResponse:
     """Return a version as it was made, and whether it is in force. Raises NotFound."""
     row = store.calibrations.get(store.units.get(serial).serial, version)
     history = store.calibrations.history(serial)
@@ -83,17 +83,17 @@ def one_version(store: Store, serial: str, version: int) -> VersionAnswer:
         "parent": row.parent, "recording": row.recording, "created_at": row.created_at, "hash": row.hash,
         "in_force": in_force, "due": last.due if last is not None and in_force else None, "certification": last,
     }  # fmt: skip
-    return VersionAnswer.model_validate({**row.answer, **beside})
+    return VersionResponse.model_validate({**row.answer, **beside})
 
 
-def list_certifications(store: Store, serial: str) -> list[Certified]:
+def list_certifications(store: Store, serial: str) -> list[CertificationResponse]:
     """Return every act of certifying and revoking, newest first. Raises NotFound."""
     return [_certified(row) for row in store.calibrations.history(store.units.get(serial).serial)]
 
 
-def _certified(row: CertificationRow) -> Certified:
+def _certified(row: CertificationRow) -> CertificationResponse:
     act: Literal["certify", "revoke"] = "certify" if row.act == "certify" else "revoke"
-    return Certified(
+    return CertificationResponse(
         serial=row.serial, version=row.version, act=act, by=row.by, reason=row.reason, at=row.at, due=row.due_at
     )
 
@@ -127,7 +127,7 @@ def certify(
     act: Literal["certify", "revoke"],
     request: CertifyRequest,
     at: datetime,
-) -> Certified:
+) -> CertificationResponse:
     """Put a version in force, or take it out of force. Raises NotFound, Conflict."""
     store.units.get(serial)
     due = at + timedelta(days=request.due_days) if request.due_days and act == "certify" else None
@@ -136,4 +136,4 @@ def certify(
         serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due,
         who=door.name if door.via == "key" else request.by,
     )  # fmt: skip
-    return Certified(serial=serial, version=version, act=act, by=row.by, reason=row.reason, at=at, due=due)
+    return CertificationResponse(serial=serial, version=version, act=act, by=row.by, reason=row.reason, at=at, due=due)

@@ -15,32 +15,39 @@ from labctl.calibration import build_calibration
 from labctl.errors import BadInput
 from labctl.fitting import FitResult
 from labctl.fitting.criticism import criticise
-from labctl.fitting.criticism.model_comparison import weigh, with_noise_of
+from labctl.fitting.criticism.model_comparison import compare_models, with_noise_of
 from labctl.fitting.criticism.residuals import residuals_of
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formula
 from labctl.fitting.estimation.fit import fit_context
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.recording import Recording
-from labctl.services.cache import kept
+from labctl.services.cache import cached
 from labctl.services.commands.protocol import ImproveRequest
 from labctl.services.criticism.criticise import version_of
-from labctl.services.criticism.evaluation import model_of, readings_of
+from labctl.services.criticism.evaluation import load_reduced_readings, model_of
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.recordings.transfer import newest_recording, points_of
-from labctl.services.schemas.answers import Answer, ErrorFigures, FitAnswer, ModelAnswer, ResidualColumns, Validity
+from labctl.services.schemas.answers import (
+    ErrorFigures,
+    FitResponse,
+    ModelResponse,
+    ResidualColumns,
+    ResponseModel,
+    Validity,
+)
 from labctl.store import CalibrationRecord, NewCalibration, Store
 
 
-class PreviewAnswer(Answer):
+class PreviewResponse(ResponseModel):
     """What a changed model would be; nothing was kept, so it has no version of its own."""
 
     serial: str
     improved_from: int
     recording: int
-    model: ModelAnswer
+    model: ModelResponse
     axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
     error: ErrorFigures
     before: ErrorFigures
@@ -75,12 +82,12 @@ class _Change:
         }  # fmt: skip
 
 
-def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> FitAnswer:
+def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> FitResponse:
     """Change a version's effects, fit again, keep it as the next. Raises NotFound, BadInput, NotEnoughData."""
     return _keep(store, serial, _change(store, serial, request), at)
 
 
-def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewAnswer:
+def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewResponse:
     """Say what `improve_unit` would make, and what it would leave of the recording; nothing is changed.
 
     Raises NotFound, BadInput, NotEnoughData.
@@ -88,14 +95,14 @@ def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewA
     row = version_of(store, serial, request.version)
     number = newest_recording(store, serial, request.recording)
 
-    def work() -> PreviewAnswer:
+    def work() -> PreviewResponse:
         change = _change(store, serial, request)
         _, left_out = change.after.fitted.exported()
-        return PreviewAnswer(
+        return PreviewResponse(
             serial=serial, **change.figures, left_out=left_out, residuals=_residuals(store, change)
         )  # fmt: skip
 
-    return kept(PreviewAnswer, _question(store, row, number, request), work)
+    return cached(PreviewResponse, _question(store, row, number, request), work)
 
 
 def _question(store: Store, row: CalibrationRecord, recording: int, request: ImproveRequest) -> dict[str, Any]:
@@ -111,14 +118,16 @@ def _question(store: Store, row: CalibrationRecord, recording: int, request: Imp
 def _residuals(store: Store, change: _Change) -> ResidualColumns:
     """Return what a criticism of the changed model would leave, without all else that it says."""
     model = change.after.fitted.model
-    found = criticise(readings_of(store, change.recording), model, CATALOGUE, points=change.points, full=False)
+    found = criticise(
+        load_reduced_readings(store, change.recording), model, CATALOGUE, points=change.points, full=False
+    )
     seen = found.weighed
     if seen is None:
         return residual_columns(found.data, {}, change.points, change.after)
     if found.verdict.terms:  # the floor is the noise beside all that is still missing
         missing = tuple(replace(term, steady=True) for term in found.verdict.terms.values())
         whole = seen.model.with_terms((*seen.model.terms, *missing))
-        seen = with_noise_of(seen, weigh(found.data, whole, CATALOGUE))
+        seen = with_noise_of(seen, compare_models(found.data, whole, CATALOGUE))
     return residual_columns(found.data, residuals_of(seen), change.points)
 
 
@@ -149,7 +158,7 @@ def _refuse_what_changes_nothing(
 def _fitted(store: Store, row: CalibrationRecord, number: int, request: ImproveRequest) -> _Change:
     model = model_of(row)
     points = points_of(store, number)
-    context = context_of(points)
+    context = fit_data_of(points)
     for effect_id in request.remove:
         if effect_id not in model.effect_ids:
             raise BadInput(f"effect {effect_id!r} is not in version {row.version} ({', '.join(model.effect_ids)})")
@@ -170,12 +179,12 @@ def _shaped(store: Store, recording: int, points: Recording, base: ErrorModel, t
     kind = kind_of(term)
     if term.order is not None or not (kind.parameters or kind.max_order):
         return term
-    found = criticise(readings_of(store, recording), base, {kind.id: kind}, points=points, shape_only=True)
+    found = criticise(load_reduced_readings(store, recording), base, {kind.id: kind}, points=points, shape_only=True)
     shape = found.verdict.terms.get(kind.id)
     return replace(shape, steady=True) if shape is not None else term
 
 
-def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitAnswer:
+def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitResponse:
     parent, after = change.row.version, change.after
     made = {"recording": change.recording, "improved_from": parent}
 
@@ -191,7 +200,7 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitAnswer
             parent, change.recording, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
         )
 
-    return FitAnswer.model_validate(dict(store.calibrations.add(serial, at, build).answer))
+    return FitResponse.model_validate(dict(store.calibrations.add(serial, at, build).answer))
 
 
 def plausible(result: FitResult, technology: str) -> dict[str, dict[str, Any]]:

@@ -11,14 +11,14 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Array, Channels
 from labctl.fitting.models.error_model import FittedModel, NotConverged
-from labctl.services.schemas.answers import Answer, Validity
+from labctl.services.schemas.answers import ResponseModel, Validity
 from labctl.store import CalibrationRecord, Store
 
 #: Rounds in which a law of the output is solved for the output; each shrinks the rest a hundredfold or so.
 ROUNDS, CLOSE_DPS = 100, 1e-12
 
 
-class Surface(Answer):
+class Surface(ResponseModel):
     """One axis, turned about itself, the others at rest."""
 
     rate_dps: list[float]
@@ -28,7 +28,7 @@ class Surface(Answer):
     )
 
 
-class SurfaceAnswer(Answer):
+class SurfaceResponse(ResponseModel):
     """What a calibration takes off, within what was calibrated."""
 
     serial: str
@@ -39,7 +39,7 @@ class SurfaceAnswer(Answer):
     axes: dict[str, Surface]
 
 
-def surface_of(store: Store, serial: str, version: int, rate_points: int, temperature_points: int) -> SurfaceAnswer:
+def surface_of(store: Store, serial: str, version: int, rate_points: int, temperature_points: int) -> SurfaceResponse:
     """Return the modelled error on a grid over the validity. Raises NotFound, BadInput, NotConverged."""
     row = store.calibrations.get(store.units.get(serial).serial, version)
     calibration = read_calibration(row.document)
@@ -54,7 +54,7 @@ def surface_of(store: Store, serial: str, version: int, rate_points: int, temper
     }  # fmt: skip
     validity = Validity(temperature_c=calibration.temperature_c, rate_dps=calibration.rate_dps)
     left_out = list(calibration.document["left_out"])
-    return SurfaceAnswer(serial=serial, version=version, validity=validity, held=held, left_out=left_out, axes=axes)
+    return SurfaceResponse(serial=serial, version=version, validity=validity, held=held, left_out=left_out, axes=axes)
 
 
 def _grid(span: tuple[float, float], points: int) -> Array:

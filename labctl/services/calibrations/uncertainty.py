@@ -7,12 +7,12 @@ from dataclasses import asdict
 from pydantic import Field
 
 from labctl.calibration import read_calibration
-from labctl.services.schemas.answers import Answer
+from labctl.services.schemas.answers import ResponseModel
 from labctl.store import Store
 from labctl.uncertainty import COVERAGE, is_inside, rate_uncertainty
 
 
-class AxisUncertainty(Answer):
+class AxisUncertainty(ResponseModel):
     """One axis, deg/s."""
 
     coefficients_dps: float = Field(description="Standard uncertainty from the coefficients' covariance.")
@@ -23,7 +23,7 @@ class AxisUncertainty(Answer):
     expanded_dps: float = Field(description="Combined, times the coverage factor.")
 
 
-class UncertaintyAnswer(Answer):
+class UncertaintyResponse(ResponseModel):
     """The uncertainty of a corrected rate; the noise of a single reading comes on top."""
 
     serial: str
@@ -35,12 +35,14 @@ class UncertaintyAnswer(Answer):
     axes: dict[str, AxisUncertainty]
 
 
-def uncertainty_at(store: Store, serial: str, version: int, rate_dps: float, temperature_c: float) -> UncertaintyAnswer:
+def uncertainty_at(
+    store: Store, serial: str, version: int, rate_dps: float, temperature_c: float
+) -> UncertaintyResponse:
     """Return the uncertainty about each axis. Raises NotFound, BadInput."""
     document, _ = store.calibrations.document(serial, version)
     calibration = read_calibration(document)
     found = rate_uncertainty(calibration, rate_dps, temperature_c)
-    return UncertaintyAnswer(
+    return UncertaintyResponse(
         serial=serial,
         version=version,
         rate_dps=rate_dps,

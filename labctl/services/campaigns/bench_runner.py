@@ -17,14 +17,14 @@ from labctl.services.campaigns.execution import Prepared, prepare, run
 from labctl.services.campaigns.resume import as_it_was, leave_safe, prepare_resume, too_often
 from labctl.services.campaigns.status import ENDED, answer_of, campaign_status
 from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
-from labctl.services.schemas.answers import CampaignAnswer
-from labctl.services.simulation.recordings import hiding
+from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.simulation.recordings import with_hidden_effects
 from labctl.store import CampaignRow, Store
 from procedures.contracts.control import Control
 from procedures.contracts.errors import StalePrompt
 from procedures.contracts.journal import CampaignState
-from procedures.contracts.operator import Operator, PersonOperator
-from procedures.execution.signals import uninterrupted
+from procedures.contracts.operator import HumanOperator, Operator
+from procedures.execution.signals import ignore_signals
 from procedures.monitoring.progress import Progress
 
 #: How long a request to abort waits for the safe state before it says how far the campaign is.
@@ -94,14 +94,14 @@ class BenchRunner:
         job = self._job
         return job is not None and job.row.id == campaign
 
-    def start(self, request: CampaignRequest) -> CampaignAnswer:
+    def start(self, request: CampaignRequest) -> CampaignResponse:
         """Plan, write down and begin a campaign.
 
         Raises BenchBusy while another runs or without the lease on the bench, and whatever planning raises.
         """
         with self._guard:
             self._refuse_unless_free()
-            bench = hiding(self._bench, request.hide)
+            bench = with_hidden_effects(self._bench, request.hide)
             prepared = prepare(self._store, request.recipe, bench, self._make_clock(), clip=request.clip)
             self._begin(prepared)
         return campaign_status(self._store, prepared.id)
@@ -127,7 +127,7 @@ class BenchRunner:
             control.abort(STOPS)
         job.thread.start()
 
-    def resume(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+    def resume(self, campaign: int, request: ResumeRequest) -> CampaignResponse:
         """Let a paused campaign go on, or take up one that was interrupted, failed or aborted.
 
         Raises BenchBusy while another runs or without the lease on the bench, Conflict when it is done, or when the
@@ -197,16 +197,16 @@ class BenchRunner:
             self._store.campaigns.close_unfinished(unsaid.campaign, unsaid.why, at)
         self._unsaid = None
 
-    def pause(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+    def pause(self, campaign: int, request: ReasonRequest) -> CampaignResponse:
         """Ask the running campaign to hold after the present data set. Raises Conflict when it does not run here."""
         self._running(campaign).control.pause(request.text)
         answer = self.status(campaign)
         return answer or campaign_status(self._store, campaign)
 
-    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:
         """Answer the open question. Raises StalePrompt for any other one, Conflict when nothing is asked here."""
         operator = self._running(campaign).operator
-        if not isinstance(operator, PersonOperator):
+        if not isinstance(operator, HumanOperator):
             raise StalePrompt(
                 f"question {request.prompt!r} is not asked: this bench turns and switches units by itself"
             )
@@ -257,14 +257,14 @@ class BenchRunner:
 
         return stop
 
-    def status(self, campaign: int) -> CampaignAnswer | None:
+    def status(self, campaign: int) -> CampaignResponse | None:
         """Return the live picture of a campaign that runs here."""
         job = self._job
         if job is None or job.row.id != campaign or job.progress is None:
             return None
         return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.wish)
 
-    def abort(self, campaign: int, reason: str) -> CampaignAnswer:
+    def abort(self, campaign: int, reason: str) -> CampaignResponse:
         """End the running campaign in the safe state; returns once it is there."""
         job = self._job
         if job is not None and job.row.id == campaign and job.thread is not None:
@@ -296,7 +296,7 @@ class BenchRunner:
         Waits as long as that takes, and every part of the safe state has an end of its own: whoever had the bench or
         the database before the table stands could drive it too.
         """
-        with uninterrupted():  # an impatient Ctrl-C must not leave the bench as it is
+        with ignore_signals():  # an impatient Ctrl-C must not leave the bench as it is
             self.end_soon()
             with self._guard:  # what is being begun is begun, and ended
                 job = self._job

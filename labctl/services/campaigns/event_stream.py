@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Hashable
 from typing import Any, TypeVar, cast
 
 from labctl.services.campaigns.status import ENDED, event_answer
-from labctl.services.schemas.answers import CampaignAnswer, EventAnswer
+from labctl.services.schemas.answers import CampaignResponse, EventResponse
 from labctl.store import Store
 
 #: An open event stream says that it is alive after this long without an event.
@@ -21,7 +21,7 @@ Listen = Callable[[Callable[[], None]], Callable[[], None]]
 T = TypeVar("T")
 
 
-class Glances:
+class StatusCache:
     """What many ask at the same moment is looked up once. A moment ends when the bench rings, and after FRESH_S."""
 
     def __init__(self) -> None:
@@ -45,20 +45,20 @@ class Glances:
         return cast(T, await asyncio.shield(found))  # one who leaves does not end it for the others
 
 
-class Followers:
+class CampaignEventStream:
     """Tells onlookers where campaigns are."""
 
-    def __init__(self, store: Store, status: Callable[[int], CampaignAnswer], listen: Listen | None) -> None:
+    def __init__(self, store: Store, status: Callable[[int], CampaignResponse], listen: Listen | None) -> None:
         self._store = store
         self._status = status
         self._listen = listen
-        self._glances = Glances()
+        self._status_cache = StatusCache()
         if listen is not None:
-            listen(self._glances.ring)  # the first to hear: who is woken by the bell looks anew
+            listen(self._status_cache.ring)  # the first to hear: who is woken by the bell looks anew
 
     async def follow(
         self, campaign: int, after: int, over: Callable[[], bool]
-    ) -> AsyncIterator[EventAnswer | CampaignAnswer | None]:
+    ) -> AsyncIterator[EventResponse | CampaignResponse | None]:
         """Yield a campaign's events after number `after`, where it stands whenever that has changed, and None to show
         that the stream lives, until the campaign ends or it is `over` for another reason.
 
@@ -66,7 +66,7 @@ class Followers:
         """
         bell = asyncio.Event()
         loop = asyncio.get_running_loop()
-        shown: CampaignAnswer | None = None
+        shown: CampaignResponse | None = None
 
         def ring() -> None:
             if not bell.is_set():
@@ -94,22 +94,22 @@ class Followers:
             if stop is not None:
                 stop()
 
-    async def _told(self, campaign: int, after: int) -> tuple[str, list[EventAnswer]]:
+    async def _told(self, campaign: int, after: int) -> tuple[str, list[EventResponse]]:
         """Return the state in the database, not that of the live picture, and the events that came before it.
 
         The last event is written before the state there ends, so that whoever sees the end has seen every event.
         """
 
-        def look() -> tuple[str, list[EventAnswer]]:
+        def look() -> tuple[str, list[EventResponse]]:
             state = self._store.campaigns.get(campaign).state
             return state, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
 
-        return await self._glances.at(("told", campaign, after), look)
+        return await self._status_cache.at(("told", campaign, after), look)
 
-    async def _now(self, campaign: int) -> CampaignAnswer:
-        return await self._glances.at(("now", campaign), lambda: self._status(campaign))
+    async def _now(self, campaign: int) -> CampaignResponse:
+        return await self._status_cache.at(("now", campaign), lambda: self._status(campaign))
 
-    async def _meanwhile(self, campaign: int, bell: asyncio.Event) -> AsyncIterator[CampaignAnswer | None]:
+    async def _meanwhile(self, campaign: int, bell: asyncio.Event) -> AsyncIterator[CampaignResponse | None]:
         """Yield where a campaign stands until the bell rings, or until it is time to show that the stream lives."""
         for _ in range(round(HEARTBEAT_S / LIVE_S)):
             if await _rings(bell):

@@ -13,29 +13,29 @@ from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
-from instruments.interfaces.unit_handler import NoHand
+from instruments.interfaces.unit_handler import ManualUnitHandler
 from labctl.config import default_database
 from labctl.errors import BadInput, Conflict, Stopped, StoreError
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.benches.host import boot_id
 from labctl.services.benches.lease import holding, open_for
-from labctl.services.campaigns.status import ENDED, answer_of, cut_short, from_rows
+from labctl.services.campaigns.status import ENDED, answer_of, describe_interrupted, from_rows
 from labctl.services.commands.protocol import Request
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
-from labctl.services.schemas.answers import CampaignAnswer
+from labctl.services.schemas.answers import CampaignResponse
 from labctl.store import NewCampaign, NewUnit, Store
 from labctl.store.connection.database import note_campaign
 from procedures.contracts.control import Control
-from procedures.contracts.operator import HandOperator, Operator, PersonOperator
+from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator
 from procedures.execution.engine import Engine
 from procedures.execution.resume import Restart
 from procedures.execution.safe_state import stop_table
-from procedures.execution.signals import uninterrupted
+from procedures.execution.signals import ignore_signals
 from procedures.monitoring.progress import Progress
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
 
-Observe = Callable[[CampaignAnswer], None]
+Observe = Callable[[CampaignResponse], None]
 Attend = Callable[[Operator, Callable[[str], None]], None]
 
 
@@ -67,7 +67,11 @@ class Prepared:
 
 def operator_of(bench: Bench) -> Operator:
     """Return who turns and switches the units of a bench."""
-    return PersonOperator() if isinstance(bench.hand, NoHand) else HandOperator(bench.hand)
+    return (
+        HumanOperator()
+        if isinstance(bench.unit_handler, ManualUnitHandler)
+        else UnitHandlerOperator(bench.unit_handler)
+    )
 
 
 def refuse_unconfirmed(store: Store, bench: str) -> None:
@@ -162,7 +166,7 @@ def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
 
 def run(
     store: Store, prepared: Prepared, control: Control | None = None, observe: Callable[[Progress], None] | None = None
-) -> CampaignAnswer:
+) -> CampaignResponse:
     """Run a prepared campaign to its end; the bench is closed, in its safe state, when this returns.
 
     Raises Stopped after a Ctrl-C.
@@ -185,13 +189,13 @@ def _engine(
     )
 
 
-def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignAnswer:
+def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse:
     try:
         engine.run(prepared.start_at, prepared.restart)
     except KeyboardInterrupt as interrupt:
         raise Stopped(_stopped(store, prepared, engine)) from interrupt
     finally:
-        with uninterrupted(), closing(prepared.bench):
+        with ignore_signals(), closing(prepared.bench):
             if engine.complaints:  # said in its event already, unless that could not be written
                 bench = store.campaigns.get(prepared.id).bench_name
                 if not store.benches.unconfirmed(bench):
@@ -199,7 +203,7 @@ def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignAnswer:
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
 
 
-def how_left(bench: str, unconfirmed: str) -> str:
+def describe_safe_state(bench: str, unconfirmed: str) -> str:
     """Say how a bench was left, and what to do where it could not be confirmed safe."""
     if not unconfirmed:
         return f"bench {bench} is safe"
@@ -209,7 +213,7 @@ def how_left(bench: str, unconfirmed: str) -> str:
 
 
 def _stopped(store: Store, prepared: Prepared, engine: Engine) -> str:
-    left = how_left(store.campaigns.get(prepared.id).bench_name, "; ".join(engine.complaints))
+    left = describe_safe_state(store.campaigns.get(prepared.id).bench_name, "; ".join(engine.complaints))
     return f"campaign {prepared.id} was stopped; {left}; `labctl campaign resume {prepared.id}` goes on with it"
 
 
@@ -218,7 +222,7 @@ def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: S
     complaints, ended, marked = "; ".join(engine.complaints), False, ""
     with suppress(StoreError):
         ended, marked = store.campaigns.get(campaign).state in ENDED, store.benches.unconfirmed(bench)
-    left = how_left(bench, complaints)
+    left = describe_safe_state(bench, complaints)
     if complaints and not marked:  # nothing that `labctl bench clear` could take back
         left = f"bench {bench} is NOT confirmed safe, and that could not be written down: {complaints}; look at it"
     elif not complaints and not ended:
@@ -245,7 +249,7 @@ def run_here(
     observe: Observe | None = None,
     attend: Attend | None = None,
     say: Callable[[str], None] | None = None,
-) -> CampaignAnswer:
+) -> CampaignResponse:
     """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks.
 
     `say` is told of a campaign that was left on a simulated bench. Raises Conflict for one on any other bench.
@@ -267,12 +271,12 @@ def _left_on(store: Store, bench: BenchFile) -> list[str]:
     if bench.is_simulated and not store.is_sole_writer:  # it has no lease: another process may run them
         return []
     rows = [row for row in store.campaigns.unfinished() if row.bench_name == bench.name]
-    return [cut_short(from_rows(store, row)) for row in rows]
+    return [describe_interrupted(from_rows(store, row)) for row in rows]
 
 
 def run_attended(
     store: Store, prepared: Prepared, control: Control, observe: Observe | None, attend: Attend | None
-) -> CampaignAnswer:
+) -> CampaignResponse:
     """Run a prepared campaign to its end at somebody's terminal.
 
     Raises Stopped after a Ctrl-C, StoreError when it cannot be written any more; both say how the bench was left.

@@ -27,8 +27,8 @@ from labctl.services.campaigns.execution import (
 from labctl.services.campaigns.status import from_rows, how_far
 from labctl.services.commands.protocol import ResumeRequest
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import CampaignAnswer
-from labctl.store import CampaignRow, Standing, Store, TakeUp, open_store
+from labctl.services.schemas.answers import CampaignResponse
+from labctl.store import CampaignRow, ResumePoint, Store, TakeUp, open_store
 from procedures.execution.resume import Restart
 from procedures.execution.safe_state import make_safe
 from procedures.planning.plan import Plan
@@ -70,7 +70,7 @@ def prepare_resume(
     store: Store,
     campaign: int,
     bench_file: BenchFile,
-    make_clock: Callable[[Standing], Clock],
+    make_clock: Callable[[ResumePoint], Clock],
     request: ResumeRequest,
     opened: Bench | None = None,
 ) -> Prepared:
@@ -101,7 +101,7 @@ def prepare_resume(
     try:
         store.interruptions.take_up(campaign, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
         if new_world and (position := plan.mounted_at(standing.start_at)):
-            bench.hand.mount(position)
+            bench.unit_handler.mount(position)
     except BaseException:
         bench.close()
         raise
@@ -124,7 +124,7 @@ def _refuse_other_units(row: CampaignRow, bench_file: BenchFile) -> None:
         )
 
 
-def too_often(standing: Standing) -> str | None:
+def too_often(standing: ResumePoint) -> str | None:
     """Return why a campaign is not taken up by itself any more, or None."""
     if standing.tries < MOST_TRIES:
         return None
@@ -166,7 +166,7 @@ def resume_here(
     request: ResumeRequest,
     observe: Observe | None = None,
     attend: Attend | None = None,
-) -> CampaignAnswer:
+) -> CampaignResponse:
     """Take up a campaign in this process and run it to its end; without a number the newest that is not over."""
     location = database or default_database()
     with open_store(location, write=False) as store:
@@ -174,7 +174,7 @@ def resume_here(
     bench_file = load_bench(bench) if bench else BenchFile.model_validate(dict(row.bench))
     with open_for(bench_file, location) as store, holding(store, bench_file) as control:
 
-        def make_clock(standing: Standing) -> Clock:
+        def make_clock(standing: ResumePoint) -> Clock:
             clock = clock_for(bench_file, speed)
             return VirtualClock(standing.last_at) if isinstance(clock, VirtualClock) else clock
 

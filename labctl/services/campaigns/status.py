@@ -8,18 +8,18 @@ from datetime import timedelta
 from typing import Literal
 
 from instruments.bench_config import BenchFile
-from labctl.services.schemas.answers import CampaignAnswer, EventAnswer, OutputAnswer, PromptAnswer
+from labctl.services.schemas.answers import CampaignResponse, EventResponse, OutputResponse, PromptResponse
 from labctl.store import CampaignRow, EventRow, Store
-from procedures.contracts.control import Wish
+from procedures.contracts.control import ControlRequest
 from procedures.monitoring.progress import Progress
 
 ENDED = frozenset({"done", "aborted", "failed"})
 
 
-def answer_of(row: CampaignRow, progress: Progress, wish: Wish | None = None) -> CampaignAnswer:
+def answer_of(row: CampaignRow, progress: Progress, wish: ControlRequest | None = None) -> CampaignResponse:
     """Return a campaign as its engine sees it, with what a person asked for and the engine has not yet done."""
     state, prompt = progress.state.value, progress.prompt
-    return CampaignAnswer(
+    return CampaignResponse(
         id=row.id,
         recipe=row.recipe_name,
         bench=row.bench_name,
@@ -35,10 +35,10 @@ def answer_of(row: CampaignRow, progress: Progress, wish: Wish | None = None) ->
         setpoint_c=progress.setpoint_c,
         gyro_c=next(iter(progress.gyro_c.values()), None),
         rate_dps=progress.rate_dps,
-        outputs=[] if state in ENDED else [OutputAnswer(**asdict(output)) for output in progress.live.outputs()],
+        outputs=[] if state in ENDED else [OutputResponse(**asdict(output)) for output in progress.live.outputs()],
         last_error=progress.last_error or None,
         wish=None if wish is None or state in ENDED else _open_wish(wish, state),
-        prompt=None if prompt is None else PromptAnswer(**asdict(prompt)),
+        prompt=None if prompt is None else PromptResponse(**asdict(prompt)),
         links=dict(progress.links),
         dropped=dict(progress.dropped),
         started_at=row.started_at,
@@ -47,13 +47,13 @@ def answer_of(row: CampaignRow, progress: Progress, wish: Wish | None = None) ->
     )
 
 
-def _open_wish(wish: Wish, state: str) -> Literal["pause", "abort"] | None:
+def _open_wish(wish: ControlRequest, state: str) -> Literal["pause", "abort"] | None:
     if wish.abort:
         return "abort"
     return "pause" if wish.pause and state != "paused" else None
 
 
-def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
+def from_rows(store: Store, row: CampaignRow) -> CampaignResponse:
     """Return a campaign as the database tells it."""
     steps = store.campaigns.steps(row.id)
     begun = [step for step in steps if step.started_s is not None]
@@ -64,7 +64,7 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
     events = store.campaigns.events(row.id, limit=1_000_000)
     faults = [event for event in events if event.level == "error"]
     over = row.state in ENDED
-    return CampaignAnswer(
+    return CampaignResponse(
         id=row.id,
         recipe=row.recipe_name,
         bench=row.bench_name,
@@ -88,18 +88,18 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignAnswer:
     )
 
 
-def list_campaigns(store: Store) -> list[CampaignAnswer]:
+def list_campaigns(store: Store) -> list[CampaignResponse]:
     """Return every campaign, newest first."""
     return _told(store, store.campaigns.all)
 
 
-def campaign_status(store: Store, campaign: int | None) -> CampaignAnswer:
+def campaign_status(store: Store, campaign: int | None) -> CampaignResponse:
     """Return where a campaign is; without a number the newest. Raises NotFound."""
     number = store.campaigns.newest().id if campaign is None else campaign
     return _told(store, lambda: [store.campaigns.get(number)])[0]
 
 
-def _told(store: Store, read: Callable[[], list[CampaignRow]]) -> list[CampaignAnswer]:
+def _told(store: Store, read: Callable[[], list[CampaignRow]]) -> list[CampaignResponse]:
     """Return campaigns as the database tells them, those that nobody runs as left.
 
     Whoever wrote to the database may have ended its campaign after the rows were read and let go before the lock was
@@ -114,17 +114,17 @@ def _told(store: Store, read: Callable[[], list[CampaignRow]]) -> list[CampaignA
     return [looked_after(from_rows(store, row), by_somebody=row.id not in left) for row in rows]
 
 
-def left_behind(store: Store) -> list[CampaignAnswer]:
+def abandoned_campaigns(store: Store) -> list[CampaignResponse]:
     """Return the campaigns that no process runs any more and that have not ended, newest first."""
     return [answer for answer in _told(store, store.campaigns.unfinished) if answer.abandoned]
 
 
-def how_far(answer: CampaignAnswer) -> str:
+def how_far(answer: CampaignResponse) -> str:
     """Say that a campaign was left, and how far it was."""
     return f"campaign {answer.id} was cut short at {100 * answer.progress:.0f} %"
 
 
-def cut_short(answer: CampaignAnswer) -> str:
+def describe_interrupted(answer: CampaignResponse) -> str:
     """Say that a campaign was left, and what a person can do about it."""
     takes_up, ends = f"`labctl campaign resume {answer.id}`", f"`labctl campaign abort {answer.id}`"
     return f"{how_far(answer)}; {takes_up} takes it up, {ends} ends it"
@@ -136,7 +136,7 @@ def outlives_its_process(row: CampaignRow) -> bool:
     return not BenchFile.model_validate({**row.bench, "simulation": None}).is_simulated
 
 
-def looked_after(answer: CampaignAnswer, *, by_somebody: bool) -> CampaignAnswer:
+def looked_after(answer: CampaignResponse, *, by_somebody: bool) -> CampaignResponse:
     """Say so when no process runs a campaign that has not ended."""
     if answer.state in ENDED or by_somebody:
         return answer
@@ -148,9 +148,9 @@ def looked_after(answer: CampaignAnswer, *, by_somebody: bool) -> CampaignAnswer
     return answer.model_copy(update={"reason": reason, "abandoned": True})
 
 
-def event_answer(row: EventRow) -> EventAnswer:
+def event_answer(row: EventRow) -> EventResponse:
     """Return an event as it leaves the house."""
-    return EventAnswer(
+    return EventResponse(
         id=row.id, at=row.at, t_s=row.t_s, kind=row.kind, level=row.level, message=row.message, device=row.device,
         value=row.value, limit=row.limit, unit=row.unit,
     )  # fmt: skip

@@ -14,11 +14,11 @@ from labctl.services.benches.check import bench_status
 from labctl.services.calibrations import fitting, revision
 from labctl.services.campaigns.status import campaign_status, outlives_its_process
 from labctl.services.commands.protocol import (
-    Acts,
     BackupNote,
     CampaignRequest,
     CertifyRequest,
     ClearRequest,
+    Commands,
     ConfirmRequest,
     ExampleRequest,
     FitRequest,
@@ -29,15 +29,15 @@ from labctl.services.commands.protocol import (
 )
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.recordings import examples, transfer
-from labctl.services.recordings.examples import SimulatedRecording
+from labctl.services.recordings.examples import SimulatedRecordingResponse
 from labctl.services.schedule import queue
 from labctl.services.schemas.answers import (
     BenchStatus,
-    CampaignAnswer,
-    Certified,
-    FitAnswer,
-    Imported,
-    ScheduledAnswer,
+    CampaignResponse,
+    CertificationResponse,
+    FitResponse,
+    ImportResponse,
+    ScheduledResponse,
 )
 from labctl.store import Store, holder_of, open_store
 
@@ -45,42 +45,42 @@ from labctl.store import Store, holder_of, open_store
 UNDER_WAY = frozenset({"running", "paused", "waiting"})
 
 
-class LocalActs:
+class LocalCommands:
     """The acts, done by this process."""
 
     def __init__(self, store: Store, clock: Clock) -> None:
         self._store = store
         self._clock = clock
 
-    def import_recording(self, folder: Path) -> Imported:
+    def import_recording(self, folder: Path) -> ImportResponse:
         """Take in a recording from a folder."""
         return transfer.import_folder(self._store, folder, self._clock.utc())
 
-    def simulate_recording(self, request: SimulatedRequest) -> SimulatedRecording:
+    def simulate_recording(self, request: SimulatedRequest) -> SimulatedRecordingResponse:
         """Make a recording in simulation and take it in."""
         return examples.add_simulated(self._store, request, self._clock.utc())
 
-    def import_example(self, request: ExampleRequest) -> Imported:
+    def import_example(self, request: ExampleRequest) -> ImportResponse:
         """Take in a recording that comes with labctl."""
         return self.import_recording(examples.example(request.name))
 
-    def fit(self, serial: str, request: FitRequest) -> FitAnswer:
+    def fit(self, serial: str, request: FitRequest) -> FitResponse:
         """Fit a model and keep it as the unit's next version."""
         return fitting.fit_unit(self._store, serial, request, self._clock.utc())
 
-    def improve(self, serial: str, request: ImproveRequest) -> FitAnswer:
+    def improve(self, serial: str, request: ImproveRequest) -> FitResponse:
         """Change a version's effects and keep the fit as the unit's next version."""
         return revision.improve_unit(self._store, serial, request, self._clock.utc())
 
-    def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:
+    def certify(self, serial: str, version: int, request: CertifyRequest) -> CertificationResponse:
         """Make a version the unit's current one."""
         return fitting.certify(self._store, serial, version, "certify", request, self._clock.utc())
 
-    def revoke(self, serial: str, version: int, request: CertifyRequest) -> Certified:
+    def revoke(self, serial: str, version: int, request: CertifyRequest) -> CertificationResponse:
         """Take a version out of force."""
         return fitting.certify(self._store, serial, version, "revoke", request, self._clock.utc())
 
-    def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
+    def abort_campaign(self, campaign: int, reason: str) -> CampaignResponse:
         """Close a campaign that no process runs any more; one that runs here would hold the database."""
         answer = campaign_status(self._store, campaign)
         if answer.state in {"done", "aborted", "failed"}:
@@ -99,11 +99,11 @@ class LocalActs:
         """Write down what a person did to a campaign, before it shows."""
         self._store.audit.record(self._clock.utc(), f"campaign {act}", f"campaign {campaign}", {"reason": reason})
 
-    def create_key(self, request: api_keys.KeyRequest) -> api_keys.NewKeyAnswer:
+    def create_key(self, request: api_keys.KeyRequest) -> api_keys.NewKeyResponse:
         """Make an API key."""
         return api_keys.create_key(self._store, request, self._clock.utc())
 
-    def revoke_key(self, name: str, reason: str) -> api_keys.KeyAnswer:
+    def revoke_key(self, name: str, reason: str) -> api_keys.KeyResponse:
         """Take a key's power away."""
         return api_keys.revoke_key(self._store, name, reason, self._clock.utc())
 
@@ -112,15 +112,15 @@ class LocalActs:
         detail = {"bytes": note.bytes, "sha256": note.sha256}
         self._store.audit.record(self._clock.utc(), "backup", note.file, detail)
 
-    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignResponse:
         """Raise Conflict: what this process could pause would hold the database."""
         raise self._not_here(campaign, f"pause it ({request.reason})")
 
-    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignResponse:
         """Raise Conflict: a campaign is taken up by a process that stays."""
         raise self._not_here(campaign, f"let it go on ({request.by})")
 
-    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:
         """Raise Conflict: nobody here has put a question."""
         raise self._not_here(campaign, f"answer question {request.prompt}")
 
@@ -132,14 +132,14 @@ class LocalActs:
         """Take in that a person has looked at a bench."""
         return bench_status(self._store.benches.clear(bench, request.by, request.reason, self._clock.utc()))
 
-    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledResponse:
         """Enter a campaign into the schedule of a bench; a service that holds this bench and database begins it."""
         file = load_bench(bench or bench_for(load_recipe(request.recipe)))
         answer = queue.add_start(self._store, request, file, self._clock.utc())
         said = "; ".join(filter(None, (queue.NOBODY.format(bench=file.name), answer.note)))
         return answer.model_copy(update={"note": said})
 
-    def cancel_start(self, start: int) -> ScheduledAnswer:
+    def cancel_start(self, start: int) -> ScheduledResponse:
         """Take an entry out of the schedule."""
         return queue.cancel_start(self._store, start, self._clock.utc())
 
@@ -151,13 +151,13 @@ def service_url(database: str | None) -> str | None:
 
 
 @contextmanager
-def open_acts(database: str | None) -> Iterator[Acts]:
+def open_commands(database: str | None) -> Iterator[Commands]:
     """Give what acts on the database: this process, or the service that holds it."""
     location = database or default_database()
     if url := service_url(location):
-        from labctl.services.commands.remote import RemoteActs  # noqa: PLC0415  an HTTP client only where one is needed
+        from labctl.services.commands.remote import HttpCommands  # noqa: PLC0415  an HTTP client only where one is needed
 
-        yield RemoteActs(url)
+        yield HttpCommands(url)
         return
     with open_store(location, write=True) as store:
-        yield LocalActs(store, SystemClock())
+        yield LocalCommands(store, SystemClock())

@@ -10,7 +10,7 @@ from labctl.store import Store, open_store
 
 
 @contextmanager
-def open_reading(database: str | None) -> Iterator[Store]:
+def open_readonly(database: str | None) -> Iterator[Store]:
     """Give the store to read from, also while another process writes."""
     with open_store(database or default_database(), write=False) as store:
         yield store

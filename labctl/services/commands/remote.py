@@ -11,7 +11,7 @@ import httpx
 
 from labctl.config import KEY_VARIABLE, key, os_user
 from labctl.errors import Conflict, LabctlError, NotCertified, StoreError
-from labctl.services.admin.api_keys import KeyAnswer, KeyRequest, NewKeyAnswer
+from labctl.services.admin.api_keys import KeyRequest, KeyResponse, NewKeyResponse
 from labctl.services.campaigns.execution import StartRequest
 from labctl.services.commands.protocol import (
     BackupNote,
@@ -29,11 +29,11 @@ from labctl.services.planning.loading import own_text
 from labctl.services.recordings.transfer import FILE_NAMES
 from labctl.services.schemas.answers import (
     BenchStatus,
-    CampaignAnswer,
-    Certified,
-    FitAnswer,
-    Imported,
-    ScheduledAnswer,
+    CampaignResponse,
+    CertificationResponse,
+    FitResponse,
+    ImportResponse,
+    ScheduledResponse,
 )
 
 TIMEOUT_S = 300.0
@@ -45,7 +45,7 @@ class ServiceRefused(LabctlError):
     """The service answered, and said no; the text is its own."""
 
 
-class RemoteActs:
+class HttpCommands:
     """Every act as a request to a service."""
 
     def __init__(self, url: str) -> None:
@@ -74,48 +74,48 @@ class RemoteActs:
             raise refused
         return body
 
-    def import_recording(self, folder: Path) -> Imported:
+    def import_recording(self, folder: Path) -> ImportResponse:
         """Send a recording's files."""
         with ExitStack() as opened:
             found = [path for path in sorted(folder.glob("*")) if path.name in FILE_NAMES]
             files = [("files", (path.name, opened.enter_context(path.open("rb")))) for path in found]
             if not files:
                 raise ServiceRefused(f"{folder}: no recording there (expected recording.toml and a data file)")
-            return Imported.model_validate(self._post("/api/recordings", files=files))
+            return ImportResponse.model_validate(self._post("/api/recordings", files=files))
 
-    def fit(self, serial: str, request: FitRequest) -> FitAnswer:
+    def fit(self, serial: str, request: FitRequest) -> FitResponse:
         """Ask for a fit."""
-        return FitAnswer.model_validate(
+        return FitResponse.model_validate(
             self._post(f"/api/units/{quote(serial, safe='')}/calibrations", json=request.model_dump())
         )
 
-    def improve(self, serial: str, request: ImproveRequest) -> FitAnswer:
+    def improve(self, serial: str, request: ImproveRequest) -> FitResponse:
         """Ask for a changed model."""
         version = request.version or self._newest(serial)
         path = f"/api/units/{quote(serial, safe='')}/calibrations/{version}/improve"
-        return FitAnswer.model_validate(self._post(path, json=request.model_dump(exclude={"version"})))
+        return FitResponse.model_validate(self._post(path, json=request.model_dump(exclude={"version"})))
 
     def _newest(self, serial: str) -> int:
         rows = self._ask("GET", f"/api/units/{quote(serial, safe='')}/calibrations")
         return int(rows[0]["version"]) if rows else 1
 
-    def certify(self, serial: str, version: int, request: CertifyRequest) -> Certified:
+    def certify(self, serial: str, version: int, request: CertifyRequest) -> CertificationResponse:
         """Ask for a certification."""
         return self._certification(serial, version, "certify", request)
 
-    def revoke(self, serial: str, version: int, request: CertifyRequest) -> Certified:
+    def revoke(self, serial: str, version: int, request: CertifyRequest) -> CertificationResponse:
         """Ask for a revocation."""
         return self._certification(serial, version, "revoke", request)
 
-    def _certification(self, serial: str, version: int, act: str, request: CertifyRequest) -> Certified:
+    def _certification(self, serial: str, version: int, act: str, request: CertifyRequest) -> CertificationResponse:
         path = f"/api/units/{quote(serial, safe='')}/calibrations/{version}/{act}"
-        return Certified.model_validate(self._post(path, json=request.model_dump()))
+        return CertificationResponse.model_validate(self._post(path, json=request.model_dump()))
 
-    def start_campaign(self, request: StartRequest) -> CampaignAnswer:
+    def start_campaign(self, request: StartRequest) -> CampaignResponse:
         """Ask for a campaign on the service's bench."""
         self._refuse_options(("--bench", request.bench), ("--speed", request.speed), ("--seed", request.seed))
         recipe = own_text(request.recipe)
-        return CampaignAnswer.model_validate(
+        return CampaignResponse.model_validate(
             self._post("/api/campaigns", json={"recipe": recipe, "clip": request.clip})
         )
 
@@ -127,18 +127,20 @@ class RemoteActs:
                     "on its own bench at its own pace; leave the option out, stop it, or name another --database"
                 )
 
-    def _campaign(self, campaign: int, act: str, request: Request) -> CampaignAnswer:
-        return CampaignAnswer.model_validate(self._post(f"/api/campaigns/{campaign}/{act}", json=request.model_dump()))
+    def _campaign(self, campaign: int, act: str, request: Request) -> CampaignResponse:
+        return CampaignResponse.model_validate(
+            self._post(f"/api/campaigns/{campaign}/{act}", json=request.model_dump())
+        )
 
-    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignAnswer:
+    def pause_campaign(self, campaign: int, request: ReasonRequest) -> CampaignResponse:
         """Ask for a pause."""
         return self._campaign(campaign, "pause", request)
 
-    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignAnswer:
+    def resume_campaign(self, campaign: int, request: ResumeRequest) -> CampaignResponse:
         """Ask that a campaign go on."""
         return self._campaign(campaign, "resume", request)
 
-    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignAnswer:
+    def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:
         """Answer a question."""
         return self._campaign(campaign, "confirm", request)
 
@@ -148,32 +150,34 @@ class RemoteActs:
             self._post(f"/api/benches/{quote(bench, safe='')}/clear", json=request.model_dump())
         )
 
-    def campaign(self, campaign: int) -> CampaignAnswer:
+    def campaign(self, campaign: int) -> CampaignResponse:
         """Return a campaign as the service sees it now."""
-        return CampaignAnswer.model_validate(self._ask("GET", f"/api/campaigns/{campaign}"))
+        return CampaignResponse.model_validate(self._ask("GET", f"/api/campaigns/{campaign}"))
 
-    def abort_campaign(self, campaign: int, reason: str) -> CampaignAnswer:
+    def abort_campaign(self, campaign: int, reason: str) -> CampaignResponse:
         """Ask for the end of a campaign."""
-        return CampaignAnswer.model_validate(self._post(f"/api/campaigns/{campaign}/abort", json={"reason": reason}))
+        return CampaignResponse.model_validate(self._post(f"/api/campaigns/{campaign}/abort", json={"reason": reason}))
 
-    def create_key(self, request: KeyRequest) -> NewKeyAnswer:
+    def create_key(self, request: KeyRequest) -> NewKeyResponse:
         """Ask for a new key."""
-        return NewKeyAnswer.model_validate(self._post("/api/keys", json=request.model_dump(mode="json")))
+        return NewKeyResponse.model_validate(self._post("/api/keys", json=request.model_dump(mode="json")))
 
-    def revoke_key(self, name: str, reason: str) -> KeyAnswer:
+    def revoke_key(self, name: str, reason: str) -> KeyResponse:
         """Ask for a key's end."""
         path = f"/api/keys/{quote(name, safe='')}/revoke"
-        return KeyAnswer.model_validate(self._post(path, json={"reason": reason}))
+        return KeyResponse.model_validate(self._post(path, json={"reason": reason}))
 
     def note_backup(self, note: BackupNote) -> None:
         """Ask for a row in the audit trail."""
         self._post("/api/backups", json=note.model_dump())
 
-    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledAnswer:
+    def schedule_campaign(self, request: CampaignRequest, bench: str | None = None) -> ScheduledResponse:
         """Ask for a campaign on the service's bench, later."""
         self._refuse_options(("--bench", bench))
-        return ScheduledAnswer.model_validate(self._post("/api/campaigns", json=request.model_dump(exclude_unset=True)))
+        return ScheduledResponse.model_validate(
+            self._post("/api/campaigns", json=request.model_dump(exclude_unset=True))
+        )
 
-    def cancel_start(self, start: int) -> ScheduledAnswer:
+    def cancel_start(self, start: int) -> ScheduledResponse:
         """Ask for an entry to be taken out of the schedule."""
-        return ScheduledAnswer.model_validate(self._ask("DELETE", f"/api/schedule/{start}"))
+        return ScheduledResponse.model_validate(self._ask("DELETE", f"/api/schedule/{start}"))

@@ -7,50 +7,56 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from labctl.errors import BadInput
-from labctl.services.cache import kept_among
+from labctl.services.cache import cached_group
 from labctl.services.recordings.transfer import newest_recording
-from labctl.services.schemas.answers import Answer, CriticismAnswer, LadderAnswer, LadderRow, ResidualsAnswer
+from labctl.services.schemas.answers import (
+    CriticismResponse,
+    LadderResponse,
+    LadderRow,
+    ResidualsResponse,
+    ResponseModel,
+)
 from labctl.store import CalibrationRecord, Store
 
 if TYPE_CHECKING:
     from labctl.fitting.effects import Formula
 
-A = TypeVar("A", bound=Answer)
+A = TypeVar("A", bound=ResponseModel)
 ERRORS = ("raw_rms_dps", "rms_dps", "heldout_rms_dps", "noise_floor_dps")
 
 
 def criticise_unit(
     store: Store, serial: str, version: int | None, recording: int | None, competing: Sequence[Formula] = ()
-) -> CriticismAnswer:
+) -> CriticismResponse:
     """Hold a version (default: the newest) against a recording (default: the newest). Raises NotFound, BadInput."""
-    return _held(CriticismAnswer, store, serial, version, recording, competing)
+    return _cached_criticism(CriticismResponse, store, serial, version, recording, competing)
 
 
-def residuals_unit(store: Store, serial: str, version: int | None, recording: int | None) -> ResidualsAnswer:
+def residuals_unit(store: Store, serial: str, version: int | None, recording: int | None) -> ResidualsResponse:
     """Return what the same criticism leaves, data set by data set. Raises NotFound, BadInput."""
-    return _held(ResidualsAnswer, store, serial, version, recording, ())
+    return _cached_criticism(ResidualsResponse, store, serial, version, recording, ())
 
 
-def _held(
+def _cached_criticism(
     kind: type[A], store: Store, serial: str, version: int | None, recording: int | None, competing: Sequence[Formula]
 ) -> A:
     """Return one of the answers of a criticism; whichever is asked first, all are kept."""
     row = version_of(store, serial, version)
     number = newest_recording(store, serial, recording)
 
-    def work() -> Sequence[Answer]:
-        from labctl.services.criticism.evaluation import judged  # noqa: PLC0415  half a second that a kept answer does not need
+    def work() -> Sequence[ResponseModel]:
+        from labctl.services.criticism.evaluation import evaluate  # noqa: PLC0415  half a second that a kept answer does not need
 
-        return judged(store, row, number, competing)
+        return evaluate(store, row, number, competing)
 
     question = {
         "serial": serial, "version": row.version, "model": row.answer["model"], "recording": number,
         "readings": store.recordings.fingerprint(number), "formulas": [[each.id, each.text] for each in competing],
     }  # fmt: skip
-    return kept_among(kind, question, work)
+    return cached_group(kind, question, work)
 
 
-def ladder(store: Store, serial: str) -> LadderAnswer:
+def ladder(store: Store, serial: str) -> LadderResponse:
     """Return the error of every version, oldest first, down to the noise floor. Raises NotFound."""
     rows = sorted(store.calibrations.of_unit(store.units.get(serial).serial), key=lambda row: row.version)
     if not rows:
@@ -63,7 +69,7 @@ def ladder(store: Store, serial: str) -> LadderAnswer:
         for row in rows
     ]  # fmt: skip
     floors = [step.noise_floor_dps for step in steps if step.noise_floor_dps is not None]
-    return LadderAnswer(serial=serial, steps=steps, noise_floor_dps=min(floors) if floors else None)
+    return LadderResponse(serial=serial, steps=steps, noise_floor_dps=min(floors) if floors else None)
 
 
 def version_of(store: Store, serial: str, version: int | None) -> CalibrationRecord:
@@ -76,7 +82,7 @@ def version_of(store: Store, serial: str, version: int | None) -> CalibrationRec
     return store.calibrations.get(serial, version)
 
 
-def write_next(answer: CriticismAnswer, path: Path) -> None:
+def write_next(answer: CriticismResponse, path: Path) -> None:
     """Write the best next experiment as a recipe that a campaign can be started from. Raises BadInput without one."""
     if not answer.experiments:
         raise BadInput(f"{path}: there is no experiment to write; the verdict is {answer.verdict!r}")

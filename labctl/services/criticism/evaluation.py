@@ -20,24 +20,24 @@ from labctl.services.criticism.report_text import answer_of
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.formulas import catalogue_with
 from labctl.services.recordings.transfer import points_of
-from labctl.services.schemas.answers import CriticismAnswer, ResidualsAnswer
+from labctl.services.schemas.answers import CriticismResponse, ResidualsResponse
 from labctl.store import CalibrationRecord, Store
 
 
-def judged(
+def evaluate(
     store: Store, row: CalibrationRecord, recording: int, competing: Sequence[Formula]
-) -> tuple[CriticismAnswer, ResidualsAnswer]:
+) -> tuple[CriticismResponse, ResidualsResponse]:
     """Hold a version against a recording; returns what is said of it and what it leaves. Raises BadInput."""
     catalogue, points = catalogue_with(competing), points_of(store, recording)
-    found = criticise(readings_of(store, recording), model_of(row), catalogue, points=points)
+    found = criticise(load_reduced_readings(store, recording), model_of(row), catalogue, points=points)
     columns = residual_columns(found.data, found.residuals, points, found.base)
     return (
         answer_of(row.serial, row.version, recording, found, experiments_for(store, recording, found)),
-        ResidualsAnswer(serial=row.serial, version=row.version, recording=recording, columns=columns),
+        ResidualsResponse(serial=row.serial, version=row.version, recording=recording, columns=columns),
     )
 
 
-def readings_of(store: Store, recording: int) -> Recording:
+def load_reduced_readings(store: Store, recording: int) -> Recording:
     """Return a recording's readings at no more than criticism needs, data set by data set; points as they are.
 
     Raises BadInput for a table of coefficients: there is nothing measured in it to hold a model against.

@@ -8,13 +8,13 @@ from typing import Any
 
 from pydantic import Field
 
-from labctl.services.cache import kept
+from labctl.services.cache import cached
 from labctl.services.criticism.criticise import criticise_unit, ladder
-from labctl.services.schemas.answers import Answer
+from labctl.services.schemas.answers import ResponseModel
 from labctl.store import Store
 
 
-class PictureAnswer(Answer):
+class PictureResponse(ResponseModel):
     """One picture."""
 
     id: str
@@ -24,27 +24,27 @@ class PictureAnswer(Answer):
     figure: dict[str, Any] = Field(description="Plotly: data and layout.")
 
 
-class PicturesAnswer(Answer):
+class PicturesResponse(ResponseModel):
     """All of them, as they are kept: drawing takes a second."""
 
-    pictures: list[PictureAnswer]
+    pictures: list[PictureResponse]
 
 
-def pictures_unit(store: Store, serial: str, version: int | None, recording: int | None) -> list[PictureAnswer]:
+def pictures_unit(store: Store, serial: str, version: int | None, recording: int | None) -> list[PictureResponse]:
     """Return the pictures of a version's criticism and of its unit's ladder. Raises NotFound, BadInput."""
     said, steps = criticise_unit(store, serial, version, recording), ladder(store, serial)
 
-    def work() -> PicturesAnswer:
+    def work() -> PicturesResponse:
         from labctl.plots import pictures_of  # noqa: PLC0415  a service starts without a drawing library
 
         found = [
-            PictureAnswer(
+            PictureResponse(
                 id=picture.id, title=picture.title, how_to_read=picture.caption, effects=list(picture.effects),
                 figure=json.loads(picture.figure.to_json()),
             )
             for picture in pictures_of(said.model_dump(mode="json"), steps.model_dump(mode="json"))
         ]  # fmt: skip
-        return PicturesAnswer(pictures=found)
+        return PicturesResponse(pictures=found)
 
     numbers = "\n".join(answer.model_dump_json() for answer in (said, steps))
-    return kept(PicturesAnswer, {"numbers": hashlib.sha256(numbers.encode()).hexdigest()}, work).pictures
+    return cached(PicturesResponse, {"numbers": hashlib.sha256(numbers.encode()).hexdigest()}, work).pictures

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from labctl.plots import report_html
 from labctl.services.criticism.criticise import ladder
-from labctl.services.schemas.answers import CriticismAnswer
+from labctl.services.schemas.answers import CriticismResponse
 from labctl.store import Store
 
 
-def write_report(store: Store, answer: CriticismAnswer, path: Path) -> None:
+def write_report(store: Store, answer: CriticismResponse, path: Path) -> None:
     """Write a criticism with its pictures and the unit's ladder. Raises OSError where the file cannot be written."""
     steps = ladder(store, answer.serial)
     path.write_text(report_html(answer.model_dump(mode="json"), steps.model_dump(mode="json")), encoding="utf-8")

@@ -11,15 +11,15 @@ from labctl.fitting.criticism import Criticism
 from labctl.fitting.criticism.criticise import LARGE_DRIFT, Suspect, failing, pictures, worst
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.effects import CATALOGUE, kind_of
-from labctl.services.schemas.answers import CriticismAnswer
+from labctl.services.schemas.answers import CriticismResponse
 
 
 def answer_of(
     serial: str, version: int, recording: int, found: Criticism, experiments: list[dict[str, Any]]
-) -> CriticismAnswer:
+) -> CriticismResponse:
     """Return the answer of a criticism."""
     verdict, base = found.verdict, found.base
-    return CriticismAnswer(
+    return CriticismResponse(
         serial=serial,
         version=version,
         recording=recording,

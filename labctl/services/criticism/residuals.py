@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from labctl.fitting import FitResult
-from labctl.fitting.criticism.reduction import Compressed
+from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.data.channels import Array, Channels
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.recording import Recording
 from labctl.services.schemas.answers import ResidualColumns
 
 
 def residual_columns(
-    data: Compressed, left: Mapping[str, Residuals], points: Recording, base: FitResult | None = None
+    data: ReducedRecording, left: Mapping[str, Residuals], points: Recording, base: FitResult | None = None
 ) -> ResidualColumns:
     """Return the rows of what a criticism left, axis by axis.
 
@@ -40,7 +40,7 @@ def residual_columns(
 
 
 def _of_fit(points: Recording, base: FitResult) -> ResidualColumns:
-    context = context_of(points)
+    context = fit_data_of(points)
     floor = base.error.noise_floor_dps
     channels = context.channels
     dataset = np.asarray(channels["dataset"], dtype=np.int64)

@@ -15,7 +15,7 @@ from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
 from instruments.interfaces.table import TableLimits
 from labctl.errors import BadBench
-from labctl.services.schemas.answers import PlanAnswer, Visibility
+from labctl.services.schemas.answers import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
@@ -115,15 +115,15 @@ def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tup
     return make_plan(recipe, limits_of(bench), clip=clip), bench
 
 
-def describe_plan(recipe: str, bench: str | None, *, clip: bool, look: Look | None = None) -> PlanAnswer:
+def describe_plan(recipe: str, bench: str | None, *, clip: bool, look: Look | None = None) -> PlanResponse:
     """Say what a campaign would do and how long it takes; `look` also says what it could find."""
     plan, bench_file = plan_for(recipe, bench, clip=clip)
     return plan_answer(plan, bench_file, look)
 
 
-def plan_answer(plan: Plan, bench_file: BenchFile, look: Look | None = None) -> PlanAnswer:
+def plan_answer(plan: Plan, bench_file: BenchFile, look: Look | None = None) -> PlanResponse:
     """Return a plan's figures; `look` also says what it could find."""
-    return PlanAnswer(
+    return PlanResponse(
         recipe=plan.recipe.name,
         bench=bench_file.name,
         steps=len(plan.steps),

@@ -19,7 +19,7 @@ from labctl.services.planning.loading import (
     plan_answer,
     recipe_document,
 )
-from labctl.services.schemas.answers import Answer, PlanAnswer
+from labctl.services.schemas.answers import PlanResponse, ResponseModel
 from labctl.services.simulation.walk import visibility
 from labctl.store import StepRow, Store
 from procedures.contracts.errors import PlanRefused
@@ -32,7 +32,7 @@ LONGEST_LOOK_S = 14 * 86_400.0
 StepState = Literal["to come", "running", "done", "failed", "interrupted", "skipped"]
 
 
-class RecipeAnswer(Answer):
+class RecipeResponse(ResponseModel):
     """A recipe that comes with labctl, and what it would take."""
 
     name: str
@@ -46,7 +46,7 @@ class RecipeAnswer(Answer):
     remark: str = Field(default="", description="What speaks against it although the bench can do it.")
 
 
-class TimelineColumns(Answer):
+class TimelineColumns(ResponseModel):
     """The steps of a plan in order, as lists of equal length."""
 
     number: list[int] = Field(description="From 1.")
@@ -59,7 +59,7 @@ class TimelineColumns(Answer):
     dataset: list[int | None]
 
 
-class PlannedAnswer(PlanAnswer):
+class PlannedResponse(PlanResponse):
     """What a campaign would do, with its steps."""
 
     timeline: TimelineColumns
@@ -74,7 +74,7 @@ class RunColumns(TimelineColumns):
     forecast_s: list[float] = Field(description="When it began, or will if all that is left takes as expected.")
 
 
-class CampaignPlanAnswer(Answer):
+class CampaignPlanResponse(ResponseModel):
     """The plan of a campaign, and how far it is."""
 
     campaign: int
@@ -89,12 +89,12 @@ class CampaignPlanAnswer(Answer):
     timeline: RunColumns
 
 
-def list_recipes(bench: BenchFile | None) -> list[RecipeAnswer]:
+def list_recipes(bench: BenchFile | None) -> list[RecipeResponse]:
     """Return the shipped recipes, each planned on a bench; without one on the simulated bench that fits it best."""
     return [_recipe(name, path.read_text(encoding="utf-8"), bench) for name, path in shipped_recipes().items()]
 
 
-def _recipe(name: str, text: str, bench: BenchFile | None) -> RecipeAnswer:
+def _recipe(name: str, text: str, bench: BenchFile | None) -> RecipeResponse:
     recipe = load_recipe(name)
     on = bench or load_bench(bench_for(recipe))
     remark = _lacking(recipe.positions, on)
@@ -104,8 +104,8 @@ def _recipe(name: str, text: str, bench: BenchFile | None) -> RecipeAnswer:
     try:
         plan = make_plan(recipe, limits_of(on))
     except PlanRefused as refused:
-        return RecipeAnswer(**said, refused=str(refused))
-    return RecipeAnswer(**said, steps=len(plan.steps), datasets=plan.datasets, expected_s=plan.expected_s)
+        return RecipeResponse(**said, refused=str(refused))
+    return RecipeResponse(**said, steps=len(plan.steps), datasets=plan.datasets, expected_s=plan.expected_s)
 
 
 def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
@@ -116,7 +116,7 @@ def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
     return ""
 
 
-def plan_steps(request: PlanRequest, bench: BenchFile | None) -> PlannedAnswer:
+def plan_steps(request: PlanRequest, bench: BenchFile | None) -> PlannedResponse:
     """Plan a recipe on a bench, or on the simulated one that fits it best.
 
     Raises RecipeError, PlanRefused, BadInput.
@@ -131,10 +131,10 @@ def plan_steps(request: PlanRequest, bench: BenchFile | None) -> PlannedAnswer:
         )
     answer = plan_answer(plan, on, visibility if request.visibility else None)
     columns = _columns([step.model_dump(mode="json") for step in plan.steps])
-    return PlannedAnswer(**answer.model_dump(), timeline=TimelineColumns(**columns))
+    return PlannedResponse(**answer.model_dump(), timeline=TimelineColumns(**columns))
 
 
-def campaign_plan(store: Store, campaign: int) -> CampaignPlanAnswer:
+def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
     """Return a campaign's steps as they were written down, with what became of each. Raises NotFound."""
     row = store.campaigns.get(campaign)
     steps = store.campaigns.steps(campaign)
@@ -146,7 +146,7 @@ def campaign_plan(store: Store, campaign: int) -> CampaignPlanAnswer:
         ended_s=[step.ended_s for step in steps],
         forecast_s=_forecast(steps),
     )
-    return CampaignPlanAnswer(
+    return CampaignPlanResponse(
         campaign=campaign, recipe=row.recipe_name, text=_text(row.recipe), bench=row.bench_name, state=row.state,
         schedule_hash=row.schedule_hash, steps=len(steps),
         datasets=sum(number is not None for number in columns["dataset"]), expected_s=row.expected_s,

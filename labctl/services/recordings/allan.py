@@ -13,15 +13,15 @@ from labctl.fitting.data.static_record import StaticRecord, static_record
 from labctl.fitting.numeric.allan import LEAST_READINGS, allan
 from labctl.recording import Recording, RecordingInfo
 from labctl.recording.points import temperature_of
-from labctl.services.cache import kept
-from labctl.services.schemas.answers import Answer
+from labctl.services.cache import cached
+from labctl.services.schemas.answers import ResponseModel
 from labctl.store import Store
 
 #: What a static record is looked for in, beside the outputs.
 NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "temperature_c", "chamber_c", "valid")
 
 
-class AllanAnswer(Answer):
+class AllanResponse(ResponseModel):
     """An overlapping Allan deviation, axis by axis, and the figures of IEEE Std 952 that it shows."""
 
     recording: int
@@ -33,7 +33,7 @@ class AllanAnswer(Answer):
     )
 
 
-def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanAnswer:
+def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanResponse:
     """Return the Allan deviation of a data set, or of the longest stretch at rest and at one temperature.
 
     Raises NotFound, BadInput for a recording without readings, NotEnoughData.
@@ -43,14 +43,14 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanAnswer
         raise BadInput(f"recording {recording} holds {head.kind}: an Allan deviation needs the readings themselves")
     info = RecordingInfo.model_validate(head.info)
 
-    def work() -> AllanAnswer:
+    def work() -> AllanResponse:
         if dataset is None:
-            return AllanAnswer(recording=recording, **_at_rest(store, recording, info).to_json())
+            return AllanResponse(recording=recording, **_at_rest(store, recording, info).to_json())
         columns = store.recordings.dataset(recording, dataset)
-        return AllanAnswer(recording=recording, **_of_set(Recording(info, columns), dataset).to_json())
+        return AllanResponse(recording=recording, **_of_set(Recording(info, columns), dataset).to_json())
 
     question = {"recording": recording, "readings": store.recordings.fingerprint(recording), "dataset": dataset}
-    return kept(AllanAnswer, question, work)
+    return cached(AllanResponse, question, work)
 
 
 def _of_set(recording: Recording, dataset: int) -> StaticRecord:

@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import Field
 
 from labctl.recording import Recording
-from labctl.services.schemas.answers import Answer
+from labctl.services.schemas.answers import ResponseModel
 from labctl.store import MeanRow, RecordingRow, Store
 
 
-class RecordingAnswer(Answer):
+class RecordingResponse(ResponseModel):
     """One line of the list of recordings."""
 
     id: int
@@ -26,14 +26,14 @@ class RecordingAnswer(Answer):
     notes: str = ""
 
 
-class ChannelColumns(Answer):
+class ChannelColumns(ResponseModel):
     """A channel's figures by data set, in the channel's unit; null: none."""
 
     mean: list[float | None]
     std: list[float | None]
 
 
-class DataSetsAnswer(Answer):
+class DataSetsResponse(ResponseModel):
     """The data sets of a recording, as lists of equal length."""
 
     recording: int
@@ -53,19 +53,19 @@ class DataSetsAnswer(Answer):
     channels: dict[str, ChannelColumns]
 
 
-def list_recordings(store: Store) -> list[RecordingAnswer]:
+def list_recordings(store: Store) -> list[RecordingResponse]:
     """Return every recording, newest first."""
     return [_line(row) for row in store.recordings.all()]
 
 
-def _line(row: RecordingRow) -> RecordingAnswer:
-    return RecordingAnswer(
+def _line(row: RecordingRow) -> RecordingResponse:
+    return RecordingResponse(
         id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
         readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
     )  # fmt: skip
 
 
-def data_sets(store: Store, recording: int) -> DataSetsAnswer:
+def data_sets(store: Store, recording: int) -> DataSetsResponse:
     """Return the data sets of a recording as columns; none for a table of coefficients. Raises NotFound."""
     head = store.recordings.get(recording)
     rows = store.recordings.data_sets(recording)
@@ -74,7 +74,7 @@ def data_sets(store: Store, recording: int) -> DataSetsAnswer:
         channels = _of_rows(numbers, store.recordings.means(recording))
     else:
         channels = _of_table(numbers, store.recordings.points(recording)) if rows else {}
-    return DataSetsAnswer(
+    return DataSetsResponse(
         recording=recording,
         number=numbers,
         state=[row.state for row in rows],

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
-from labctl.services.cache import code_digest, one_at_a_time, write_kept
+from labctl.services.cache import code_digest, single_flight, write_cached
 from labctl.store import Store
 
 #: Bins of a data set: so many, or one for this many readings where it is far longer than others, up to a limit.
@@ -62,14 +62,14 @@ def envelope_of(store: Store, recording: int, channel: str) -> Envelope:
     file = user_cache_path("labctl") / "envelopes" / f"{name}.npz"
     if (found := _read(file)) is not None:
         return found
-    with one_at_a_time(asked):
+    with single_flight(asked):
         if (found := _read(file)) is not None:
             return found
         made = _made(store, recording, channel)
         packed = io.BytesIO()
         np.savez(packed, t_s=made.t_s, bounds=np.stack([made.low, made.high, made.mean, made.n]).astype(np.float32))
         with suppress(OSError):
-            write_kept(file, packed.getvalue(), MOST_FILES)
+            write_cached(file, packed.getvalue(), MOST_FILES)
     packed.seek(0)
     return _taken(packed)
 

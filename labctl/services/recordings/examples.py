@@ -11,12 +11,12 @@ from pydantic import Field
 from labctl.errors import BadInput
 from labctl.services.commands.protocol import SimulatedRequest
 from labctl.services.recordings.transfer import suggested_model
-from labctl.services.schemas.answers import Imported
+from labctl.services.schemas.answers import ImportResponse
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from labctl.store import Store
 
 
-class SimulatedRecording(Imported):
+class SimulatedRecordingResponse(ImportResponse):
     """A simulated recording that is now in the database."""
 
     recipe: str
@@ -39,14 +39,14 @@ def example(name: str) -> Path:
     return known[name]
 
 
-def add_simulated(store: Store, request: SimulatedRequest, at: datetime) -> SimulatedRecording:
+def add_simulated(store: Store, request: SimulatedRequest, at: datetime) -> SimulatedRecordingResponse:
     """Make a recording in simulation and take it in. Raises BadInput, RecipeError, PlanRefused."""
     asked = SimulateRequest(recipe=request.recipe, hide=request.hide, seed=request.seed, clip=request.clip)
     made = make_recording(asked, request.serial)
     recipe, bench, hidden = made.plan.recipe.name, made.bench.name, dict(made.hidden)
     what = {"recipe": recipe, "bench": bench, "seed": request.seed, "hidden": hidden}
     number = store.recordings.add_import(made.recording, at, what)
-    return SimulatedRecording(
+    return SimulatedRecordingResponse(
         serial=made.recording.info.serial, recording=number, datasets=made.plan.datasets,
         readings=len(made.recording), suggested_model=suggested_model(made.recording.info), recipe=recipe,
         bench=bench, seed=request.seed, hidden=hidden,

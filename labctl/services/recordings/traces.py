@@ -13,14 +13,14 @@ from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
 from labctl.recording.columns import BY_NAME
 from labctl.services.recordings.envelopes import Array, Envelope, bins_of, courses_of, envelope_of
-from labctl.services.schemas.answers import Answer
+from labctl.services.schemas.answers import ResponseModel
 from labctl.store import DataSetRow, Store
 
 #: More readings than this are not read for one picture; their envelope is drawn.
 MOST_RAW = 2_000_000
 
 
-class TraceAnswer(Answer):
+class TraceResponse(ResponseModel):
     """One channel over a window of time, in bins that hold readings, as lists of equal length."""
 
     recording: int
@@ -39,7 +39,7 @@ class TraceAnswer(Answer):
 
 def trace(
     store: Store, recording: int, channel: str, from_s: float | None, until_s: float | None, points: int
-) -> TraceAnswer:
+) -> TraceResponse:
     """Return a channel in at most `points` bins; without a window over the whole recording.
 
     Raises NotFound, and BadInput for a channel that is not there, a window that is none, or means without times.
@@ -67,7 +67,7 @@ def trace(
         raw = _is_few(inside, low, high, points)
         found = _readings(store, recording, channel, inside) if raw else envelope_of(store, recording, channel)
     shown = _binned(found, low, high, points)
-    return TraceAnswer(
+    return TraceResponse(
         recording=recording, channel=channel, unit=_unit(info, channel), from_s=low, until_s=high, raw=raw,
         t_s=shown.t_s.tolist(), min=shown.low.tolist(), max=shown.high.tolist(), mean=shown.mean.tolist(),
         n=shown.n.astype(np.int64).tolist(), channels=sorted(known),

@@ -14,24 +14,24 @@ import numpy as np
 from labctl.errors import BadRecording, NotEnoughData, NotFound
 from labctl.recording import Recording, RecordingInfo, read_recording, write_recording
 from labctl.recording.points import with_pieces
-from labctl.services.schemas.answers import Imported
+from labctl.services.schemas.answers import ImportResponse
 from labctl.store import RecordingRow, Store
 
 if TYPE_CHECKING:
-    from labctl.services.commands.protocol import Acts
+    from labctl.services.commands.protocol import Commands
 
 STEMS = ("samples", "points", "coefficients", "environment")
 FILE_NAMES = frozenset({"recording.toml", *(f"{stem}.{suffix}" for stem in STEMS for suffix in ("csv", "parquet"))})
 
 
-def import_folder(store: Store, folder: Path, at: datetime) -> Imported:
+def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
     """Take in a recording from a folder; all of it or nothing. Raises BadRecording."""
     recording = read_recording(folder)
     number = store.recordings.add_import(recording, at)
     row = store.recordings.get(number)
     readings = row.readings if recording.info.kind == "samples" else len(recording)
     datasets = 0 if recording.info.kind == "coefficients" else row.datasets
-    return Imported(
+    return ImportResponse(
         serial=row.serial,
         recording=number,
         datasets=datasets,
@@ -47,7 +47,7 @@ def suggested_model(info: RecordingInfo) -> str:
     return "yang2018" if len(info.axes) > 1 else "ojeda2000"
 
 
-def import_files(acts: Acts, files: Sequence[tuple[str, BinaryIO]]) -> Imported:
+def import_files(commands: Commands, files: Sequence[tuple[str, BinaryIO]]) -> ImportResponse:
     """Take in a recording from uploaded files; their names may only be the format's. Raises BadRecording."""
     names = [name for name, _ in files]
     for name in names:
@@ -60,7 +60,7 @@ def import_files(acts: Acts, files: Sequence[tuple[str, BinaryIO]]) -> Imported:
             with (Path(folder) / name).open("wb") as target:
                 shutil.copyfileobj(content, target)
         try:
-            return acts.import_recording(Path(folder))
+            return commands.import_recording(Path(folder))
         except BadRecording as error:
             raise BadRecording(str(error).replace(f"{folder}/", "")) from None
 

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from labctl.errors import NotCertified
-from labctl.services.schemas.answers import UnitAnswer
+from labctl.services.schemas.answers import UnitResponse
 from labctl.store import Store, Unit
 
 
-def list_units(store: Store) -> list[UnitAnswer]:
+def list_units(store: Store) -> list[UnitResponse]:
     """Return every unit."""
     return [_answer(store, found) for found in store.units.all()]
 
 
-def unit(store: Store, serial: str) -> UnitAnswer:
+def unit(store: Store, serial: str) -> UnitResponse:
     """Return one unit; raises NotFound."""
     return _answer(store, store.units.get(serial))
 
 
-def _answer(store: Store, found: Unit) -> UnitAnswer:
+def _answer(store: Store, found: Unit) -> UnitResponse:
     try:
         certified = store.calibrations.certified_version(found.serial)
     except NotCertified:
         certified = None
-    return UnitAnswer(
+    return UnitResponse(
         serial=found.serial,
         model=found.model,
         technology=found.technology,

@@ -9,7 +9,7 @@ from labctl.errors import BadInput
 from labctl.services.commands.protocol import CampaignRequest
 from labctl.services.planning.loading import limits_of, load_recipe
 from labctl.services.schedule import times
-from labctl.services.schemas.answers import ScheduledAnswer, StartEventAnswer
+from labctl.services.schemas.answers import ScheduledResponse, StartEventResponse
 from labctl.store import NewStart, StartRow, Store
 from procedures.planning.plan import make_plan
 
@@ -30,7 +30,7 @@ def is_scheduled(request: CampaignRequest) -> bool:
     return False
 
 
-def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: datetime) -> ScheduledAnswer:
+def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: datetime) -> ScheduledResponse:
     """Enter a campaign into the schedule of a bench.
 
     What can be known now is refused now: raises BadInput for its time, RecipeError, PlanRefused.
@@ -56,30 +56,30 @@ def _has_zone(at: str | None) -> bool:
     return at == times.NOW or (at is not None and datetime.fromisoformat(at).tzinfo is not None)
 
 
-def list_starts(store: Store, *, ended: bool) -> list[ScheduledAnswer]:
+def list_starts(store: Store, *, ended: bool) -> list[ScheduledResponse]:
     """Return what waits to begin, next first; with `ended` also what is over."""
     return [_answer(store, row) for row in store.starts.all(ended=ended)]
 
 
-def start_status(store: Store, start: int) -> ScheduledAnswer:
+def start_status(store: Store, start: int) -> ScheduledResponse:
     """Return one entry of the schedule with what became of its starts. Raises NotFound."""
     return _answer(store, store.starts.get(start))
 
 
-def cancel_start(store: Store, start: int, now: datetime) -> ScheduledAnswer:
+def cancel_start(store: Store, start: int, now: datetime) -> ScheduledResponse:
     """Take an entry out of the schedule; a campaign that it has begun runs on. Raises NotFound, Conflict."""
     store.starts.cancel(start, now)
     return start_status(store, start)
 
 
-def _answer(store: Store, row: StartRow, note: str = "") -> ScheduledAnswer:
+def _answer(store: Store, row: StartRow, note: str = "") -> ScheduledResponse:
     zone = times.time_zone(row.time_zone)
-    return ScheduledAnswer(
+    return ScheduledResponse(
         id=row.id, bench=row.bench_name, recipe=row.recipe_name, state=row.state,
         due_at=row.due_at.astimezone(zone) if row.state == "waiting" else None, time_zone=row.time_zone, cron=row.cron,
         priority=row.priority, clip=row.clip, late_limit_s=row.late_limit_s, created_at=row.created_at, note=note,
         history=[
-            StartEventAnswer(
+            StartEventResponse(
                 at=event.at, due_at=event.due_at.astimezone(zone), outcome=event.outcome, message=event.message,
                 campaign=event.campaign,
             )

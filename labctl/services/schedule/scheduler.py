@@ -16,7 +16,7 @@ from instruments.errors import InstrumentError
 from labctl.errors import BenchBusy, LabctlError
 from labctl.services.commands.protocol import CampaignRequest
 from labctl.services.schedule import times
-from labctl.services.schemas.answers import CampaignAnswer
+from labctl.services.schemas.answers import CampaignResponse
 from labctl.store import StartEventRow, StartRow, Store
 from procedures.contracts.errors import ProcedureError
 
@@ -37,7 +37,7 @@ class Runs(Protocol):
         """Take up what was cut short, once that may be."""
         ...
 
-    def start(self, request: CampaignRequest) -> CampaignAnswer:
+    def start(self, request: CampaignRequest) -> CampaignResponse:
         """Begin a campaign."""
         ...
 

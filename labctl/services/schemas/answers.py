@@ -8,13 +8,13 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 
-class Answer(BaseModel):
+class ResponseModel(BaseModel):
     """A document that leaves the house; more keys may be added, none renamed."""
 
     model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="null")
 
 
-class Imported(Answer):
+class ImportResponse(ResponseModel):
     """A recording that is now in the database."""
 
     serial: str
@@ -24,7 +24,7 @@ class Imported(Answer):
     suggested_model: str = Field(default="bias_scale", description="A published model for such a recording.")
 
 
-class ModelAnswer(Answer):
+class ModelResponse(ResponseModel):
     """Which effects a calibration is made of."""
 
     name: str
@@ -34,7 +34,7 @@ class ModelAnswer(Answer):
     )
 
 
-class ErrorFigures(Answer):
+class ErrorFigures(ResponseModel):
     """Input-referred errors in deg/s, one value per data set and axis, root mean square over all."""
 
     raw_rms_dps: float | None = Field(description="Before any compensation.")
@@ -43,25 +43,25 @@ class ErrorFigures(Answer):
     noise_floor_dps: float | None = Field(description="Root of the mean variance of a data-set mean: white and drift.")
 
 
-class Validity(Answer):
+class Validity(ResponseModel):
     """Where the calibration was measured; outside it is extrapolation."""
 
     temperature_c: tuple[float, float]
     rate_dps: tuple[float, float]
 
 
-class FitAnswer(Answer):
+class FitResponse(ResponseModel):
     """A calibration version, as `labctl fit --json` and `POST .../calibrations` give it."""
 
     serial: str
     version: int
-    model: ModelAnswer
+    model: ModelResponse
     axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
     error: ErrorFigures
     validity: Validity
 
 
-class CriticismAnswer(Answer):
+class CriticismResponse(ResponseModel):
     """A model held against a recording: the verdict in one of five forms, and what it stands on."""
 
     serial: str
@@ -83,7 +83,7 @@ class CriticismAnswer(Answer):
     )
 
 
-class ResidualColumns(Answer):
+class ResidualColumns(ResponseModel):
     """One row per data set and axis, as lists of equal length. A data set far longer than the others is in pieces."""
 
     dataset: list[int] = Field(default_factory=list)
@@ -104,7 +104,7 @@ class ResidualColumns(Answer):
     over_floor: list[float | None] = Field(default_factory=list, description="Residual over floor, as in the map.")
 
 
-class ResidualsAnswer(Answer):
+class ResidualsResponse(ResponseModel):
     """What a version leaves of a recording."""
 
     serial: str
@@ -113,7 +113,7 @@ class ResidualsAnswer(Answer):
     columns: ResidualColumns
 
 
-class LadderRow(Answer):
+class LadderRow(ResponseModel):
     """One version of a unit's calibration, with its errors."""
 
     version: int
@@ -126,7 +126,7 @@ class LadderRow(Answer):
     noise_floor_dps: float | None
 
 
-class LadderAnswer(Answer):
+class LadderResponse(ResponseModel):
     """The error, version by version, oldest first."""
 
     serial: str
@@ -134,7 +134,7 @@ class LadderAnswer(Answer):
     noise_floor_dps: float | None
 
 
-class CalibrationRow(Answer):
+class CalibrationRow(ResponseModel):
     """One line of a unit's list of calibrations."""
 
     serial: str
@@ -148,7 +148,7 @@ class CalibrationRow(Answer):
     heldout_rms_dps: float | None = None
 
 
-class Certified(Answer):
+class CertificationResponse(ResponseModel):
     """A certification or its revocation."""
 
     serial: str
@@ -160,7 +160,7 @@ class Certified(Answer):
     due: datetime | None = None
 
 
-class VersionAnswer(FitAnswer):
+class VersionResponse(FitResponse):
     """A calibration version as it was made, and whether it is in force."""
 
     parent: int | None = None
@@ -169,10 +169,12 @@ class VersionAnswer(FitAnswer):
     hash: str
     in_force: bool
     due: datetime | None = Field(default=None, description="Until when it is in force as certified; null: no date.")
-    certification: Certified | None = Field(description="The newest act on this version; null: there was none.")
+    certification: CertificationResponse | None = Field(
+        description="The newest act on this version; null: there was none."
+    )
 
 
-class UnitAnswer(Answer):
+class UnitResponse(ResponseModel):
     """Who a unit is and what is known of it."""
 
     serial: str
@@ -183,7 +185,7 @@ class UnitAnswer(Answer):
     certified_version: int | None
 
 
-class Visibility(Answer):
+class Visibility(ResponseModel):
     """Whether a schedule could show an effect, and from which size on."""
 
     effect: str
@@ -196,7 +198,7 @@ class Visibility(Answer):
     experiment: str = ""
 
 
-class PlanAnswer(Answer):
+class PlanResponse(ResponseModel):
     """What a campaign would do, before anything moves."""
 
     recipe: str
@@ -209,7 +211,7 @@ class PlanAnswer(Answer):
     visibility: list[Visibility] | None = Field(default=None, description="What the plan could and could not find.")
 
 
-class PromptAnswer(Answer):
+class PromptResponse(ResponseModel):
     """A question to a person; an answer names its id."""
 
     id: str
@@ -218,7 +220,7 @@ class PromptAnswer(Answer):
     position: str | None = None
 
 
-class OutputAnswer(Answer):
+class OutputResponse(ResponseModel):
     """What one channel of a unit put out in the last moment, in the channel's unit."""
 
     gyro: str = Field(description="The unit's name on the bench.")
@@ -230,7 +232,7 @@ class OutputAnswer(Answer):
     t_s: float = Field(description="Time of the last reading since the campaign began.")
 
 
-class CampaignAnswer(Answer):
+class CampaignResponse(ResponseModel):
     """Where a campaign is."""
 
     id: int
@@ -248,10 +250,10 @@ class CampaignAnswer(Answer):
     setpoint_c: float | None = None
     gyro_c: float | None = None
     rate_dps: float | None = None
-    outputs: list[OutputAnswer] = Field(default_factory=list, description="Of a campaign that runs here, now.")
+    outputs: list[OutputResponse] = Field(default_factory=list, description="Of a campaign that runs here, now.")
     last_error: str | None = None
     wish: Literal["pause", "abort"] | None = Field(default=None, description="Asked for, and not yet taken up.")
-    prompt: PromptAnswer | None = Field(default=None, description="The question that waits for a person.")
+    prompt: PromptResponse | None = Field(default=None, description="The question that waits for a person.")
     links: dict[str, str] = Field(default_factory=dict, description="Instruments that are degraded or lost.")
     dropped: dict[str, str] = Field(default_factory=dict, description="Units that take no further part: name -> why.")
     abandoned: bool = Field(default=False, description="No process runs it any more, and it has no end.")
@@ -260,7 +262,7 @@ class CampaignAnswer(Answer):
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
 
 
-class EventAnswer(Answer):
+class EventResponse(ResponseModel):
     """Something that happened in a campaign."""
 
     id: int
@@ -271,7 +273,7 @@ class EventAnswer(Answer):
     message: str
 
 
-class BenchStatus(Answer):
+class BenchStatus(ResponseModel):
     """A bench, and what its last safe state could not confirm."""
 
     name: str
@@ -283,7 +285,7 @@ class BenchStatus(Answer):
     )
 
 
-class StartEventAnswer(Answer):
+class StartEventResponse(ResponseModel):
     """What became of one start that fell due."""
 
     at: datetime
@@ -293,7 +295,7 @@ class StartEventAnswer(Answer):
     campaign: int | None = None
 
 
-class ScheduledAnswer(Answer):
+class ScheduledResponse(ResponseModel):
     """A campaign that is to begin later."""
 
     id: int
@@ -308,10 +310,10 @@ class ScheduledAnswer(Answer):
     late_limit_s: float | None
     created_at: datetime
     note: str = ""
-    history: list[StartEventAnswer] = Field(default_factory=list)
+    history: list[StartEventResponse] = Field(default_factory=list)
 
 
-class DeviceCheck(Answer):
+class DeviceCheck(ResponseModel):
     """What one instrument of a bench answered."""
 
     device: str

@@ -24,7 +24,7 @@ from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo, write_recording
 from labctl.services.commands.protocol import Request
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
-from labctl.services.schemas.answers import Answer
+from labctl.services.schemas.answers import ResponseModel
 from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn
 from procedures.planning.plan import Plan, make_plan
 
@@ -44,7 +44,7 @@ class SimulateRequest(Request):
     clip: bool = False
 
 
-class Simulated(Answer):
+class SimulateResponse(ResponseModel):
     """What was made."""
 
     serial: str
@@ -64,11 +64,11 @@ class Made:
     hidden: Mapping[str, float]  #: effect id -> size that was hidden
 
 
-def simulate_recording(request: SimulateRequest, out: Path, file_format: Literal["parquet", "csv"]) -> Simulated:
+def simulate_recording(request: SimulateRequest, out: Path, file_format: Literal["parquet", "csv"]) -> SimulateResponse:
     """Simulate a campaign and write its recording to a new folder. Raises BadInput, RecipeError, PlanRefused."""
     made = make_recording(request)
     write_recording(made.recording, out, file_format)
-    return Simulated(
+    return SimulateResponse(
         serial=made.recording.info.serial, datasets=made.plan.datasets, readings=len(made.recording),
         hidden=dict(made.hidden), folder=str(out),
     )  # fmt: skip
@@ -133,7 +133,7 @@ def hidden_sizes(texts: list[str]) -> dict[str, float]:
     return sizes
 
 
-def hiding(bench: BenchFile, texts: list[str]) -> BenchFile:
+def with_hidden_effects(bench: BenchFile, texts: list[str]) -> BenchFile:
     """Return a simulated bench with effects hidden in its units, `EFFECT` or `EFFECT=SIZE`. Raises BadInput."""
     if not texts:
         return bench

@@ -11,11 +11,11 @@ import numpy as np
 
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
 from labctl.errors import BadInput
-from labctl.fitting.criticism.evidence import schur
+from labctl.fitting.criticism.evidence import eliminate_base
 from labctl.fitting.criticism.model_comparison import design_of
 from labctl.fitting.criticism.noise_grid import USUAL_DPS, Noise
-from labctl.fitting.criticism.reduction import Compressed, compress
-from labctl.fitting.data.fit_data import context_of
+from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording
@@ -38,7 +38,7 @@ def hidden_recording(
 
 def usual_model(recording: Recording) -> ErrorModel:
     """Return the published model that fits a recording's axes: what a size is measured beside."""
-    context = context_of(recording)
+    context = fit_data_of(recording)
     name = "yang2018" if len(recording.info.axes) > 1 and context.levels is not None else "ojeda2000"
     model, _ = preset_for(name, []).build(context)
     return changed(model).build(context)[0]
@@ -50,7 +50,7 @@ class Sizing:
     def __init__(self, plan: Plan, bench: BenchFile, gyro: GyroSettings) -> None:
         self._plan, self._bench, self._gyro = plan, bench, gyro
         self._plain = hidden_recording(plan, bench, gyro, SEED, {})
-        self._data = compress(self._plain, outliers=False)
+        self._data = reduce_recording(self._plain, outliers=False)
         model = usual_model(self._plain)
         designs = {axis: design_of(self._data, model, axis, {}) for axis in map(str, self._data.info.axes)}
         self._designs = {axis: replace(design, options=[]) for axis, design in designs.items()}
@@ -60,7 +60,7 @@ class Sizing:
     def z_of(self, effect: str, size: float) -> tuple[float, float]:
         """Return (z, the share of the effect that the model cannot absorb) of a hidden effect of this size."""
         recording = hidden_recording(self._plan, self._bench, self._gyro, SEED, {effect: size})
-        other = compress(recording, outliers=False)
+        other = reduce_recording(recording, outliers=False)
         best = (0.0, 0.0)
         for axis, design in self._designs.items():
             difference = other.output[axis] - self._data.output[axis]
@@ -70,12 +70,12 @@ class Sizing:
         return best
 
     def _norm(self, base: np.ndarray, precision: np.ndarray, difference: np.ndarray, axis: str) -> float:
-        data: Compressed = self._data
+        data: ReducedRecording = self._data
         assert data.white_var is not None
         white = data.white_var[axis]
         scale = np.repeat(np.sqrt(white)[None, :], len(difference), axis=0)
         design = replace(self._designs[axis], base=base, precision=precision)
-        return max(schur(design, difference, white, scale, [Noise(self._drift, 0.0, 0.0)])[0].chi2, 0.0)
+        return max(eliminate_base(design, difference, white, scale, [Noise(self._drift, 0.0, 0.0)])[0].chi2, 0.0)
 
     def size_of(self, effect: str, z: float, start: float) -> float:
         """Return the size that gives z. Raises BadInput where no size does."""

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from instruments.bench_config import BenchFile
 from labctl.fitting.criticism.candidates import Option, untestable_channels
 from labctl.fitting.criticism.criticise import LEAST_VISIBLE
-from labctl.fitting.criticism.evidence import Design, Schur, schur, slices_of, visible_share
+from labctl.fitting.criticism.evidence import Design, EliminatedBase, eliminate_base, slices_of, visible_share
 from labctl.fitting.criticism.model_comparison import design_of
 from labctl.fitting.criticism.noise_grid import USUAL_DPS, Noise
-from labctl.fitting.criticism.reduction import Compressed, compress
+from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.effects import CATALOGUE
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.services.schemas.answers import Visibility
@@ -31,9 +31,9 @@ SEED = 1
 class Schedule:
     """A plan walked through in the simulated world, beside a model: everything but the output."""
 
-    data: Compressed
+    data: ReducedRecording
     designs: dict[str, Design]
-    left: dict[str, Schur]
+    left: dict[str, EliminatedBase]
     slices: dict[str, list[slice]]
 
     def options(self, axis: str) -> list[tuple[Option, slice]]:
@@ -45,7 +45,7 @@ def walk(plan: Plan, bench: BenchFile, model: ErrorModel | None = None) -> Sched
     """Walk through a plan; `model` (default: the published one for such a recording) is what effects stand beside."""
     gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": WALK_HZ})
     recording = hidden_recording(plan, bench, gyro, SEED, {})
-    data = compress(recording, outliers=False)
+    data = reduce_recording(recording, outliers=False)
     beside = model or usual_model(recording)
     stability = data.info.datasheet.get("bias_stability_dps")
     drift = Noise(stability / 2 if stability else USUAL_DPS.get(data.info.technology or "", 0.002), 0.0, 0.0)
@@ -57,7 +57,7 @@ def walk(plan: Plan, bench: BenchFile, model: ErrorModel | None = None) -> Sched
         scale = np.repeat(np.sqrt(white)[None, :], len(data.present), axis=0)
         nothing: NDArray[np.float64] = np.zeros(data.present.shape)
         designs[axis] = design
-        left[axis] = schur(design, nothing, white, scale, [drift])[0]
+        left[axis] = eliminate_base(design, nothing, white, scale, [drift])[0]
         slices[axis] = slices_of(design.options)
     return Schedule(data, designs, left, slices)
 

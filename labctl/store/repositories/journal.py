@@ -32,7 +32,7 @@ from procedures.contracts.journal import (
     Event,
 )
 from procedures.contracts.steps import StepResult
-from procedures.execution.signals import afterwards
+from procedures.execution.signals import defer_signals
 
 #: Made once: a statement that is built anew for every second of a campaign costs more than writing it.
 _ADD_BLOCK = sa.insert(tables.sample_blocks)
@@ -60,7 +60,7 @@ class StoreJournal:
 
     @contextmanager
     def _writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
-        with afterwards(), self._database.writing(synced=synced) as connection:
+        with defer_signals(), self._database.writing(synced=synced) as connection:
             yield connection
 
     def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:

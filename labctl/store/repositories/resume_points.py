@@ -23,7 +23,7 @@ FINISHED = frozenset({"done", "skipped"})
 
 
 @dataclass(frozen=True)
-class Standing:
+class ResumePoint:
     """Where a campaign stands that no process runs."""
 
     start_at: int  #: the first step that has to be run
@@ -56,7 +56,7 @@ class Interruptions:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def standing(self, campaign: int) -> Standing:
+    def standing(self, campaign: int) -> ResumePoint:
         """Return where a campaign stands, from its rows alone."""
         c, s, r, d = tables.campaigns.c, tables.steps.c, tables.recordings.c, tables.data_sets.c
         with self._database.reading() as connection:
@@ -80,7 +80,7 @@ class Interruptions:
             step[0] for step in steps if step[1] not in FINISHED and step[2].get("dataset") in planned - {None}
         )
         left = [step[0] for step in steps if step[1] not in FINISHED and step[0] not in complete]
-        return Standing(
+        return ResumePoint(
             start_at=left[0] if left else len(steps),
             complete=complete,
             skipped=frozenset(step[0] for step in steps if step[1] == "skipped"),
@@ -119,7 +119,7 @@ class Interruptions:
         tries = sa.select(sa.func.count()).where(v.campaign_id == campaign, v.kind == "taken_up", v.t_s >= ended_s)
         return last(OWED) > last(PAID), int(connection.scalar(tries) or 0)
 
-    def take_up(self, campaign: int, standing: Standing, how: TakeUp) -> None:
+    def take_up(self, campaign: int, standing: ResumePoint, how: TakeUp) -> None:
         """Mark what the interruption left half done, and the campaign as running again. Safe to be cut short itself.
 
         Raises Conflict when it is done already.

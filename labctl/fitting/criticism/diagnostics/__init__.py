@@ -15,7 +15,7 @@ from labctl.fitting.criticism.diagnostics.channels import channel_lines, data_se
 from labctl.fitting.criticism.diagnostics.periodogram import between_sets
 from labctl.fitting.criticism.diagnostics.repeatability import legs, repeats
 from labctl.fitting.criticism.diagnostics.within_dataset import within_of
-from labctl.fitting.criticism.model_comparison import Weighed
+from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.effects import Effect
 from labctl.recording import Recording
@@ -27,7 +27,7 @@ __all__ = ["VIEWS", "draws_of", "views_of"]
 
 
 def views_of(
-    weighed: Weighed, left: Mapping[str, Residuals], recording: Recording, catalogue: Mapping[str, Effect]
+    weighed: Comparison, left: Mapping[str, Residuals], recording: Recording, catalogue: Mapping[str, Effect]
 ) -> dict[str, Any]:
     """Return all views of a criticism: lists of records, one or more for each axis, of plain numbers without NaN."""
     axes = [axis_view(weighed, axis, residuals) for axis, residuals in left.items()]

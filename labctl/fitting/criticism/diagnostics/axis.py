@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.model_comparison import Weighed
+from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.noise_grid import correlation, factors, whiten
-from labctl.fitting.criticism.reduction import Compressed
+from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.data.channels import Array
 
@@ -22,7 +22,7 @@ class AxisView:
     """One axis over m data sets, in the order in which they were measured."""
 
     axis: str
-    data: Compressed
+    data: ReducedRecording
     residual_dps: Array  #: (m,) of the means
     floor_dps: Array  #: (m,)
     covariance: NDArray[np.float64]  #: (m, m) of the means, (deg/s)^2
@@ -50,7 +50,7 @@ class AxisView:
         return np.asarray(self.data.nodes["position"]).reshape(len(self), -1)[:, 0].astype(np.str_)
 
 
-def axis_view(weighed: Weighed, axis: str, residuals: Residuals) -> AxisView:
+def axis_view(weighed: Comparison, axis: str, residuals: Residuals) -> AxisView:
     """Return one axis at the noise that its base finds likeliest."""
     design, noise = weighed.designs[axis], weighed.axes[axis].best.noise
     white = weighed.white_var[axis]

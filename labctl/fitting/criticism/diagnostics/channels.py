@@ -11,7 +11,7 @@ from scipy.special import ndtr
 
 from labctl.fitting.criticism.candidates import smooth_channels
 from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
-from labctl.fitting.criticism.reduction import Compressed
+from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.channels import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 
@@ -28,7 +28,7 @@ MOST_SETS = 300
 LEAST_FOR_RUNS = 12
 
 
-def data_sets(data: Compressed, axes: Sequence[AxisView]) -> dict[str, Any]:
+def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> dict[str, Any]:
     """Return the data sets one by one as columns of equal length: what was logged, and each axis' residual."""
     if not axes:
         return {}
