@@ -11,7 +11,7 @@ demo: install
 	@$(BIN)/labctl demo
 
 test: $(VENV)/.tested
-	@scripts/need-machine
+	@scripts/install-test-dependencies
 	@$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: $(VENV)/.tested

@@ -10,6 +10,7 @@ import httpx
 import pytest
 
 from labctl.services.admin.api_keys import KeyRequest, Role
+from tests.helpers.paths import EXAMPLES
 from tests.web.conftest import Faults, Service
 from tests.web.test_pages import settled
 
@@ -60,7 +61,7 @@ def test_a_wrong_file_is_refused_with_the_place_of_the_fault(
 ) -> None:
     from playwright.sync_api import expect
 
-    source = Path(__file__).resolve().parents[2] / "examples" / "weiss-gyrostar"
+    source = EXAMPLES / "weiss-gyrostar"
     wrong = tmp_path / "wrong"
     wrong.mkdir()
     for file in source.iterdir():

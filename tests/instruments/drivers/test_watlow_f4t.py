@@ -1,0 +1,167 @@
+"""The F4T through its bytes: floats in two words, units, limits, modes, alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from instruments.drivers.watlow_f4t import ALARMS_EVERY_S
+from instruments.errors import LimitError, LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
+from instruments.interfaces.chamber import ChamberLimits
+
+pytest_plugins = ["tests.helpers.modbus_rig"]
+
+
+def test_making_the_driver_sends_nothing(f4t: Any) -> None:
+    assert f4t.tap.heard == []
+    assert f4t.ports.opened == []
+
+
+def test_it_says_what_it_is(f4t: Any) -> None:
+    assert f4t.driver.identify() == "Watlow F4T1A1A1A1A1A1A"
+
+
+def test_another_part_number_is_another_instrument(f4t: Any) -> None:
+    f4t.simulated.part_number[:3] = [ord(letter) for letter in "PM6"]
+    with pytest.raises(WrongInstrument, match="part number 'PM61A1A1A1A1A1A' is not an F4T's"):
+        f4t.driver.identify()
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "text"), [("units", 30, "units on Ethernet are 30"), ("status", 32, "status is 32")]
+)
+def test_fahrenheit_and_failure_are_refused(f4t: Any, attribute: str, value: int, text: str) -> None:
+    setattr(f4t.simulated, attribute, value)
+    with pytest.raises(WrongInstrument, match=f"chamber: .*{text}"):
+        f4t.driver.identify()
+
+
+def test_the_narrower_limits_count(make_rig: Callable[..., Any]) -> None:
+    rig = make_rig("f4t", min_c=-60, max_c=100)
+    rig.simulated.min_c, rig.simulated.max_c = -55.0, 180.0
+    assert rig.driver.limits == ChamberLimits(-55.0, 100.0, 0.1, 1.67)
+    with pytest.raises(LimitError, match=r"-55\.1 deg C lies outside -55 to 100 deg C"):
+        rig.driver.set_temperature_c(-55.1)
+    assert rig.simulated.writes == []
+
+
+@pytest.mark.parametrize(("asked_c", "set_c"), [(85.1, 85.1), (0.3, 0.3), (-0.05, 0.0), (-22.14, -22.1), (40, 40.0)])
+@pytest.mark.parametrize("word_order", ["little", "big"])
+def test_set_points_are_rounded_and_read_back(
+    make_rig: Callable[..., Any], word_order: str, asked_c: float, set_c: float
+) -> None:
+    rig = make_rig("f4t", word_order=word_order)
+    assert rig.driver.set_temperature_c(asked_c) == set_c
+    assert rig.driver.read().setpoint_c == set_c
+    assert rig.simulated.setpoint_c == pytest.approx(set_c, abs=1e-5)
+
+
+def test_a_set_point_is_written_on_change_only(f4t: Any) -> None:
+    for temperature_c in (25.0, 85.1, 85.1, 85.14, 85.1):
+        f4t.driver.set_temperature_c(temperature_c)
+    assert f4t.simulated.writes == [pytest.approx(85.1)]
+
+
+def test_a_set_point_that_reads_back_otherwise_is_an_error(f4t: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    f4t.driver.identify()
+    f4t.simulated._cells[2782] = f4t.simulated._cells[2782].__class__(
+        f4t.simulated._cells[2782].get, lambda _words, _t_s: True, words=2
+    )
+    with pytest.raises(RequestRejected, match="40 deg C was written but 25 deg C read back"):
+        f4t.driver.set_temperature_c(40.0)
+
+
+def test_words_in_another_order_are_seen_at_once(make_rig: Callable[..., Any]) -> None:
+    rig = make_rig("f4t", word_order="big")
+    rig.driver._registers._word_order = "little"
+    rig.simulated.setpoint_c = 36.6
+    with pytest.raises(MalformedReply, match="check the sensor, the word order"):
+        rig.driver.read()
+
+
+def test_the_chamber_follows(f4t: Any) -> None:
+    f4t.driver.set_temperature_c(15.0)
+    f4t.clock.sleep(3600)
+    state = f4t.driver.read()
+    assert (state.temperature_c, state.setpoint_c) == (pytest.approx(15.0, abs=0.3), 15.0)
+    assert state.t_s == f4t.clock.now_s()
+
+
+@pytest.mark.parametrize(("mode", "text"), [(62, "off"), (54, "manual"), (7, "7")])
+def test_control_that_is_switched_off_is_left_to_the_person(f4t: Any, mode: int, text: str) -> None:
+    f4t.simulated.control_mode = mode
+    with pytest.raises(RequestRejected, match=f"mode {text}, not auto"):
+        f4t.driver.set_temperature_c(40.0)
+    f4t.simulated.setpoint_c = 80.0
+    assert f4t.driver.make_safe() == 25.0
+    assert "control is not in auto" in f4t.driver.read().alarms
+
+
+@pytest.mark.parametrize("state", [149, 146])
+def test_a_profile_of_somebody_is_not_ended(f4t: Any, state: int) -> None:
+    f4t.simulated.profile_state = state
+    for act in (lambda: f4t.driver.set_temperature_c(40.0), f4t.driver.make_safe):
+        with pytest.raises(RequestRejected, match="a profile runs or is held"):
+            act()
+    assert f4t.simulated.profile_state == state
+
+
+def test_the_way_to_safety_ends_a_profile_that_came_later(f4t: Any) -> None:
+    f4t.driver.set_temperature_c(80.0)
+    f4t.simulated.profile_state = 149
+    assert f4t.driver.make_safe() == 25.0
+    assert f4t.simulated.profile_state not in {149, 146}
+
+
+def test_a_controller_without_profiles_needs_no_profile_register(f4t: Any) -> None:
+    del f4t.simulated._cells[16568]
+    assert f4t.driver.set_temperature_c(40.0) == 40.0
+
+
+def test_alarms_are_asked_for_at_first_and_then_twice_a_minute(f4t: Any) -> None:
+    assert f4t.driver.read().alarms == ()
+    f4t.simulated.alarms[2] = 8
+    f4t.clock.sleep(ALARMS_EVERY_S - 1)
+    assert f4t.driver.read().alarms == ()
+    f4t.clock.sleep(1)
+    assert f4t.driver.read().alarms == ("alarm 3",)
+    for quiet in (88, 61, 12):
+        f4t.simulated.alarms[2] = quiet
+        f4t.clock.sleep(ALARMS_EVERY_S)
+        assert f4t.driver.read().alarms == ()
+
+
+@pytest.mark.parametrize(
+    ("kind", "error"),
+    [("silence", NoReply), ("wrong_crc", MalformedReply), ("dropped_link", LinkError), ("merge", NoReply)],
+)
+def test_every_lasting_fault_names_the_chamber(f4t: Any, kind: Any, error: Any) -> None:
+    f4t.driver.identify()
+    f4t.faults.arm(kind)
+    with pytest.raises(error, match=r"^chamber: "):
+        f4t.driver.read()
+    assert f4t.clock.now_s() < 10
+    f4t.faults.clear()
+    assert f4t.driver.read().setpoint_c == 25.0
+
+
+@pytest.mark.parametrize("kind", ["silence", "wrong_crc", "noise", "split", "lost_reply", "dropped_link"])
+def test_every_passing_fault_is_survived(f4t: Any, kind: Any) -> None:
+    f4t.faults.arm(kind, count=2, value=2)
+    assert f4t.driver.set_temperature_c(40.0) == 40.0
+    assert f4t.simulated.setpoint_c == 40.0
+
+
+def test_an_exception_of_the_controller_is_a_refusal(f4t: Any) -> None:
+    f4t.faults.arm("modbus_exception", value=2, count=1)
+    with pytest.raises(RequestRejected, match=r"refused to read air temperature \(register 2820\): Modbus exception 2"):
+        f4t.driver.read()
+
+
+def test_closing_twice_is_fine(f4t: Any) -> None:
+    f4t.driver.identify()
+    f4t.driver.close()
+    f4t.driver.close()
+    assert f4t.driver.read().setpoint_c == 25.0

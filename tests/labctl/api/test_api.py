@@ -1,0 +1,188 @@
+"""HTTP: the same answers as the command line, problem documents, tags, and campaigns that can be followed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from instruments.clock import SystemClock, VirtualClock
+from labctl.api import create_app
+from labctl.services.app import LabService
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.planning.loading import load_bench
+from labctl.store import Store
+from labctl.store.connection.database import Database
+from tests.helpers.paths import EXAMPLES
+
+
+@pytest.fixture
+def client(tmp_path: Path) -> Iterator[TestClient]:
+    store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
+    runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
+    with TestClient(create_app(LabService(store, SystemClock(), runner))) as opened:
+        yield opened
+
+
+def upload(client: TestClient, folder: Path, **changed: bytes) -> object:
+    content = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix in {".toml", ".csv"}}
+    content |= {name.replace("_", "."): data for name, data in changed.items()}
+    return client.post("/api/recordings", files=[("files", (name, data)) for name, data in content.items()])
+
+
+@pytest.fixture
+def fog(client: TestClient) -> TestClient:
+    assert upload(client, EXAMPLES / "osu-fog").status_code == 201  # type: ignore[attr-defined]
+    assert client.post("/api/units/OSU-FOG-2024/calibrations", json={"model": "ojeda2000"}).status_code == 201
+    return client
+
+
+def test_it_is_well(client: TestClient) -> None:
+    body = client.get("/health").json()
+    assert body["status"] == "ok"
+    assert body["bench"]["name"] == "single-axis-sim"
+    assert "labctl_units 0.0" in client.get("/metrics").text
+    assert client.get("/openapi.json").json()["info"]["title"] == "labctl"
+
+
+def test_uncertainty_criticism_improve_and_ladder(fog: TestClient) -> None:
+    path = "/api/units/OSU-FOG-2024/calibrations/1"
+    here = fog.get(f"{path}/uncertainty", params={"rate_dps": 50, "temperature_c": 40}).json()
+    assert here["inside"] is True
+    assert 0 < here["axes"]["z"]["combined_dps"] < here["axes"]["z"]["expanded_dps"] < 0.5
+    assert fog.get(f"{path}/uncertainty", params={"rate_dps": 50, "temperature_c": 400}).json()["inside"] is False
+    assert fog.get(f"{path}/uncertainty", params={"rate_dps": "nan", "temperature_c": 40}).status_code == 400
+    criticism = fog.get(f"{path}/criticism").json()
+    assert criticism["verdict"] in {"adequate", "missing", "ambiguous", "unexplained"}
+    assert set(criticism["error"]) >= {"rms_dps", "noise_floor_dps", "explained"}
+    better = fog.post(f"{path}/improve", json={"add": ["scale_factor_asymmetry"]})
+    assert better.status_code == 201
+    assert (better.json()["version"], better.json()["parent"]) == (2, 1)
+    steps = fog.get("/api/units/OSU-FOG-2024/ladder").json()["steps"]
+    assert [step["version"] for step in steps] == [1, 2]
+    assert better.json()["error"]["rms_dps"] < better.json()["before"]["rms_dps"]  # both in the forward form
+    formula = fog.get(f"{path}/criticism", params={"formula": "odd: __import__('os')"})
+    assert formula.status_code == 400
+    assert formula.headers["content-type"] == "application/problem+json"
+
+
+def test_import_fit_certify_fetch(fog: TestClient) -> None:
+    unit = fog.get("/api/units/OSU-FOG-2024").json()
+    assert unit["calibrations"] == [1]
+    assert unit["certified_version"] is None
+    refused = fog.get("/api/units/OSU-FOG-2024/calibration")
+    assert refused.status_code == 404
+    assert refused.headers["content-type"] == "application/problem+json"
+    assert refused.json()["type"].endswith("not-certified")
+    fog.post("/api/units/OSU-FOG-2024/calibrations/1/certify", json={"by": "A", "reason": "fits", "due_days": 365})
+    got = fog.get("/api/units/OSU-FOG-2024/calibration")
+    assert got.status_code == 200
+    tag = got.headers["etag"]
+    assert tag == f'"{got.json()["hash"]}"'
+    assert fog.get("/api/units/OSU-FOG-2024/calibration", headers={"If-None-Match": tag}).status_code == 304
+    header = fog.get("/api/units/OSU-FOG-2024/calibration", params={"format": "c", "version": 1})
+    assert header.text.startswith("/* Calibration of gyro OSU-FOG-2024")
+    assert header.headers["etag"] != tag
+    rows = fog.get("/api/units/OSU-FOG-2024/calibrations").json()
+    assert [(row["version"], row["certified"]) for row in rows] == [(1, True)]
+    fog.post("/api/units/OSU-FOG-2024/calibrations/1/revoke", json={"by": "A", "reason": "dropped"})
+    assert fog.get("/api/units/OSU-FOG-2024/calibration").status_code == 404
+
+
+def test_the_fit_is_the_command_lines(fog: TestClient) -> None:
+    answer = fog.post("/api/units/OSU-FOG-2024/calibrations", json={"effects": ["bias", "scale_factor"]}).json()
+    assert answer["version"] == 2
+    expected = {"name": "custom", "effects": ["bias", "scale_factor"], "argument": "rate"}
+    assert answer["model"].items() >= expected.items()
+    assert set(answer["axes"]["z"]["coefficients"]) == {"bias", "scale_factor"}
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body", "status", "slug"),
+    [
+        ("get", "/api/units/NOBODY", None, 404, "not-found"),
+        ("get", "/api/recordings/9", None, 404, "not-found"),
+        ("get", "/api/campaigns/9", None, 404, "not-found"),
+        ("get", "/api/campaigns/9/events", None, 404, "not-found"),
+        ("get", "/api/nowhere", None, 404, "http-404"),
+        ("post", "/api/units/NOBODY/calibrations", {"model": "ojeda2000"}, 404, "not-found"),
+        ("post", "/api/units/OSU-FOG-2024/calibrations", {"model": "x"}, 400, "bad-input"),
+        ("post", "/api/units/OSU-FOG-2024/calibrations", {"modell": "x"}, 422, "bad-request"),
+        ("post", "/api/units/OSU-FOG-2024/calibrations/1/revoke", {"by": "A", "reason": "B"}, 409, "conflict"),
+        ("get", "/api/units/OSU-FOG-2024/calibration?version=1&format=pdf", None, 400, "bad-input"),
+        ("post", "/api/campaigns", {"recipe": "no-such"}, 400, "recipe"),
+        ("post", "/api/campaigns", {"recipe": "table1-x-table2"}, 400, "plan-refused"),
+    ],
+)
+def test_errors_are_problem_documents(
+    fog: TestClient, method: str, path: str, body: object, status: int, slug: str
+) -> None:
+    answer = fog.request(method, path, json=body)
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem = answer.json()
+    assert problem["type"] == f"urn:labctl:problem:{slug}"
+    assert problem["status"] == status
+    assert problem["detail"]
+
+
+def test_a_bad_upload_leaves_nothing(client: TestClient) -> None:
+    answer = upload(client, EXAMPLES / "osu-fog", points_csv=b"dataset,table_rate_dps\n1,x\n")
+    assert answer.status_code == 400  # type: ignore[attr-defined]
+    assert answer.json()["detail"].startswith("points.csv: column")  # type: ignore[attr-defined]
+    assert client.get("/api/units").json() == []
+    evil = client.post("/api/recordings", files=[("files", ("../../evil.toml", b"x"))])
+    assert evil.status_code == 400
+
+
+def followed(client: TestClient, number: int, **headers: str) -> tuple[list[Any], list[Any]]:
+    """Return a campaign's events, which have ids, and the pictures of where it stood in between, which have none."""
+    with client.stream("GET", f"/api/campaigns/{number}/events", headers=headers) as stream:
+        messages = "\n".join(stream.iter_lines()).split("\n\n")
+    said = [dict(line.split(": ", 1) for line in message.splitlines()) for message in messages if "data: " in message]
+    events = [json.loads(each["data"]) for each in said if "id" in each]
+    return events, [json.loads(each["data"]) for each in said if each["event"] == "progress"]
+
+
+def test_a_campaign_runs_and_can_be_followed(client: TestClient) -> None:
+    started = client.post("/api/campaigns", json={"recipe": "short"}).json()
+    number = started["id"]
+    events, pictures = followed(client, number)
+    assert events[0]["message"].startswith("campaign running")
+    assert events[-1]["message"].startswith("campaign done")
+    resumed = events[1]["id"]
+    later, _ = followed(client, number, **{"Last-Event-ID": str(resumed)})
+    assert [event["id"] for event in later] == [event["id"] for event in events[2:]]
+    assert pictures[-1]["state"] == "done"
+    assert {"step", "progress", "expected_end", "chamber_c", "gyro_c", "rate_dps", "last_error"} <= set(pictures[0])
+    answer = client.get(f"/api/campaigns/{number}").json()
+    assert answer["state"] == "done"
+    assert answer["progress"] == 1.0
+    recording = answer["recordings"]["FOG-0001"]
+    shown = client.get(f"/api/recordings/{recording}/samples", params={"dataset": 1, "limit": 5}).json()
+    assert shown["readings"] >= 99
+    assert len(shown["columns"]["gyro_z"]) == 5
+
+
+def test_a_service_that_starts_again_says_what_was_left(tmp_path: Path) -> None:
+    location = str(tmp_path / "lab.sqlite")
+    from labctl.services.campaigns.execution import prepare
+
+    store = Store(Database(location, write=True))
+    prepare(store, "short", load_bench("single-axis-sim"), VirtualClock(), clip=False).bench.close()
+    with TestClient(create_app(LabService(store, SystemClock()))) as client:
+        answer = client.get("/api/campaigns").json()
+        assert (answer[0]["state"], answer[0]["abandoned"]) == ("planned", True)
+        assert "no process runs it any more" in answer[0]["reason"]
+    store = Store(Database(location, write=True))
+    runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
+    with TestClient(create_app(LabService(store, SystemClock(), runner))) as client:
+        events, _ = followed(client, 1)
+        assert "taken_up" in [event["kind"] for event in events]
+        assert client.get("/api/campaigns/1").json()["state"] == "done"
+        again = client.post("/api/campaigns/1/resume", json={"by": "Ada"})
+        assert (again.status_code, "cannot be finished twice" in again.json()["detail"]) == (409, True)

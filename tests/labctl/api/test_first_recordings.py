@@ -1,0 +1,126 @@
+"""HTTP: what a newcomer begins with in one press: an example, a simulated recording, a simulated campaign."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from instruments.clock import SystemClock, VirtualClock
+from labctl.api import create_app
+from labctl.services.app import LabService
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.execution import prepare
+from labctl.services.planning.loading import load_bench
+from labctl.services.recordings.examples import examples
+from labctl.services.simulation.recordings import with_hidden_effects
+from labctl.store import Store
+from labctl.store.connection.database import Database
+from tests.labctl.api.test_page_requests import client  # noqa: F401  a fixture
+
+HIDE = ["scale_factor_asymmetry=0.02"]
+
+
+def test_examples_come_with_the_package(client: TestClient) -> None:  # noqa: F811
+    assert set(examples()) == {"osu-fog", "weiss-gyrostar"}
+    assert all("labctl" in folder.parts[-3:] for folder in examples().values())
+    fog = client.post("/api/recordings/example", json={"name": "osu-fog"})
+    assert fog.status_code == 201
+    assert fog.json().items() >= {"serial": "OSU-FOG-2024", "datasets": 695, "suggested_model": "ojeda2000"}.items()
+    table = client.post("/api/recordings/example", json={"name": "weiss-gyrostar"}).json()
+    assert table["suggested_model"] == "weiss1995"
+    client.post("/api/units/WEISS-ENV05S/calibrations", json={"model": "weiss1995"})
+    for view in ("criticism", "residuals", "pictures"):
+        nothing = client.get(f"/api/units/WEISS-ENV05S/calibrations/1/{view}")
+        assert (nothing.status_code, "table of coefficients" in nothing.json()["detail"]) == (400, True)
+    assert client.get("/api/units/WEISS-ENV05S/calibrations/1/surface").status_code == 200
+    refused = client.post("/api/recordings/example", json={"name": "../.."})
+    assert (refused.status_code, "there are osu-fog, weiss-gyrostar" in refused.json()["detail"]) == (400, True)
+
+
+def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClient) -> None:  # noqa: F811
+    asked = {"recipe": "short", "hide": HIDE, "seed": 7, "serial": "HIDDEN-7"}
+    made = client.post("/api/recordings/simulated", json=asked)
+    assert made.status_code == 201, made.text
+    answer = made.json()
+    assert answer["hidden"] == {"scale_factor_asymmetry": 0.02}
+    assert (answer["serial"], answer["datasets"], answer["seed"], answer["recipe"]) == ("HIDDEN-7", 15, 7, "short")
+    (row,) = client.get("/api/recordings").json()
+    assert (row["serial"], row["readings"], row["campaign"]) == ("HIDDEN-7", answer["readings"], None)
+    assert "simulated: recipe short, seed 7" in row["notes"]
+    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
+    (act,) = store.audit.rows()
+    assert act.action == "simulate"
+    assert act.detail.items() >= {"hidden": answer["hidden"], "seed": 7, "serial": "HIDDEN-7"}.items()
+    plain = client.post("/api/recordings/simulated", json={**asked, "hide": [], "serial": "PLAIN-7"}).json()
+    with_it, without = asymmetry(client, answer["recording"]), asymmetry(client, plain["recording"])
+    assert abs(with_it - without) == pytest.approx(0.04, rel=0.1)
+
+
+def asymmetry(client: TestClient, recording: int) -> float:  # noqa: F811
+    """How much a scale factor differs between the two ways of turning (twice the effect), from the fastest rates."""
+    sets = client.get(f"/api/recordings/{recording}/datasets").json()
+    rate, gyro = np.array(sets["table_rate_dps"]), np.array(sets["channels"]["gyro_z"]["mean"])
+    rest = gyro[np.abs(rate) < 1].mean()
+    gain = [np.mean((gyro[np.abs(rate - at) < 1] - rest) / rate[np.abs(rate - at) < 1]) for at in (40.0, -40.0)]
+    return float(gain[0] - gain[1])
+
+
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ({"recipe": "short", "hide": ["gremlins"]}, "effect 'gremlins' cannot be hidden (there are"),
+        ({"recipe": "short", "hide": ["scale_factor_asymmetry=much"]}, "is not a finite number"),
+        ({"recipe": "/etc/passwd"}, "send its text, or one of"),
+    ],
+)
+def test_what_cannot_be_simulated_says_why(client: TestClient, body: dict[str, Any], says: str) -> None:  # noqa: F811
+    answer = client.post("/api/recordings/simulated", json=body)
+    assert (answer.status_code, says in answer.json()["detail"]) == (400, True), answer.text
+    assert client.get("/api/recordings").json() == []
+    assert client.post("/api/recordings/simulated", json={"recipe": "short", "serial": "../x"}).status_code == 422
+
+
+def run(client: TestClient, **body: Any) -> int:  # noqa: F811
+    """Run the short campaign to its end; returns its recording."""
+    number = client.post("/api/campaigns", json={"recipe": "short", **body}).json()["id"]
+    assert "campaign done" in client.get(f"/api/campaigns/{number}/events").text
+    return int(client.get(f"/api/campaigns/{number}").json()["recordings"]["FOG-0001"])
+
+
+def test_a_simulated_campaign_can_hide_an_effect(client: TestClient) -> None:  # noqa: F811
+    plain, hidden = run(client), run(client, hide=HIDE)
+    assert asymmetry(client, hidden) - asymmetry(client, plain) == pytest.approx(0.04, rel=0.1)
+    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
+    assert store.campaigns.get(1).bench["simulation"]["hidden"] == {}
+    assert store.campaigns.get(2).bench["simulation"]["hidden"] == {"scale_factor_asymmetry": 0.02}
+    starts = [row.detail for row in store.audit.rows() if row.action == "campaign start"]
+    assert [detail.get("hidden") for detail in starts] == [None, {"scale_factor_asymmetry": 0.02}]
+    later = client.post("/api/campaigns", json={"recipe": "short", "hide": HIDE, "at": "2199-01-01T00:00Z"})
+    assert (later.status_code, "begins now" in later.json()["detail"]) == (400, True)
+    wrong = client.post("/api/campaigns", json={"recipe": "short", "hide": ["gremlins"]})
+    assert (wrong.status_code, "cannot be hidden" in wrong.json()["detail"]) == (400, True)
+
+
+def test_nothing_is_hidden_in_a_real_unit(tmp_path: Path) -> None:
+    store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
+    runner = BenchRunner(store, load_bench("example-real"), VirtualClock)
+    with TestClient(create_app(LabService(store, SystemClock(), runner))) as real:
+        answer = real.post("/api/campaigns", json={"recipe": "short", "hide": HIDE})
+        assert answer.status_code == 400
+        assert "is not simulated here" in answer.json()["detail"]
+        assert real.get("/api/campaigns").json() == []
+
+
+def test_a_resumed_campaign_goes_on_with_the_same_units(tmp_path: Path) -> None:
+    store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
+    bench = load_bench("single-axis-sim")
+    prepare(
+        store, "short", with_hidden_effects(bench, HIDE), VirtualClock(), clip=False
+    ).bench.close()  # and the process dies
+    with TestClient(create_app(LabService(store, SystemClock(), BenchRunner(store, bench, VirtualClock)))) as again:
+        assert "campaign done" in again.get("/api/campaigns/1/events").text
+        assert asymmetry(again, 1) - asymmetry(again, run(again)) == pytest.approx(0.04, rel=0.1)

@@ -1,0 +1,96 @@
+"""HTTP: recipes and plans to look at before anything moves, and a campaign's steps while it runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from instruments.clock import VirtualClock
+from labctl.services.campaigns.execution import prepare
+from labctl.services.planning.planner import _forecast
+from labctl.store import StepRow, Store
+from procedures.recipe.recipe import shipped_recipes
+from tests.labctl.api.test_page_requests import client, ran  # noqa: F401  fixtures
+
+ENDLESS = """
+format = "labctl-recipe/1"
+name = "endless"
+temperatures_c = [25]
+rates_dps = [0, 10]
+positions = ["z"]
+repeats = 1000000000
+"""
+LONG = ENDLESS.replace("1000000000", "2").replace("positions", "warm_up_s = 9e6\npositions")
+
+
+def test_recipes_say_what_they_take_here_or_why_not(client: TestClient) -> None:  # noqa: F811
+    rows = {row["name"]: row for row in client.get("/api/recipes").json()}
+    assert set(rows) == set(shipped_recipes())
+    short = rows["short"]
+    assert (short["bench"], short["datasets"], short["refused"], short["remark"]) == ("single-axis-sim", 15, None, "")
+    assert short["expected_s"] > 1000
+    assert 'name = "short"' in short["text"]
+    assert short["description"].startswith("First try")
+    triaxial = rows["table1-x-table2"]
+    assert triaxial["expected_s"] is None
+    assert "beyond the" in triaxial["refused"]
+    assert "about x, y" in triaxial["remark"]
+
+
+def test_a_plan_can_be_drawn_before_anything_moves(client: TestClient) -> None:  # noqa: F811
+    plan = client.post("/api/plans", json={"recipe": "short"}).json()
+    line = plan["timeline"]
+    assert {len(values) for values in line.values()} == {plan["steps"]}
+    assert [number for number in line["dataset"] if number] == list(range(1, plan["datasets"] + 1))
+    assert line["start_s"][-1] + line["expected_s"][-1] == pytest.approx(plan["expected_s"])
+    first = line["kind"].index("acquire")
+    assert (line["temperature_c"][first], line["rate_dps"][first], line["position"][first]) == (24, -40, "z")
+    assert line["rate_dps"][first - 1] is None
+    assert plan["visibility"] is None
+    assert client.get("/api/campaigns").json() == []
+    seen = client.post("/api/plans", json={"recipe": "short", "visibility": True}).json()
+    assert "scale_factor_asymmetry" in {each["effect"] for each in seen["visibility"]}
+
+
+@pytest.mark.parametrize(
+    ("body", "slug", "says"),
+    [
+        ({"recipe": "/etc/passwd"}, "recipe", "send its text, or one of"),
+        ({"recipe": "table1-x-table2"}, "plan-refused", "beyond the"),
+        ({"recipe": ENDLESS}, "plan-refused", "where a campaign has at most 100000"),
+        ({"recipe": LONG, "visibility": True}, "bad-input", "visibility: the plan takes 104 days"),
+    ],
+)
+def test_what_cannot_be_planned_says_why(client: TestClient, body: dict[str, Any], slug: str, says: str) -> None:  # noqa: F811
+    answer = client.post("/api/plans", json=body)
+    assert answer.json()["type"] == f"urn:labctl:problem:{slug}"
+    assert says in answer.json()["detail"]
+
+
+def test_a_campaigns_steps_tell_what_became_of_them(ran: TestClient) -> None:  # noqa: F811
+    plan = ran.get("/api/campaigns/1/plan").json()
+    line = plan["timeline"]
+    assert {len(values) for values in line.values()} == {plan["steps"]}
+    assert (plan["state"], set(line["state"]), plan["datasets"]) == ("done", {"done"}, 15)
+    assert line["forecast_s"] == line["started_s"]
+    assert line["started_s"] == sorted(line["started_s"])
+    store: Store = ran.app.state.lab_service.store  # type: ignore[attr-defined]
+    bench = ran.app.state.lab_service.bench  # type: ignore[attr-defined]
+    prepare(store, "short", bench, VirtualClock(), clip=False).bench.close()
+    later = ran.get("/api/campaigns/2/plan").json()["timeline"]
+    assert set(later["state"]) == {"to come"}
+    assert later["forecast_s"] == pytest.approx(later["start_s"])
+    assert ran.get("/api/campaigns/3/plan").status_code == 404
+
+
+def test_what_is_to_come_is_moved_by_what_has_been() -> None:
+    def step(state: str, started_s: float | None, ended_s: float | None) -> StepRow:
+        return StepRow(0, "rest", {}, 10.0, state, started_s, ended_s, None)
+
+    steps = [
+        step("done", 0.0, 25.0), step("skipped", None, None), step("running", 25.0, None), step("planned", None, None),
+        step("planned", None, None),
+    ]  # fmt: skip
+    assert _forecast(steps) == [0.0, 25.0, 25.0, 35.0, 45.0]

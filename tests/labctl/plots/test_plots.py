@@ -1,0 +1,236 @@
+"""Figures carry the numbers of the criticism, and the report is one page that needs nothing else."""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import lru_cache
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from labctl.fitting.data.static_record import static_record
+from labctl.plots import Picture, pictures_of, report_html
+from labctl.plots.noise import ladder
+from labctl.plots.residual_maps import maps
+from labctl.recording import write_recording
+from labctl.services.criticism.report_text import answer_of
+from tests.labctl.cli.test_cli import Lab
+from tests.labctl.fitting.criticism.test_criticism import held, single_axis, three_axes
+from tests.labctl.fitting.criticism.test_diagnostics import cycled, views
+from tests.labctl.fitting.test_allan import with_record_at_rest
+
+LADDER = {
+    "serial": "S",
+    "noise_floor_dps": 0.002,
+    "steps": [
+        {"version": 1, "model": "bias_scale", "effects": ["bias"], "rms_dps": 0.05, "heldout_rms_dps": 0.06},
+        {"version": 2, "model": "bias_scale+", "effects": ["bias", "x"], "rms_dps": 0.004, "heldout_rms_dps": None},
+    ],
+}
+CELLS = ("dataset", "table_rate_dps", "temperature_c", "over_floor")
+#: Attributes with which a page reaches out.
+REACHING = {"src", "href", "srcset", "action", "data", "poster", "ping", "background", "manifest", "formaction"}
+
+
+@lru_cache(maxsize=1)
+def answer() -> dict[str, Any]:
+    found = held(single_axis(1, scale_factor_asymmetry=4e-4), full=True)
+    shown = answer_of("FOG-0001", 3, 7, found, []).model_dump(mode="json")
+    static = static_record(with_record_at_rest(30, 2e-3))
+    assert static is not None
+    return {**shown, "noise": {**shown["noise"], "static": static.to_json()}}
+
+
+def named(pictures: list[Picture]) -> dict[str, Picture]:
+    return {picture.id: picture for picture in pictures}
+
+
+def trace(picture: Picture, name: str) -> Any:
+    return next(t for t in picture.figure.data if t.name == name)
+
+
+def test_every_picture_has_a_title_a_caption_and_something_drawn() -> None:
+    found = named(pictures_of(answer(), LADDER))
+    assert list(found) == [
+        "map",
+        "channels",
+        "time",
+        "angle",
+        "frequency",
+        "time_in_set",
+        "previous_rate",
+        "allan",
+        "ladder",
+    ]
+    for picture in found.values():
+        assert picture.title
+        assert len(picture.caption) > 80
+        assert len(picture.figure.data) > 0
+    assert "scale_factor_asymmetry" in found["channels"].effects
+    assert found["angle"].effects == tuple(answer()["views"]["draws"]["angle"])
+
+
+def test_the_map_has_each_data_set_where_it_was_measured_and_dims_what_means_nothing() -> None:
+    figure = named(pictures_of(answer()))["map"].figure
+    cells, dimmed = figure.data
+    source = answer()["maps"][0]
+    rates, warm = [float(x) for x in cells.x], [float(y) for y in cells.y]
+    assert (len(rates), len(warm)) == (11, 11)
+    for k in (0, 37, 120):
+        column = min(range(11), key=lambda c: abs(rates[c] - source["table_rate_dps"][k]))
+        row = min(range(11), key=lambda r: abs(warm[r] - source["temperature_c"][k]))
+        score = source["over_floor"][k]
+        assert cells.z[row][column] == pytest.approx(score)
+        assert (dimmed.z[row][column] == 1) == (abs(score) < 2)
+        assert cells.customdata[row][column] == str(source["dataset"][k])
+
+
+def test_all_maps_share_one_scale() -> None:
+    found = three_axes(4)
+    from labctl.fitting.criticism.criticise import pictures as maps_of
+
+    shown = maps({"maps": maps_of(held(found, "yang2018", full=True))})
+    assert shown is not None
+    heat = [t for t in shown.data if t.showscale is None]
+    assert len(heat) == 9
+    assert {t.coloraxis for t in heat} == {"coloraxis"}
+    assert shown.layout.coloraxis.cmin == -shown.layout.coloraxis.cmax
+
+
+def test_lines_and_bands_are_those_of_the_views() -> None:
+    found = named(pictures_of(answer()))
+    line = next(line for line in answer()["views"]["channels"] if line["channel"] == "table_rate_dps")
+    figure = found["channels"].figure
+    drawn = [t for t in figure.data if t.name == "z" and list(t.x) == line["at"]]
+    assert [list(t.y) for t in drawn] == [line["mean_dps"]]
+    band = next(t for t in figure.data if t.fill == "toself" and list(t.x[: len(line["at"])]) == line["at"])
+    assert list(band.y) == [*line["high_dps"], *reversed(line["low_dps"])]
+    angle = answer()["views"]["angle"][0]
+    assert list(trace(found["angle"], "z").y) == angle["over_white"]
+    noise = answer()["noise"]["static"]["axes"]["z"]
+    points = trace(found["allan"], "z")
+    assert list(points.y) == noise["deviation_dps"]
+    assert [points.y[k] + points.error_y.array[k] for k in range(3)] == pytest.approx(noise["high_dps"][:3])
+
+
+def test_legs_and_repeats_are_drawn_where_there_are_any() -> None:
+    shown = {"views": views(cycled(0.01), None, ("bias", "scale_factor"))}
+    found = named(pictures_of(shown))
+    legs = shown["views"]["legs"][0]
+    assert list(trace(found["legs"], "z").y) == legs["mean_dps"]
+    assert list(trace(found["repeats"], "z").y) == shown["views"]["repeats"][0]["difference_dps"]
+    assert "thermal_hysteresis" in found["legs"].effects
+
+
+def test_the_ladder_falls_to_the_floor() -> None:
+    figure = ladder(LADDER)
+    assert figure is not None
+    own, held_out, floor = figure.data
+    assert list(own.y) == [0.05, 0.004]
+    assert list(held_out.y) == [0.06, None]
+    assert list(floor.y) == [0.002, 0.002]
+
+
+class Page(HTMLParser):
+    """Collects what a page reaches out to, its text, and its scripts by type."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.reaches: list[str] = []
+        self.order: list[str] = []
+        self.scripts: list[tuple[str, str]] = []
+        self._script: str | None = None
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.reaches += [f"{tag} {name}={value}" for name, value in attrs if name in REACHING]
+        self.reaches += [tag] if tag in {"link", "iframe", "img", "object", "embed", "base"} else []
+        self.order.append(given.get("class") or given.get("data-figure") or tag)
+        self._script = (given.get("type") or "code") if tag == "script" else None
+
+    def handle_data(self, data: str) -> None:
+        if self._script is not None:
+            self.scripts.append((self._script, data))
+            self._script = None
+
+
+def test_the_report_is_one_page_that_needs_no_network() -> None:
+    text = report_html(answer(), LADDER)
+    page = Page(text)
+    assert page.reaches == []
+    code = [script for kind, script in page.scripts if kind == "code"]
+    assert [len(script) > 1_000_000 for script in code] == [True, False]  # plotly.js once, and what draws
+    own = text.replace(code[0], "")
+    assert not re.search(r"https?://|url\(|@import|fetch\(", own)
+    data = [
+        json.loads(script, parse_constant=pytest.fail) for kind, script in page.scripts if kind == "application/json"
+    ]
+    assert len(data) == 9
+    assert all(figure["data"] for figure in data)
+
+
+def test_the_verdict_stands_before_the_pictures() -> None:
+    page = Page(report_html(answer(), LADDER))
+    assert page.order.index("verdict") < page.order.index("table") < page.order.index("numbers-map")
+    assert answer()["text"][0] in report_html(answer())
+
+
+def test_the_same_criticism_is_the_same_page() -> None:
+    assert report_html(answer(), LADDER) == report_html(answer(), LADDER)
+
+
+def bare(**more: Any) -> dict[str, Any]:
+    return {
+        "serial": "S</script>", "version": 1, "recording": 1, "text": ["Too little <data>."], "error": {},
+        "noise": {}, "suspects": [], "experiments": [], "not_testable": [], **more,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {},
+        {"views": {}, "maps": [], "noise": {"static": None}},
+        {"views": {"sets": {}, "channels": [], "time": [], "angle": [], "draws": {}}},
+        {"maps": [{"axis": "z", "position": "z", **{key: [] for key in CELLS}}]},
+    ],
+)  # fmt: skip
+def test_an_empty_criticism_has_no_pictures_and_a_page_all_the_same(more: dict[str, Any]) -> None:
+    assert pictures_of(bare(**more), {"steps": [], "noise_floor_dps": None}) == []
+    text = report_html(bare(**more))
+    assert "Too little &lt;data&gt;." in text
+    assert "</script>" not in text
+
+
+def test_a_map_of_one_data_set_is_drawn() -> None:
+    one = {"axis": "z", "position": "z", **dict(zip(CELLS, ([1], [0.0], [25.0], [-3.0]), strict=True))}
+    shown = maps({"maps": [one]})
+    assert shown is not None
+    assert list(shown.data[0].z[0]) == [-3.0]
+
+
+def test_what_is_in_the_numbers_cannot_end_the_script() -> None:
+    steps = {**LADDER, "steps": [{**LADDER["steps"][0], "model": "</script><b>"}]}
+    text = report_html(bare(), steps)
+    assert "</script><b>" not in text
+    (data,) = [json.loads(s) for kind, s in Page(text).scripts if kind == "application/json"]
+    assert data["data"][0]["x"] == ["1: </script><b>"]
+
+
+def test_the_command_writes_the_report(tmp_path: Path) -> None:
+    lab = Lab(tmp_path)
+    write_recording(single_axis(1), lab.folder / "in", "parquet")
+    lab.run("import", str(lab.folder / "in"))
+    lab.run("fit", "FOG-0001", "--model", "ojeda2000")
+    file = tmp_path / "report.html"
+    shown = lab.json("criticise", "FOG-0001", "--report", str(file))
+    assert shown["views"]["sets"]["of"] == 121
+    text = file.read_text(encoding="utf-8")
+    assert shown["text"][0] in text
+    assert 'data-figure="numbers-ladder"' in text
+    refused = lab.run("criticise", "FOG-0001", "--report", str(tmp_path / "no" / "where.html"), status=2)
+    assert "nothing was written" in refused.stderr

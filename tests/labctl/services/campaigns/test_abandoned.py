@@ -1,0 +1,369 @@
+"""What a campaign leaves that nobody takes up: its bench made safe, or said to be unsafe, and its end written."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sqlalchemy as sa
+from typer.testing import CliRunner
+
+from instruments.bench_config import BenchFile
+from instruments.clock import SystemClock, VirtualClock
+from instruments.errors import NoReply
+from labctl.api.server import ServeRequest, create_service
+from labctl.cli.app import app
+from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
+from labctl.services.app import LabService
+from labctl.services.campaigns import bench_runner, resume
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
+from labctl.services.campaigns.status import campaign_status, list_campaigns
+from labctl.services.commands.local import LocalCommands
+from labctl.services.commands.protocol import CampaignRequest
+from labctl.services.planning.loading import load_bench
+from labctl.services.recordings.transfer import newest_recording
+from labctl.store import Store, open_store
+from labctl.store.connection.database import Database
+from procedures.contracts.control import Control
+from procedures.contracts.journal import NOT_SAFE, CampaignState, Event
+from procedures.execution.signals import defer_signals
+
+BENCH = load_bench("single-axis-sim")
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as opened:
+        yield opened
+
+
+@pytest.fixture
+def real(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the bench be one that outlives the process that drove it."""
+    monkeypatch.setattr(BenchFile, "is_simulated", property(lambda _: False))
+
+
+def left_running(store: Store) -> int:
+    """Leave a campaign as a process does that is killed."""
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    store.campaigns.journal(prepared.id).campaign_state(CampaignState.RUNNING, "started", 0.0, AT)
+    prepared.bench.close()
+    return prepared.id
+
+
+def rest(runner: BenchRunner) -> None:
+    job = runner._job
+    if job is not None and job.thread is not None:
+        job.thread.join()
+
+
+@pytest.mark.usefixtures("real")
+def test_a_bench_that_is_silent_when_its_campaign_is_to_be_taken_up_is_not_held_safe(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left_running(store)
+
+    def silent(*_: Any) -> None:
+        raise NoReply("table", "no answer")
+
+    monkeypatch.setattr(resume, "open_bench", silent)
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    runner.take_up_left()
+    assert store.campaigns.get(1).state == "failed"
+    assert "no answer" in store.benches.unconfirmed(BENCH.name)
+    with pytest.raises(Conflict, match="not confirmed safe"):
+        runner.start(CampaignRequest(recipe="short"))
+
+
+@pytest.mark.usefixtures("real")
+def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    left_running(store)
+    states: list[str] = []
+
+    def safe(*_: Any) -> tuple[str, ...]:
+        states.append(store.campaigns.get(1).state)
+        return ("table to rest: it still moves",)
+
+    monkeypatch.setattr(bench_runner, "too_often", lambda _: "taken up 5 times")
+    monkeypatch.setattr(resume, "make_safe", safe)
+    BenchRunner(store, BENCH, VirtualClock).take_up_left()
+    assert states == ["running"]
+    assert store.campaigns.get(1).reason == "taken up 5 times"
+    assert store.benches.unconfirmed(BENCH.name) == "table to rest: it still moves"
+
+
+def test_what_is_not_safe_is_on_the_bench_before_the_campaign_ends(store: Store) -> None:
+    """Whoever is killed between the two leaves a bench that says so."""
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    prepared.bench.close()
+    event = Event("safe_state", f"{NOT_SAFE}table to rest: no answer", level="error")
+    store.campaigns.journal(prepared.id).event(event, 0.0, AT)
+    assert store.benches.unconfirmed(BENCH.name) == "table to rest: no answer"
+
+
+def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: Store) -> None:
+    left_running(store)
+    with pytest.raises(NotEnoughData, match="no complete data set yet"):
+        newest_recording(store, "FOG-0001", None)
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    run(store, prepared)
+    left_running(store)
+    assert newest_recording(store, "FOG-0001", None) == 2
+    with pytest.raises(NotEnoughData, match="recording 3"):
+        newest_recording(store, "FOG-0001", 3)
+
+
+def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say_so(store: Store) -> None:
+    older, newer = left_running(store), left_running(store)
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    runner.take_up_left()
+    rest(runner)
+    assert store.campaigns.get(newer).state == "done"
+    row = store.campaigns.get(older)
+    assert (row.state, f"campaign {newer} goes on here" in row.reason) == ("failed", True)
+
+
+@pytest.mark.usefixtures("real")
+def test_ending_by_hand_what_no_process_runs_says_that_nobody_made_the_bench_safe(store: Store) -> None:
+    campaign = left_running(store)
+    answer = LocalCommands(store, VirtualClock()).abort_campaign(campaign, "the computer died")
+    assert (answer.state, "Nobody has made bench" in answer.reason) == ("aborted", True)
+    assert f"campaign {campaign} ended before" in store.benches.unconfirmed(BENCH.name)
+
+
+def test_a_simulated_bench_ended_with_its_process(store: Store) -> None:
+    answer = LocalCommands(store, VirtualClock()).abort_campaign(left_running(store), "enough")
+    assert (answer.state, store.benches.unconfirmed(BENCH.name)) == ("aborted", "")
+
+
+class FullDisk:
+    """A disk that takes nothing more while `full`."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.full = False
+        real = Database.writing
+
+        def writing(database: Database, *, synced: bool = True) -> Any:
+            if self.full:
+                raise DiskFull("the disk is full")
+            return real(database, synced=synced)
+
+        monkeypatch.setattr(Database, "writing", writing)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_end_that_could_not_be_written_is_written_before_anything_else_begins(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = FullDisk(monkeypatch)
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    stop = runner.listen(lambda: setattr(disk, "full", True))
+    campaign = runner.start(CampaignRequest(recipe="short")).id
+    rest(runner)
+    stop()
+    assert store.campaigns.get(campaign).state == "planned"
+    assert not runner.free
+    with pytest.raises(StoreError, match="the disk is full"):
+        runner.start(CampaignRequest(recipe="short"))
+    disk.full = False
+    runner.take_up_cut_short()
+    row = store.campaigns.get(campaign)
+    assert (row.state, "the disk is full" in row.reason) == ("failed", True)
+    assert f"campaign {campaign} ended while" in store.benches.unconfirmed(BENCH.name)
+    assert runner.free
+
+
+def test_a_bench_is_closed_even_if_what_is_wrong_with_it_cannot_be_written(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    closed: list[str] = []
+    monkeypatch.setattr(type(prepared.bench), "close", lambda bench: closed.append(bench.table.name))
+    monkeypatch.setattr("procedures.execution.engine.make_safe", lambda *_: ("table to rest: no answer",))
+
+    def full(*_: Any) -> None:
+        raise StoreError("the disk is full")
+
+    monkeypatch.setattr(store.benches, "mark", full)
+    monkeypatch.setattr("labctl.store.repositories.journal.benches.mark", full)
+    control = Control()
+    control.abort("enough")
+    with pytest.raises(StoreError):
+        run(store, prepared, control)
+    assert closed == ["table"]
+
+
+def test_a_runner_that_stops_begins_nothing_and_waits_until_the_bench_is_safe(store: Store) -> None:
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    campaign = runner.start(CampaignRequest(recipe="short")).id
+    runner.end_soon()
+    with pytest.raises(BenchBusy, match="the service stops"):
+        runner.start(CampaignRequest(recipe="short"))
+    assert not runner.free
+    runner.close()
+    row = store.campaigns.get(campaign)
+    assert (row.state, "the service stops" in row.reason) == ("aborted", True)
+
+
+@pytest.mark.parametrize("at", [1, 2, 3])
+def test_interrupts_inside_a_write_leave_a_database_that_can_be_written(store: Store, at: int) -> None:
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    engine, inserted = store.audit._database._engine, [0]
+
+    def interrupt(*_: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    def at_insert(_cursor: Any, statement: str, *_: Any) -> None:
+        inserted[0] += statement.startswith("INSERT INTO events")
+        if inserted[0] == at and statement.startswith("INSERT INTO events"):
+            sa.event.listen(engine, "rollback", interrupt, once=True)  # impatient: while the first is being heeded
+            sa.event.listen(engine.pool, "invalidate", interrupt, once=True)
+            interrupt()
+
+    sa.event.listen(engine, "do_execute", at_insert)
+    with pytest.raises(Stopped, match="bench single-axis-sim is safe"):
+        run(store, prepared)
+    row = store.campaigns.get(prepared.id)
+    assert (row.state, row.reason) == ("aborted", "interrupted (Ctrl-C or a signal)")
+
+
+def interrupted_write(reached: list[str], error: Exception | None) -> None:
+    with defer_signals():
+        signal.raise_signal(signal.SIGINT)
+        reached.append("the end")
+        if error is not None:
+            raise error
+
+
+@pytest.mark.parametrize("error", [None, StoreError("the disk is full")])
+def test_an_interrupt_waits_for_the_end_of_a_write_and_is_not_lost_when_that_fails(error: Exception | None) -> None:
+    reached: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_write(reached, error)
+    assert reached == ["the end"]
+
+
+def test_a_bench_that_was_not_used_is_not_called_safe(store: Store) -> None:
+    lab_service = LabService(store, SystemClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
+    lab_service.close()
+    assert lab_service.left == "bench single-axis-sim was not used"
+
+
+def test_simulate_never_takes_a_real_bench(tmp_path: Path) -> None:
+    asked = ServeRequest(bench="example-real", simulate=True, database=str(tmp_path / "lab.sqlite"))
+    with pytest.raises(BadInput, match="--simulate with --bench example-real: that bench has real instruments"):
+        create_service(asked, None)
+
+
+def labctl(location: str, *arguments: str) -> Any:
+    return CliRunner().invoke(app, [*arguments, "--database", location])
+
+
+@pytest.fixture
+def left(tmp_path: Path) -> str:
+    """A database in which a campaign was left half done by a process that is gone."""
+    location = str(tmp_path / "lab.sqlite")
+    with open_store(location, write=True) as opened:
+        left_running(opened)
+    return location
+
+
+@pytest.mark.parametrize("look", [lambda store: campaign_status(store, 1), lambda store: list_campaigns(store)[0]])
+def test_a_campaign_that_ends_while_it_is_looked_at_was_not_left(
+    left: str, monkeypatch: pytest.MonkeyPatch, look: Any
+) -> None:
+    def ends(_store: Store) -> bool:
+        with open_store(left, write=True) as writer:
+            writer.campaigns.close_unfinished(1, "enough", AT, "aborted")
+        return False
+
+    monkeypatch.setattr(Store, "is_held", property(ends))
+    with open_store(left, write=False) as reader:
+        answer = look(reader)
+    assert (answer.state, answer.abandoned, answer.reason) == ("aborted", False, "enough")
+
+
+@pytest.mark.usefixtures("real")
+def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str) -> None:
+    status = labctl(left, "bench", "status")
+    assert (status.exit_code, "nothing is unconfirmed" in status.stdout) == (1, False)
+    what = "campaign 1 was cut short at 0 %; `labctl campaign resume 1` takes it up, `labctl campaign abort 1` ends it"
+    assert what in status.stdout
+    assert json.loads(labctl(left, "bench", "status", "--json").stdout)[0]["left"] == [what]
+    refused = labctl(left, "campaign", "start", "short", "--bench", BENCH.name)
+    assert (refused.exit_code, what in refused.stderr) == (2, True)
+    with open_store(left, write=True) as opened:
+        assert len(opened.campaigns.all()) == 1
+        assert "labctl campaign" not in labctl(left, "bench", "status").stdout  # somebody writes: it may be running
+    assert labctl(left, "campaign", "abort", "1").exit_code == 0
+    again = json.loads(labctl(left, "bench", "status", "--json").stdout)[0]
+    assert (again["left"], "before it could make the bench safe" in again["unconfirmed"]) == ([], True)
+
+
+def test_a_simulated_bench_only_says_that_a_campaign_was_left(left: str) -> None:
+    assert labctl(left, "bench", "status").exit_code == 0
+    started = labctl(left, "campaign", "start", "short", "--bench", BENCH.name, "--json")
+    assert "campaign 1 was cut short at 0 %; `labctl campaign resume 1` takes it up" in started.stderr
+    assert (json.loads(started.stdout)["id"], json.loads(started.stdout)["state"]) == (2, "done")
+
+
+@pytest.mark.parametrize(("complaints", "said"), [
+    ((), "bench single-axis-sim is safe, but that could not be written down;"),
+    (("table to rest: no answer",), "NOT confirmed safe, and that could not be written down: table to rest: no answer"),
+])  # fmt: skip
+def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, complaints: tuple[str, ...], said: str
+) -> None:
+    disk, location = FullDisk(monkeypatch), str(tmp_path / "lab.sqlite")
+    monkeypatch.setattr("procedures.execution.engine.make_safe", lambda *_: complaints)
+
+    def fills(answer: Any) -> None:
+        disk.full = disk.full or answer.step == 5
+
+    with pytest.raises(DiskFull) as caught:
+        run_here(location, StartRequest(recipe="short", bench=BENCH.name), fills)
+    text = str(caught.value)
+    assert text.startswith("campaign 1 was cut short: the disk is full; what was measured before is kept; ")
+    assert said in text
+    assert text.endswith("`labctl campaign resume 1` goes on with it")
+    assert "nothing of this act" not in text
+
+
+def test_a_service_that_starts_says_what_it_finds(left: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def serve(_request: Any, ready: Any) -> str:
+        ready("http://127.0.0.1:1")
+        return ""
+
+    monkeypatch.setattr("labctl.api.server.serve_forever", serve)
+    assert "campaign 1 was cut short at 0 % and is taken up now" in labctl(left, "serve", "--bench", BENCH.name).stdout
+    with open_store(left, write=True) as opened:
+        opened.benches.mark(BENCH.name, "table to rest: no answer", AT)
+    lines = labctl(left, "serve", "--bench", BENCH.name).stdout.splitlines()
+    assert len(lines) == 3
+    assert "is NOT confirmed safe: table to rest: no answer" in lines[1]
+    assert lines[2].startswith("campaign 1 was cut short at 0 % and is not taken up: ")
+    told = json.loads(labctl(left, "serve", "--bench", BENCH.name, "--json").stdout)
+    assert (told["url"], "no answer" in told["unconfirmed"]) == ("http://127.0.0.1:1", True)
+    other = json.loads(labctl(left, "serve", "--bench", "triaxial-sim", "--json").stdout)
+    assert (other["unconfirmed"], other["cut_short"]) == ("", "")
+
+
+def test_another_terminal_is_told_where_a_campaign_runs(tmp_path: Path) -> None:
+    location, said = str(tmp_path / "lab.sqlite"), []
+
+    def look(_answer: Any) -> None:
+        if not said:
+            said.extend(labctl(location, "campaign", act, "1") for act in ("pause", "abort", "resume"))
+
+    run_here(location, StartRequest(recipe="short"), look)
+    for result in said:
+        assert result.exit_code == 2
+        assert f"campaign 1 runs in process {os.getpid()}'s terminal: Ctrl-C there ends it safely" in result.stderr
