@@ -2,7 +2,7 @@
 
 import { plotly } from "./core/figure.js";
 import { route, start } from "./core/router.js";
-import { shell } from "./core/shell.js";
+import { shell } from "./core/layout.js";
 
 /** Begin to load what draws pictures; a picture that then lacks it asks again, and says so. */
 const pencils = () => plotly().catch(() => {});
@@ -17,7 +17,7 @@ route("/", () => import("./pages/start.js"));
 route("/start", () => import("./pages/start.js"));
 route("/bench", () => import("./pages/bench.js"));
 route("/campaigns", () => import("./pages/campaigns.js"));
-route("/campaigns/new", drawn(() => import("./pages/campaign-new.js")));
+route("/campaigns/new", drawn(() => import("./pages/campaign_new.js")));
 route("/campaigns/:id", drawn(() => import("./pages/campaign.js")));
 route("/units", () => import("./pages/units.js"));
 route("/units/:serial", drawn(() => import("./pages/unit.js")));

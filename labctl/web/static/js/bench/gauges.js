@@ -1,6 +1,6 @@
 // Now, in large figures: temperatures against the set point and the rate of the table, each on a small scale.
 
-import { fill, h, s } from "../core/dom.js";
+import { fill, h, s } from "../core/elements.js";
 import { setting } from "../core/format.js";
 
 /** A gyro is warmer than its chamber: the scale goes on beyond the plan. */

@@ -1,6 +1,6 @@
 // The states of a campaign, as a chip and as words.
 
-import { chip } from "../core/parts.js";
+import { chip } from "../core/components.js";
 
 export const KINDS = { done: "good", running: "accent", planned: "", paused: "warn", waiting: "warn", interrupted: "warn", aborted: "bad", failed: "bad" };
 const WORDS = { waiting: "waits for a person", planned: "about to begin" };

@@ -1,8 +1,8 @@
 // What a plan could find, and what it could not, before anything is measured.
 
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { sizeWords, words } from "../core/format.js";
-import { notice, table } from "../core/parts.js";
+import { notice, table } from "../core/components.js";
 
 /** Less than this of an effect left beside the usual model: the model takes it in by itself. */
 const TAKEN_IN = 0.02;

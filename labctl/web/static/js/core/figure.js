@@ -1,7 +1,7 @@
 // Every picture: drawn by Plotly in the page's colours, saved as PNG, SVG or the numbers behind it as CSV.
 
 import { save } from "./api.js";
-import { h, near } from "./dom.js";
+import { h, near } from "./elements.js";
 
 let script = null;
 const drawn = new Set();

@@ -47,7 +47,7 @@ export async function show() {
   window.dispatchEvent(new CustomEvent("labctl:moved"));
   main.setAttribute("aria-busy", "true");
   try {
-    const module = await (found ? found.load() : import("../pages/missing.js"));
+    const module = await (found ? found.load() : import("../pages/not_found.js"));
     const element = await module.page({ params: found?.params ?? {}, query: query(), signal });
     if (signal.aborted) return;
     main.replaceChildren(element);
@@ -58,7 +58,7 @@ export async function show() {
     moved = true;
   } catch (error) {
     if (signal.aborted || error.name === "AbortError") return;
-    const { trouble } = await import("./parts.js");
+    const { trouble } = await import("./components.js");
     main.replaceChildren(trouble(error, show));
   } finally {
     if (!signal.aborted) main.removeAttribute("aria-busy");

@@ -1,7 +1,7 @@
 // What is looked at, picked and drawn over; whoever shows it is told when it changes.
 
 import { remember } from "../core/router.js";
-import { asRanges, fromRanges } from "./rows.js";
+import { asRanges, fromRanges } from "./dataset_rows.js";
 
 export class State {
   constructor(given) {

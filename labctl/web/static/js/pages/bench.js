@@ -1,13 +1,13 @@
 // What the bench is doing now, and the acts upon it.
 
 import { get } from "../core/api.js";
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { instant } from "../core/format.js";
-import { chip, head, notice } from "../core/parts.js";
+import { chip, head, notice } from "../core/components.js";
 import { show } from "../core/router.js";
-import { clearButton } from "../bench/acts.js";
-import { idle, withoutBench } from "../bench/idle.js";
-import { running } from "../bench/running.js";
+import { clearButton } from "../bench/actions.js";
+import { idle, withoutBench } from "../bench/idle_bench.js";
+import { running } from "../bench/running_campaign.js";
 import { runs } from "../campaigns/states.js";
 
 const LOOK_MS = 5000;

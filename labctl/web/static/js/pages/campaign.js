@@ -1,15 +1,15 @@
 // One campaign: its plan with what became of it, its events, and why it ended.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { count, duration, instant, percent } from "../core/format.js";
-import { card, chip, facts, head, headed, notice, tabs } from "../core/parts.js";
+import { card, chip, facts, head, headed, notice, tabs } from "../core/components.js";
 import { go, remember, show as showAgain } from "../core/router.js";
-import { link, resumeButton, stopButton } from "../bench/acts.js";
-import { eventList } from "../bench/events.js";
-import { ENDED, follow } from "../bench/feed.js";
-import { left } from "../bench/history.js";
-import { planPicture } from "../campaigns/picture.js";
+import { link, resumeButton, stopButton } from "../bench/actions.js";
+import { eventList } from "../bench/event_list.js";
+import { ENDED, follow } from "../bench/campaign_stream.js";
+import { left } from "../bench/campaign_history.js";
+import { planPicture } from "../campaigns/plan_chart.js";
 import { canResume, runs, stateChip } from "../campaigns/states.js";
 
 const LEVELS = [["info", "all"], ["warning", "warnings and errors"], ["error", "errors"]];

@@ -1,12 +1,12 @@
 // All campaigns, and what the schedule will begin.
 
 import { get, remove } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
-import { button, card, chip, empty, head, headed, table } from "../core/parts.js";
-import { link } from "../bench/acts.js";
+import { button, card, chip, empty, head, headed, table } from "../core/components.js";
+import { link } from "../bench/actions.js";
 import { runs, stateChip } from "../campaigns/states.js";
-import { due } from "../campaigns/when.js";
+import { due } from "../campaigns/start_time.js";
 
 const AGAIN_MS = 4000;
 

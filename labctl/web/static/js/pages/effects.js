@@ -1,8 +1,8 @@
 // The catalogue of effects: all of them, or one on a page of its own.
 
 import { get, Problem } from "../core/api.js";
-import { book } from "../effects/book.js";
-import { one } from "../effects/one.js";
+import { book } from "../effects/list.js";
+import { one } from "../effects/detail.js";
 
 let kept = null;
 

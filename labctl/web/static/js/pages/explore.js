@@ -1,18 +1,18 @@
 // The heart: hold a version against a recording, see where it fails, learn what is missing, add it, watch the error fall.
 
 import { get, post } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { count } from "../core/format.js";
-import { busy, button, card, choice, empty, head, notice, tabs, trouble } from "../core/parts.js";
+import { busy, button, card, choice, empty, head, notice, tabs, trouble } from "../core/components.js";
 import { go, query } from "../core/router.js";
-import { add, inOrder } from "../explore/add.js";
-import { compare } from "../explore/compare.js";
-import { fails } from "../explore/fails.js";
-import { learn, verdict } from "../explore/learn.js";
-import { rowsFor } from "../explore/map.js";
-import { axesOf } from "../explore/rows.js";
+import { add, inOrder } from "../explore/extend_model.js";
+import { compare } from "../explore/error_comparison.js";
+import { fails } from "../explore/residual_diagnostics.js";
+import { learn, verdict } from "../explore/suspects.js";
+import { rowsFor } from "../explore/residual_map.js";
+import { axesOf } from "../explore/dataset_rows.js";
 import { State } from "../explore/state.js";
-import { watch } from "../explore/watch.js";
+import { watch } from "../explore/error_ladder.js";
 
 const MODELS = [["bias_scale", "bias and scale factor"], ["ojeda2000", "Ojeda 2000: polynomial in rate and temperature"], ["yang2018", "Yang 2018: matrices over temperature"], ["single_temperature", "one temperature"]];
 

@@ -1,15 +1,15 @@
 // One recording: who and when, its trace, its data sets down to the readings, its noise, and the file to take away.
 
 import { download, get } from "../core/api.js";
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { count, day, number, setting } from "../core/format.js";
-import { button, card, facts, head, notice } from "../core/parts.js";
+import { button, card, facts, head, notice } from "../core/components.js";
 import { remember } from "../core/router.js";
 import { allan } from "../recordings/allan.js";
 import { unitOf } from "../recordings/channels.js";
-import { means } from "../recordings/means.js";
+import { means } from "../recordings/mean_plots.js";
 import { readings } from "../recordings/readings.js";
-import { dataSets } from "../recordings/sets.js";
+import { dataSets } from "../recordings/dataset_table.js";
 import { trace } from "../recordings/trace.js";
 
 const AGREED = { samples: "every reading", points: "one mean per data set", coefficients: "a published table, no readings" };

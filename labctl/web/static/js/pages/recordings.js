@@ -1,11 +1,11 @@
 // All recordings, and the place to bring one in.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { count, day } from "../core/format.js";
-import { chip, choice, empty, head, headed, table } from "../core/parts.js";
+import { chip, choice, empty, head, headed, table } from "../core/components.js";
 import { remember } from "../core/router.js";
-import { importing } from "../recordings/import.js";
+import { importing } from "../recordings/import_form.js";
 
 export async function page({ query, signal }) {
   const list = h("div", {});

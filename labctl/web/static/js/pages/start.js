@@ -1,8 +1,8 @@
 // The first page: what there is, or, in an empty house, the three ways to begin.
 
 import { get, post } from "../core/api.js";
-import { h } from "../core/dom.js";
-import { button, card, head } from "../core/parts.js";
+import { h } from "../core/elements.js";
+import { button, card, head } from "../core/components.js";
 import { go } from "../core/router.js";
 import { runs } from "../campaigns/states.js";
 

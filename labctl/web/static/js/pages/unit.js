@@ -1,11 +1,11 @@
 // One unit: who it is, its calibrations and which is in force, how the error fell, and its coefficients.
 
 import { download, get, post } from "../core/api.js";
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { day, instant, number } from "../core/format.js";
-import { button, card, chip, dialog, empty, facts, head, headed, later, modelName, notice, table } from "../core/parts.js";
+import { button, card, chip, dialog, empty, facts, head, headed, later, modelName, notice, table } from "../core/components.js";
 import { query, remember, show } from "../core/router.js";
-import { ladderFigure } from "../explore/watch.js";
+import { ladderFigure } from "../explore/error_ladder.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
 
 const FORMATS = [["json", "JSON", "json"], ["c", "C header", "h"]];

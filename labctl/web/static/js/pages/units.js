@@ -1,8 +1,8 @@
 // Every unit, by serial number.
 
 import { get } from "../core/api.js";
-import { h } from "../core/dom.js";
-import { chip, empty, head, table } from "../core/parts.js";
+import { h } from "../core/elements.js";
+import { chip, empty, head, table } from "../core/components.js";
 
 export async function page({ signal }) {
   const units = await get("/api/units", { signal });

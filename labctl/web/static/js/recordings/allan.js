@@ -1,10 +1,10 @@
 // Noise at rest: the Allan deviation of each axis, and N, B, K with what they mean and why one may be missing.
 
 import { get, Problem } from "../core/api.js";
-import { fill, h, near } from "../core/dom.js";
+import { fill, h, near } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
-import { headed, later, notice, table, tabs } from "../core/parts.js";
+import { headed, later, notice, table, tabs } from "../core/components.js";
 
 const FIGURES = [["N", "angle random walk"], ["B", "bias instability"], ["K", "rate random walk"]];
 

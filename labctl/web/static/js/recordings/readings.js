@@ -1,10 +1,10 @@
 // Down to the raw readings of one data set.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { count, number, setting } from "../core/format.js";
-import { choice, facts, headed, later, table } from "../core/parts.js";
+import { choice, facts, headed, later, table } from "../core/components.js";
 import { nameOf, titleOf, unitOf } from "./channels.js";
 
 const MOST = 20_000;

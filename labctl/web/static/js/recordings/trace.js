@@ -1,10 +1,10 @@
 // One channel over time, however many readings there are: the service sends as many columns as the picture has.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { count, duration, number } from "../core/format.js";
-import { busy, choice, headed, notice } from "../core/parts.js";
+import { busy, choice, headed, notice } from "../core/components.js";
 import { remember } from "../core/router.js";
 import { nameOf, titleOf } from "./channels.js";
 

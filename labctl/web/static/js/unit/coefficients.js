@@ -1,9 +1,9 @@
 // A version's coefficients: over temperature where it has a table, else as a list; two versions beside each other.
 
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number, unitWords, words } from "../core/format.js";
-import { facts, table } from "../core/parts.js";
+import { facts, table } from "../core/components.js";
 
 const ERRORS = [["rms_dps", "RMS"], ["heldout_rms_dps", "at unseen temperatures"], ["noise_floor_dps", "noise floor"]];
 /** Coverage factor of the bars: expanded uncertainty. */

@@ -1,12 +1,12 @@
 // Watch the error fall: the ladder of versions, and the map of the version before beside this one's.
 
 import { get } from "../core/api.js";
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { number, words } from "../core/format.js";
-import { headed, later, modelName, table } from "../core/parts.js";
-import { map, rowsFor, scaleOf } from "./map.js";
-import { rowsOf } from "./rows.js";
+import { headed, later, modelName, table } from "../core/components.js";
+import { map, rowsFor, scaleOf } from "./residual_map.js";
+import { rowsOf } from "./dataset_rows.js";
 
 /** What the unit is off by itself is left out of the picture, at first, where it would squeeze the fall into a line. */
 const DWARFING = 10;

@@ -1,10 +1,10 @@
 // The readings of the newest finished data set of the campaign.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { setting } from "../core/format.js";
-import { headed } from "../core/parts.js";
+import { headed } from "../core/components.js";
 
 const READINGS = 4000;
 const EVERY_MS = 3000;

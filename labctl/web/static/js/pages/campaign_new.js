@@ -1,14 +1,14 @@
 // Plan a campaign: which recipe, what it would do, what it could find, and when it begins.
 
 import { get, post } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
-import { busy, card, chip, facts, head, notice } from "../core/parts.js";
+import { busy, card, chip, facts, head, notice } from "../core/components.js";
 import { remember } from "../core/router.js";
-import { begin } from "../campaigns/begin.js";
-import { hiding } from "../campaigns/hide.js";
-import { planPicture } from "../campaigns/picture.js";
-import { recipes } from "../campaigns/recipes.js";
+import { begin } from "../campaigns/start_form.js";
+import { hiding } from "../campaigns/hidden_effects.js";
+import { planPicture } from "../campaigns/plan_chart.js";
+import { recipes } from "../campaigns/recipe_choice.js";
 import { visibility } from "../campaigns/visibility.js";
 
 export async function page({ query, signal }) {

@@ -1,8 +1,8 @@
 // What a person does to a campaign or a bench. Each asks who, and why where that will be read later.
 
 import { get, post } from "../core/api.js";
-import { h } from "../core/dom.js";
-import { button, dialog, toast } from "../core/parts.js";
+import { h } from "../core/elements.js";
+import { button, dialog, toast } from "../core/components.js";
 import { go } from "../core/router.js";
 
 const WHO = "labctl.who";

@@ -1,8 +1,8 @@
 // On a simulated bench: an effect that the simulated unit has and its data sheet does not mention.
 
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { number, sizeWords, unitWords, words } from "../core/format.js";
-import { choice, field } from "../core/parts.js";
+import { choice, field } from "../core/components.js";
 import { remember } from "../core/router.js";
 
 const USUAL_TIMES = 10;

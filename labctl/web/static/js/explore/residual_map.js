@@ -2,7 +2,7 @@
 
 import { colour, DIVERGING, figure } from "../core/figure.js";
 import { number, setting } from "../core/format.js";
-import { levels, rowsOf } from "./rows.js";
+import { levels, rowsOf } from "./dataset_rows.js";
 
 const LIMITS = [3, 10];
 const DIMMED_BELOW = 2;

@@ -1,11 +1,11 @@
 // A bench at which nothing runs: what was last, what comes next, and how to begin.
 
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
-import { card, facts, notice } from "../core/parts.js";
+import { card, facts, notice } from "../core/components.js";
 import { canResume, KINDS, stateChip } from "../campaigns/states.js";
-import { due } from "../campaigns/when.js";
-import { link, resumeButton } from "./acts.js";
+import { due } from "../campaigns/start_time.js";
+import { link, resumeButton } from "./actions.js";
 
 export function withoutBench() {
   return card("This service drives no bench",

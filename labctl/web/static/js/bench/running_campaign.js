@@ -1,21 +1,21 @@
 // A campaign while it runs: the strip that stays in view, the question that waits, and what the bench is doing.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { duration, instant } from "../core/format.js";
-import { card, headed, notice } from "../core/parts.js";
+import { card, headed, notice } from "../core/components.js";
 import { go } from "../core/router.js";
-import { planPicture } from "../campaigns/picture.js";
+import { planPicture } from "../campaigns/plan_chart.js";
 import { stateChip } from "../campaigns/states.js";
-import { link, pauseButton, resumeButton, stopButton } from "./acts.js";
-import { eventList } from "./events.js";
-import { ENDED, follow } from "./feed.js";
+import { link, pauseButton, resumeButton, stopButton } from "./actions.js";
+import { eventList } from "./event_list.js";
+import { ENDED, follow } from "./campaign_stream.js";
 import { gauges } from "./gauges.js";
-import { live } from "./live.js";
-import { historyOf, left, take } from "./history.js";
-import { promptCard } from "./mounting.js";
-import { output } from "./output.js";
-import { rolling } from "./rolling.js";
+import { live } from "./live_output.js";
+import { historyOf, left, take } from "./campaign_history.js";
+import { promptCard } from "./operator_prompt.js";
+import { output } from "./last_dataset.js";
+import { rolling } from "./history_plot.js";
 
 const EVENTS = 8;
 const PLAN_AGAIN_MS = 2500;

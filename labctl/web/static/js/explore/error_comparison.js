@@ -1,12 +1,12 @@
 // Compare: the measured and the modelled error over rate and temperature, at rest, and after full turns.
 
 import { get } from "../core/api.js";
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { axisColour, colour, figure, warmth } from "../core/figure.js";
 import { setting } from "../core/format.js";
-import { headed, later, tabs } from "../core/parts.js";
+import { headed, later, tabs } from "../core/components.js";
 import { query, remember } from "../core/router.js";
-import { levels } from "./rows.js";
+import { levels } from "./dataset_rows.js";
 
 const VIEWS = [["lines", "Error over rate"], ["warm", "Error over temperature"], ["surface", "Surface"], ["rest", "At rest"], ["turn", "Per full turn"]];
 /** Slower than this is at rest, deg/s: the Earth turns by 0.004. */

@@ -1,11 +1,11 @@
 // One effect on a page of its own.
 
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { setting, sizeWords, unitWords, words } from "../core/format.js";
-import { card, chip, head, notice, table } from "../core/parts.js";
-import { link } from "../bench/acts.js";
-import { large } from "./drawn.js";
-import { CHANNELS, ORIGINS, TECHNOLOGIES, VIEWS } from "./words.js";
+import { card, chip, head, notice, table } from "../core/components.js";
+import { link } from "../bench/actions.js";
+import { large } from "./signature_plot.js";
+import { CHANNELS, ORIGINS, TECHNOLOGIES, VIEWS } from "./labels.js";
 
 const page = (effect) => h("a", { href: `/effects/${effect.id}` }, effect.term);
 const listed = (parts) => parts.flatMap((part, k) => (k ? [", ", part] : [part]));

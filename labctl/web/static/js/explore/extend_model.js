@@ -1,12 +1,12 @@
 // Add: look at the changed model first, then make it the next version.
 
 import { post } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number, words } from "../core/format.js";
-import { button, choice, field, headed, notice, table, toast } from "../core/parts.js";
+import { button, choice, field, headed, notice, table, toast } from "../core/components.js";
 import { go } from "../core/router.js";
-import { rowsFor } from "./map.js";
+import { rowsFor } from "./residual_map.js";
 
 const ERRORS = [["raw_rms_dps", "As the unit is"], ["rms_dps", "Left after the fit"], ["heldout_rms_dps", "At unseen temperatures"], ["noise_floor_dps", "Noise floor"]];
 

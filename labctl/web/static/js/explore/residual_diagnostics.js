@@ -1,12 +1,12 @@
 // See where it fails: the map, the residual against each channel, and the data sets of what is picked, all linked.
 
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number } from "../core/format.js";
-import { choice, headed, table } from "../core/parts.js";
+import { choice, headed, table } from "../core/components.js";
 import { query, remember } from "../core/router.js";
-import { map, rowsFor, scaleOf, setsUnder } from "./map.js";
-import { channelName, channelTitle, scaled } from "./rows.js";
+import { map, rowsFor, scaleOf, setsUnder } from "./residual_map.js";
+import { channelName, channelTitle, scaled } from "./dataset_rows.js";
 
 const FIRST = ["table_rate_dps", "temperature_c", "t_s"];
 const LISTED = 12;

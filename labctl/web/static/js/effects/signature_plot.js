@@ -1,6 +1,6 @@
 // The signature of an effect as a picture: small for the list, large to be read and saved.
 
-import { s } from "../core/dom.js";
+import { s } from "../core/elements.js";
 import { colour, figure, warmth } from "../core/figure.js";
 import { POSITIONS, signature } from "./signatures.js";
 

@@ -1,8 +1,8 @@
 // The data sets of a recording: a table to leaf through, from which one is picked.
 
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { count, duration, mean, number, setting } from "../core/format.js";
-import { chip, choice, headed, table } from "../core/parts.js";
+import { chip, choice, headed, table } from "../core/components.js";
 import { remember } from "../core/router.js";
 import { nameOf, unitOf } from "./channels.js";
 

@@ -1,9 +1,9 @@
 // What the units put out just now: a figure for each axis, and its course since this tab began to listen.
 
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { mean, number } from "../core/format.js";
-import { facts, headed } from "../core/parts.js";
+import { facts, headed } from "../core/components.js";
 
 const KEPT = 3000;
 /** Fewer points than this are marked: of one alone a line shows nothing. */

@@ -1,7 +1,7 @@
 // Parts that several pages are put together from.
 
 import { Problem, Unreachable } from "./api.js";
-import { fill, fresh, h } from "./dom.js";
+import { fill, fresh, h } from "./elements.js";
 
 /** A card with a heading; `beside` stands at the heading's right. */
 export function card(title, ...children) {

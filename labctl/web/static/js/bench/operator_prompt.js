@@ -1,7 +1,7 @@
 // A question to the person at the bench, with a picture of how the unit has to lie.
 
-import { h, s } from "../core/dom.js";
-import { answerButtons } from "./acts.js";
+import { h, s } from "../core/elements.js";
+import { answerButtons } from "./actions.js";
 
 const AXES = ["x", "y", "z"];
 /** Where the eye sees "left in front", "right in front" and "up": 2D steps of a unit length; right-handed. */

@@ -1,6 +1,6 @@
 // When something on the schedule begins: in its own time zone, and in the reader's where that differs.
 
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { instant } from "../core/format.js";
 
 const FORM = { weekday: "short", day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };

@@ -1,9 +1,9 @@
 // The means of a recording without times: output over table rate, and the temperature in the order of measurement.
 
-import { h } from "../core/dom.js";
+import { h } from "../core/elements.js";
 import { axisColour, colour, figure, warmth } from "../core/figure.js";
 import { setting } from "../core/format.js";
-import { card } from "../core/parts.js";
+import { card } from "../core/components.js";
 import { unitOf } from "./channels.js";
 
 /** `state` has {id, sets, output, dataset, pick(number)}. A press on a point picks its data set. */

@@ -1,9 +1,9 @@
 // When it begins: now, at a time, again and again, or at once in simulation alone.
 
 import { post } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { instant } from "../core/format.js";
-import { button, card, field, notice, tabs, toast } from "../core/parts.js";
+import { button, card, field, notice, tabs, toast } from "../core/components.js";
 import { go } from "../core/router.js";
 
 const ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone;

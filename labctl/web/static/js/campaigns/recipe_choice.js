@@ -1,8 +1,8 @@
 // Which recipe: one that comes with the house, or one's own as TOML.
 
-import { fill, fresh, h } from "../core/dom.js";
+import { fill, fresh, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
-import { card, chip, field } from "../core/parts.js";
+import { card, chip, field } from "../core/components.js";
 
 const TYPED_MS = 600;
 

@@ -1,11 +1,11 @@
 // The catalogue as a book: by origin, searched as one types.
 
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { words } from "../core/format.js";
-import { chip, empty, field, head, tabs } from "../core/parts.js";
+import { chip, empty, field, head, tabs } from "../core/components.js";
 import { remember } from "../core/router.js";
-import { thumbnail } from "./drawn.js";
-import { CHANNELS, ORIGINS } from "./words.js";
+import { thumbnail } from "./signature_plot.js";
+import { CHANNELS, ORIGINS } from "./labels.js";
 
 export function book(all, query) {
   let [asked, origin] = [query.q ?? "", query.origin ?? ""];

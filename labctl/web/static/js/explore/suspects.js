@@ -1,9 +1,9 @@
 // Learn: the verdict in words, and what may be missing, with its evidence.
 
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { measured, number, percent, words } from "../core/format.js";
-import { button, chip, facts, headed, notice } from "../core/parts.js";
-import { axesOf } from "./rows.js";
+import { button, chip, facts, headed, notice } from "../core/components.js";
+import { axesOf } from "./dataset_rows.js";
 
 const FORMS = {
   adequate: ["Nothing is missing", "good"],

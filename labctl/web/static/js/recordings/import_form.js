@@ -1,10 +1,10 @@
 // Taking a recording in: dropped or picked, and what the service says to it.
 
 import { upload } from "../core/api.js";
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { count } from "../core/format.js";
-import { busy, notice } from "../core/parts.js";
-import { filesOf, sorted } from "./dropped.js";
+import { busy, notice } from "../core/components.js";
+import { filesOf, sorted } from "./file_input.js";
 
 const size = (files) => {
   const bytes = files.reduce((sum, file) => sum + file.size, 0);

@@ -1,8 +1,8 @@
 // What stands around every page: the rail, the key, the theme, and whether the service still answers.
 
 import { key, setKey } from "./api.js";
-import { fill, h, s } from "./dom.js";
-import { dialog } from "./parts.js";
+import { fill, h, s } from "./elements.js";
+import { dialog } from "./components.js";
 import { show } from "./router.js";
 
 const PLACES = [

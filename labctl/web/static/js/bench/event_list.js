@@ -1,8 +1,8 @@
 // What happened, newest first, by level.
 
-import { fill, h } from "../core/dom.js";
+import { fill, h } from "../core/elements.js";
 import { clock, day, setting } from "../core/format.js";
-import { chip } from "../core/parts.js";
+import { chip } from "../core/components.js";
 
 const KINDS = { info: "", warning: "warn", error: "bad" };
 const LEVELS = ["info", "warning", "error"];
