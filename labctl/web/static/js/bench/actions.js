@@ -3,25 +3,25 @@
 import { get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
 import { button, dialog, toast } from "../core/components.js";
-import { go } from "../core/router.js";
+import { navigate } from "../core/router.js";
 
-const WHO = "labctl.who";
-const who = () => ({ name: "by", label: "Your name", value: localStorage.getItem(WHO) ?? "" });
+const OPERATOR_NAME_KEY = "labctl.who";
+const operatorNameField = () => ({ name: "by", label: "Your name", value: localStorage.getItem(OPERATOR_NAME_KEY) ?? "" });
 
-async function asked(title, fields, options) {
+async function askOperator(title, fields, options) {
   const said = await dialog(title, fields, options);
-  if (said?.by) localStorage.setItem(WHO, said.by);
+  if (said?.by) localStorage.setItem(OPERATOR_NAME_KEY, said.by);
   return said;
 }
 
-const act = (id, name, body) => post(`/api/campaigns/${id}/${name}`, body);
+const postAction = (id, name, body) => post(`/api/campaigns/${id}/${name}`, body);
 
 /** The one red button: the campaign ends now, table at rest, chamber at its safe set point. */
 export const stopButton = (id) => Object.assign(button("Safe stop", async () => {
-  const said = await asked("Stop now and leave the bench safe?", [{ ...who(), required: false }, { name: "reason", label: "Why", value: "stopped by hand", hint: "It is written beside the campaign." }],
+  const said = await askOperator("Stop now and leave the bench safe?", [{ ...operatorNameField(), required: false }, { name: "reason", label: "Why", value: "stopped by hand", hint: "It is written beside the campaign." }],
     { text: "The table comes to rest, the chamber goes to its safe set point, the campaign ends. What was measured is kept, and the campaign can be resumed.", confirm: "Stop now", kind: "stop" });
   if (!said) return;
-  const answer = await act(id, "abort", said);
+  const answer = await postAction(id, "abort", said);
   const unsafe = (await get("/api/benches")).find((bench) => bench.unconfirmed);
   if (answer.state !== "aborted") toast("bad", `The campaign is ${answer.state}: ${answer.reason}`);
   else if (unsafe) toast("bad", `Stopped, but the safe state was not confirmed: ${unsafe.unconfirmed}`);
@@ -29,39 +29,39 @@ export const stopButton = (id) => Object.assign(button("Safe stop", async () => 
 }, { kind: "stop big" }), { title: "End the campaign now, in the safe state" });
 
 export const pauseButton = (id) => button("Pause", async () => {
-  const said = await asked("Pause after the present data set?", [who(), { name: "reason", label: "Why" }], { confirm: "Pause" });
-  if (said) await act(id, "pause", said);
+  const said = await askOperator("Pause after the present data set?", [operatorNameField(), { name: "reason", label: "Why" }], { confirm: "Pause" });
+  if (said) await postAction(id, "pause", said);
 });
 
 /** Go on: `whole` when it takes up a campaign that had ended or was interrupted. */
 export const resumeButton = (id, { whole = false } = {}) => button(whole ? "Resume where it was" : "Go on", async () => {
-  const said = await asked(whole ? "Take the campaign up where it was?" : "Go on with the campaign?", [who(), { name: "reason", label: "Why", required: false }],
+  const said = await askOperator(whole ? "Take the campaign up where it was?" : "Go on with the campaign?", [operatorNameField(), { name: "reason", label: "Why", required: false }],
     { text: whole ? "First the safe state, then home, temperature and soak again; the first incomplete data set is measured anew." : null, confirm: whole ? "Resume" : "Go on" });
   if (!said) return;
-  await act(id, "resume", { by: said.by, reason: said.reason });
+  await postAction(id, "resume", { by: said.by, reason: said.reason });
   toast("good", whole ? `Campaign ${id} is taken up.` : "It goes on.");
-  if (whole) await go("/bench");
+  if (whole) await navigate("/bench");
 }, { kind: "first" });
 
 /** Answer the question that waits: it is done, or it cannot be done. */
 export const answerButtons = (id, prompt) => [
   button("Done", async () => {
-    const said = await asked("Is it done?", [who()], { text: prompt.text, confirm: "It is done" });
-    if (said) await act(id, "confirm", { prompt: prompt.id, by: said.by, confirmed: true });
+    const said = await askOperator("Is it done?", [operatorNameField()], { text: prompt.text, confirm: "It is done" });
+    if (said) await postAction(id, "confirm", { prompt: prompt.id, by: said.by, confirmed: true });
   }, { kind: "first" }),
   button("Cannot be done", async () => {
-    const said = await asked("It cannot be done?", [who(), { name: "reason", label: "Why" }], { text: "The campaign ends, in the safe state.", confirm: "It cannot be done", kind: "stop" });
-    if (said) await act(id, "confirm", { prompt: prompt.id, by: said.by, reason: said.reason, confirmed: false });
+    const said = await askOperator("It cannot be done?", [operatorNameField(), { name: "reason", label: "Why" }], { text: "The campaign ends, in the safe state.", confirm: "It cannot be done", kind: "stop" });
+    if (said) await postAction(id, "confirm", { prompt: prompt.id, by: said.by, reason: said.reason, confirmed: false });
   }),
 ];
 
 /** Say that somebody has looked at a bench whose safe state was not confirmed. */
 export const clearButton = (bench, then) => button("I have looked, it is safe", async () => {
-  const said = await asked(`Is bench ${bench} safe?`, [who(), { name: "reason", label: "What you saw", value: "looked at the bench" }], { confirm: "It is safe" });
+  const said = await askOperator(`Is bench ${bench} safe?`, [operatorNameField(), { name: "reason", label: "What you saw", value: "looked at the bench" }], { confirm: "It is safe" });
   if (!said) return;
   await post(`/api/benches/${encodeURIComponent(bench)}/clear`, said);
   toast("good", `Bench ${bench} may be used again.`);
   then();
 }, { kind: "first" });
 
-export const link = (text, href, kind = "") => h("a", { class: `button ${kind}`, href }, text);
+export const linkButton = (text, href, kind = "") => h("a", { class: `button ${kind}`, href }, text);

@@ -1,24 +1,24 @@
 // What the event stream has told of a campaign since this tab was opened, as columns for a rolling picture.
 
-const KEPT = 3000;
-const held = new Map();
+const MAX_POINTS = 3000;
+const histories = new Map();
 
 /** The history of a campaign; it outlives the page, so that coming back does not begin anew. */
-export function historyOf(campaign) {
-  if (!held.has(campaign)) held.set(campaign, { t_s: [], chamber_c: [], gyro_c: [], rate_dps: [], setpoint_c: [] });
-  return held.get(campaign);
+export function campaignHistory(campaign) {
+  if (!histories.has(campaign)) histories.set(campaign, { t_s: [], chamber_c: [], gyro_c: [], rate_dps: [], setpoint_c: [] });
+  return histories.get(campaign);
 }
 
 /** Take a progress message in. Its time is the campaign's own: a simulated bench may run faster than the wall's clock. */
-export function take(history, status, setpoint_c) {
+export function appendStatus(history, status, setpoint_c) {
   const { t_s } = status;
   if (!Number.isFinite(t_s) || (history.t_s.length && t_s <= history.t_s.at(-1))) return;
   const row = { t_s, chamber_c: status.chamber_c, gyro_c: status.gyro_c, rate_dps: status.rate_dps, setpoint_c };
   for (const [name, values] of Object.entries(history)) {
     values.push(row[name] ?? null);
-    if (values.length > KEPT) values.splice(0, values.length - KEPT);
+    if (values.length > MAX_POINTS) values.splice(0, values.length - MAX_POINTS);
   }
 }
 
 /** Seconds that are left: progress is the share of what was expected that has passed. */
-export const left = (status, expected_s) => expected_s * (1 - status.progress);
+export const remainingSeconds = (status, expected_s) => expected_s * (1 - status.progress);

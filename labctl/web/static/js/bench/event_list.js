@@ -1,7 +1,7 @@
 // What happened, newest first, by level.
 
-import { fill, h } from "../core/elements.js";
-import { clock, day, setting } from "../core/format.js";
+import { setChildren, h } from "../core/elements.js";
+import { clock, day, plainNumber } from "../core/format.js";
 import { chip } from "../core/components.js";
 
 const KINDS = { info: "", warning: "warn", error: "bad" };
@@ -18,7 +18,7 @@ export function eventList(most, level = "info") {
     waiting = null;
     const shown = all.filter((event) => LEVELS.indexOf(event.level) >= LEVELS.indexOf(least));
     const from = shown.slice(-most).reverse();
-    fill(element, from.length ? from.map(line) : h("li", { class: "empty" }, all.length ? "Nothing of this kind has happened." : "No event has been heard yet."), shown.length > most ? h("li", { class: "soft small" }, `and ${shown.length - most} before`) : null);
+    setChildren(element, from.length ? from.map(eventItem) : h("li", { class: "empty" }, all.length ? "Nothing of this kind has happened." : "No event has been heard yet."), shown.length > most ? h("li", { class: "soft small" }, `and ${shown.length - most} before`) : null);
   }
   element.add = (event) => {
     all.push(event);
@@ -33,9 +33,9 @@ export function eventList(most, level = "info") {
   return element;
 }
 
-function line(event) {
+function eventItem(event) {
   const said = event.message.replace(/ \[question [^\]]+\]$/, "");
-  const limit = !said.includes("limit") && event.value !== null && event.value !== undefined && event.limit !== null && event.limit !== undefined ? ` (${setting(event.value)} ${event.unit ?? ""}, limit ${setting(event.limit)} ${event.unit ?? ""})` : "";
+  const limit = !said.includes("limit") && event.value !== null && event.value !== undefined && event.limit !== null && event.limit !== undefined ? ` (${plainNumber(event.value)} ${event.unit ?? ""}, limit ${plainNumber(event.limit)} ${event.unit ?? ""})` : "";
   return h("li", {},
     h("time", { datetime: event.at, title: `${day(event.at)}, ${event.t_s.toFixed(1)} s of the campaign` }, clock(event.at)),
     chip(event.level, KINDS[event.level] ?? ""),

@@ -1,7 +1,7 @@
 // Now, in large figures: temperatures against the set point and the rate of the table, each on a small scale.
 
-import { fill, h, s } from "../core/elements.js";
-import { setting } from "../core/format.js";
+import { setChildren, h, svg } from "../core/elements.js";
+import { plainNumber } from "../core/format.js";
 
 /** A gyro is warmer than its chamber: the scale goes on beyond the plan. */
 const MARGIN_C = 5;
@@ -12,11 +12,11 @@ function gauge(title, unit, low, high, digits) {
   const beside = h("span", { class: "gauge-beside" });
   const share = (value) => Math.min(Math.max((value - low) / Math.max(high - low, 1e-9), 0), 1) * 200;
   const zero = share(low < 0 && high > 0 ? 0 : low);
-  const bar = s("rect", { y: 5, height: 6, rx: 3, class: "gauge-bar" });
-  const wanted = s("path", { class: "gauge-wanted" });
-  const scale = s("svg", { viewBox: "-4 0 208 26", class: "gauge-scale", "aria-hidden": "true" },
-    s("rect", { x: 0, y: 5, width: 200, height: 6, rx: 3, class: "gauge-track" }), bar, wanted,
-    s("text", { x: 0, y: 24 }, setting(low)), s("text", { x: 200, y: 24, "text-anchor": "end" }, setting(high)));
+  const bar = svg("rect", { y: 5, height: 6, rx: 3, class: "gauge-bar" });
+  const wanted = svg("path", { class: "gauge-wanted" });
+  const scale = svg("svg", { viewBox: "-4 0 208 26", class: "gauge-scale", "aria-hidden": "true" },
+    svg("rect", { x: 0, y: 5, width: 200, height: 6, rx: 3, class: "gauge-track" }), bar, wanted,
+    svg("text", { x: 0, y: 24 }, plainNumber(low)), svg("text", { x: 200, y: 24, "text-anchor": "end" }, plainNumber(high)));
   const element = h("div", { class: "gauge" }, h("span", { class: "gauge-title" }, title), h("span", {}, figure, h("span", { class: "gauge-unit" }, unit)), scale, beside);
   element.set = (value, target, text) => {
     const there = Number.isFinite(value);
@@ -26,7 +26,7 @@ function gauge(title, unit, low, high, digits) {
     bar.setAttribute("width", Math.max(Math.abs(to - zero), there ? 2 : 0));
     const mark = share(target);
     wanted.setAttribute("d", Number.isFinite(target) ? `M${mark} 14l-4.5 -11h9z` : "");
-    fill(beside, text ?? "");
+    setChildren(beside, text ?? "");
   };
   return element;
 }
@@ -40,7 +40,7 @@ export function gauges(timeline) {
   const gyro = gauge("Gyro", "deg C", low, high, 2);
   const rate = gauge("Table rate", "deg/s", -most, most, 3);
   const element = h("div", { class: "gauges" }, chamber, gyro, rate);
-  const apart = (value, target) => (Number.isFinite(value) && Number.isFinite(target) ? `set point ${setting(target)} deg C, ${Math.abs(value - target) < 0.005 ? "there" : `${Math.abs(value - target).toFixed(2)} K ${value > target ? "above" : "below"}`}` : Number.isFinite(value) ? "no set point yet" : "no reading yet");
+  const apart = (value, target) => (Number.isFinite(value) && Number.isFinite(target) ? `set point ${plainNumber(target)} deg C, ${Math.abs(value - target) < 0.005 ? "there" : `${Math.abs(value - target).toFixed(2)} K ${value > target ? "above" : "below"}`}` : Number.isFinite(value) ? "no set point yet" : "no reading yet");
   element.set = (status, setpoint_c) => {
     const number = (value) => (value === null || value === undefined ? NaN : value);
     chamber.set(number(status.chamber_c), setpoint_c ?? NaN, apart(number(status.chamber_c), setpoint_c ?? NaN));

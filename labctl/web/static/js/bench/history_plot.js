@@ -2,10 +2,10 @@
 
 import { colour, figure } from "../core/figure.js";
 
-const EVERY_MS = 1000;
+const MIN_INTERVAL_MS = 1000;
 const UNITS = [[10_800, "h", 3600], [600, "min", 60], [0, "s", 1]];
 
-export function rolling(history) {
+export function historyPlot(history) {
   const draw = () => {
     const { t_s } = history;
     const long = (t_s.at(-1) ?? 0) - (t_s[0] ?? 0);
@@ -34,7 +34,7 @@ export function rolling(history) {
     if (waiting) return;
     waiting = setTimeout(() => {
       waiting = null;
-      next = Date.now() + EVERY_MS;
+      next = Date.now() + MIN_INTERVAL_MS;
       element.redraw();
     }, Math.max(0, next - Date.now()));
   };

@@ -2,32 +2,32 @@
 
 import { h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
-import { card, facts, notice } from "../core/components.js";
-import { canResume, KINDS, stateChip } from "../campaigns/states.js";
-import { due } from "../campaigns/start_time.js";
-import { link, resumeButton } from "./actions.js";
+import { card, factList, notice } from "../core/components.js";
+import { canResume, CHIP_KINDS, stateChip } from "../campaigns/states.js";
+import { startTime } from "../campaigns/start_time.js";
+import { linkButton, resumeButton } from "./actions.js";
 
-export function withoutBench() {
+export function noBenchCard() {
   return card("This service drives no bench",
     h("p", {}, "It serves calibrations and takes recordings in. A bench comes with it when it is started so:"),
     h("pre", { class: "command" }, "labctl serve --simulate\nlabctl serve --bench FILE"),
     h("p", { class: "soft" }, "The first has a simulated tri-axial bench, as fast as you like with --speed; the second drives the instruments that the bench file names."),
-    h("div", { class: "row" }, link("To the recordings", "/recordings")));
+    h("div", { class: "row" }, linkButton("To the recordings", "/recordings")));
 }
 
 /** `next` is the schedule's next entry, `last` the newest campaign; either may be missing. */
-export function idle(bench, last, next) {
+export function idleBench(bench, last, next) {
   return h("div", { class: "columns", style: "--least: 17rem" },
     card("Nothing runs",
       h("p", {}, bench.unconfirmed ? "No campaign starts before the bench was looked at." : `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`),
-      h("div", { class: "row" }, link("Plan a campaign", "/campaigns/new", "first"), link("All campaigns", "/campaigns"))),
+      h("div", { class: "row" }, linkButton("Plan a campaign", "/campaigns/new", "first"), linkButton("All campaigns", "/campaigns"))),
     card("Next on the schedule", next
-      ? [h("p", { class: "told" }, due(next)), h("p", { class: "soft" }, `${next.recipe} on ${next.bench}`, next.cron ? [", then again: ", h("code", {}, next.cron)] : null)]
+      ? [h("p", { class: "told" }, startTime(next)), h("p", { class: "soft" }, `${next.recipe} on ${next.bench}`, next.cron ? [", then again: ", h("code", {}, next.cron)] : null)]
       : h("p", { class: "soft" }, "Nothing is scheduled.")),
     last ? card(`Last: campaign ${last.id}`,
       h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),
-      facts([["Ended", last.ended_at ? instant(last.ended_at) : "not", "", last.started_at && last.ended_at ? `took ${duration((Date.parse(last.ended_at) - Date.parse(last.started_at)) / 1000)}` : null], ["Progress", percent(last.progress)]]),
-      last.reason ? notice(KINDS[last.state] ?? "warn", last.reason) : null,
-      h("div", { class: "row" }, Object.entries(last.recordings).map(([serial, recording]) => link(`Explore ${serial}`, `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`)),
+      factList([["Ended", last.ended_at ? instant(last.ended_at) : "not", "", last.started_at && last.ended_at ? `took ${duration((Date.parse(last.ended_at) - Date.parse(last.started_at)) / 1000)}` : null], ["Progress", percent(last.progress)]]),
+      last.reason ? notice(CHIP_KINDS[last.state] ?? "warn", last.reason) : null,
+      h("div", { class: "row" }, Object.entries(last.recordings).map(([serial, recording]) => linkButton(`Explore ${serial}`, `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`)),
         canResume(last) && last.bench === bench.name ? resumeButton(last.id, { whole: true }) : null)) : null);
 }

@@ -1,21 +1,21 @@
 // The readings of the newest finished data set of the campaign.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/elements.js";
+import { setChildren, h } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
-import { setting } from "../core/format.js";
-import { headed } from "../core/components.js";
+import { plainNumber } from "../core/format.js";
+import { cardWithHeader } from "../core/components.js";
 
-const READINGS = 4000;
-const EVERY_MS = 3000;
+const MAX_READINGS = 4000;
+const MIN_INTERVAL_MS = 3000;
 
 /** A card that follows the data sets as they are finished: `tell(status)`. Quiet while there is none. */
-export function output(timeline, signal) {
+export function lastDataset(timeline, signal) {
   const about = h("span", { class: "soft small" });
   const place = h("div", {}, h("p", { class: "soft" }, "The first data set has not been measured yet."));
   let columns = null;
   let [shown, next, busy, unit] = [null, 0, false, null];
-  const picture = figure("Gyro output of the last data set", `As recorded; of a long data set the first ${READINGS} readings.`, () => {
+  const picture = figure("Gyro output of the last data set", `As recorded; of a long data set the first ${MAX_READINGS} readings.`, () => {
     const axes = Object.keys(columns ?? {}).filter((name) => name.startsWith("gyro_"));
     const t = (columns?.t_s ?? []).map((value) => value - columns.t_s[0]);
     const thirds = axes.length > 1 ? axes.length : 1;
@@ -33,14 +33,14 @@ export function output(timeline, signal) {
     const dataset = timeline.dataset.slice(0, until).findLast((each) => each !== null) ?? null;
     const recording = Object.values(status.recordings)[0];
     if (busy || !recording || dataset === null || dataset === shown || Date.now() < next) return;
-    [busy, next] = [true, Date.now() + EVERY_MS];
+    [busy, next] = [true, Date.now() + MIN_INTERVAL_MS];
     try {
-      const found = await get(`/api/recordings/${recording}/samples`, { query: { dataset, limit: READINGS }, signal });
-      unit ??= await unitOf(recording, found.columns, signal);
+      const found = await get(`/api/recordings/${recording}/samples`, { query: { dataset, limit: MAX_READINGS }, signal });
+      unit ??= await outputUnit(recording, found.columns, signal);
       columns = { ...found.columns, unit };
       const k = timeline.dataset.indexOf(dataset);
-      fill(about, h("a", { href: `/recordings/${recording}?dataset=${dataset}` }, `Data set ${dataset}`), `: ${setting(timeline.rate_dps[k])} deg/s at ${setting(timeline.temperature_c[k])} deg C, ${timeline.position[k] ?? "?"} up`);
-      if (!picture.isConnected) fill(place, picture);
+      setChildren(about, h("a", { href: `/recordings/${recording}?dataset=${dataset}` }, `Data set ${dataset}`), `: ${plainNumber(timeline.rate_dps[k])} deg/s at ${plainNumber(timeline.temperature_c[k])} deg C, ${timeline.position[k] ?? "?"} up`);
+      if (!picture.isConnected) setChildren(place, picture);
       picture.redraw();
       shown = dataset;
     } catch {
@@ -49,11 +49,11 @@ export function output(timeline, signal) {
       busy = false;
     }
   }
-  return Object.assign(headed("Last data set", about, place), { tell });
+  return Object.assign(cardWithHeader("Last data set", about, place), { tell });
 }
 
 /** The unit of an output: the trace names it, also of a few seconds. */
-async function unitOf(recording, columns, signal) {
+async function outputUnit(recording, columns, signal) {
   const channel = Object.keys(columns).find((name) => name.startsWith("gyro_"));
   const asked = { channel, from_s: columns.t_s[0], until_s: columns.t_s.at(-1), points: 200 };
   return (await get(`/api/recordings/${recording}/trace`, { query: asked, signal })).unit;

@@ -1,15 +1,15 @@
 // A plan as a picture: temperature over time with its data sets, their rates below, positions as bands.
 
 import { colour, figure } from "../core/figure.js";
-import { duration, setting } from "../core/format.js";
+import { duration, plainNumber } from "../core/format.js";
 
 /** What becomes of a data set: its colour, in the order of the legend. */
 const STATES = [["done", "good"], ["running", "accent"], ["to come", "line-strong"], ["failed", "bad"], ["interrupted", "bad"], ["skipped", "soft"]];
 /** Shorter plans are drawn in minutes, s. */
-const IN_HOURS = 3 * 3600;
+const HOURS_FROM_S = 3 * 3600;
 
 /** Steps in the order of time with begin and end in `unit_s`, whether they were run or are only planned. */
-function stepsOf(timeline, unit_s) {
+function planSteps(timeline, unit_s) {
   return timeline.number.map((number, k) => {
     const from = timeline.forecast_s?.[k] ?? timeline.start_s[k];
     const over = timeline.ended_s?.[k];
@@ -19,7 +19,7 @@ function stepsOf(timeline, unit_s) {
 }
 
 /** The set point: held, and on its way while the chamber moves. */
-function course(steps) {
+function setPointCourse(steps) {
   const [x, y] = [[], []];
   let held = null;
   for (const step of steps) {
@@ -36,7 +36,7 @@ function course(steps) {
   return { x, y };
 }
 
-function bands(steps) {
+function positionBands(steps) {
   const found = [];
   for (const step of steps) {
     if (!step.position) continue;
@@ -51,12 +51,12 @@ function bands(steps) {
  * The picture of a plan. `give()` returns {timeline, now_s, live}: the columns of the API, the present moment in seconds of
  * the campaign (null: it does not run), and whether states mean anything yet. `pick(dataset)` is called for a pressed data set.
  */
-export function planPicture(name, give, { tall = "24rem", pick } = {}) {
+export function planChart(name, give, { tall = "24rem", pick } = {}) {
   const caption = "Above: set point of the chamber, with the data sets on it. Below: their table rates. Bands: which axis of the unit points up.";
   const draw = () => {
     const { timeline, now_s = null, live = false } = give();
-    const unit_s = timeline.start_s.at(-1) + timeline.expected_s.at(-1) > IN_HOURS ? 3600 : 60;
-    const steps = stepsOf(timeline, unit_s);
+    const unit_s = timeline.start_s.at(-1) + timeline.expected_s.at(-1) > HOURS_FROM_S ? 3600 : 60;
+    const steps = planSteps(timeline, unit_s);
     const sets = steps.filter((step) => step.dataset !== null);
     const narrow = window.innerWidth < 760;
     const marks = STATES.flatMap(([state, shade]) => {
@@ -64,7 +64,7 @@ export function planPicture(name, give, { tall = "24rem", pick } = {}) {
       if (!here.length) return [];
       const common = {
         type: "scatter", mode: "markers", name: live ? `${state} (${here.length})` : "data sets", legendgroup: state, x: here.map((step) => (step.from + step.until) / 2), customdata: here.map((step) => step.dataset),
-        text: here.map((step) => `data set ${step.dataset}: ${setting(step.rate)} deg/s at ${setting(step.warm)} deg C, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`),
+        text: here.map((step) => `data set ${step.dataset}: ${plainNumber(step.rate)} deg/s at ${plainNumber(step.warm)} deg C, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`),
         hovertemplate: "%{text}<extra></extra>", selected: { marker: { opacity: 1 } },
       };
       const fill = colour(live ? shade : "accent");
@@ -74,14 +74,14 @@ export function planPicture(name, give, { tall = "24rem", pick } = {}) {
       ];
     });
     const end = steps.at(-1)?.until ?? 1;
-    const shapes = bands(steps).map((band) => ({ type: "rect", xref: "x", yref: "paper", x0: band.from, x1: band.until, y0: 0, y1: 1, line: { width: 0 }, fillcolor: colour(`axis-${band.position.replace("-", "")}`), opacity: 0.1, layer: "below" }));
-    const words = bands(steps).filter((band) => band.until - band.from > end / (narrow ? 12 : 30)).map((band) => ({ text: `<b>${band.position}</b> up`, showarrow: false, xref: "x", yref: "paper", x: (band.from + band.until) / 2, y: 1, yanchor: "bottom", font: { size: 11.5, color: colour(`axis-${band.position.replace("-", "")}`) } }));
+    const shapes = positionBands(steps).map((band) => ({ type: "rect", xref: "x", yref: "paper", x0: band.from, x1: band.until, y0: 0, y1: 1, line: { width: 0 }, fillcolor: colour(`axis-${band.position.replace("-", "")}`), opacity: 0.1, layer: "below" }));
+    const words = positionBands(steps).filter((band) => band.until - band.from > end / (narrow ? 12 : 30)).map((band) => ({ text: `<b>${band.position}</b> up`, showarrow: false, xref: "x", yref: "paper", x: (band.from + band.until) / 2, y: 1, yanchor: "bottom", font: { size: 11.5, color: colour(`axis-${band.position.replace("-", "")}`) } }));
     if (Number.isFinite(now_s)) {
       shapes.push({ type: "line", xref: "x", yref: "paper", x0: now_s / unit_s, x1: now_s / unit_s, y0: 0, y1: 1, line: { color: colour("ink"), width: 1.6, dash: "dot" } });
       words.push({ text: "now", showarrow: false, xref: "x", yref: "paper", x: now_s / unit_s, y: 0.42, yanchor: "middle", xanchor: now_s / unit_s > end * 0.9 ? "right" : "left", font: { size: 11.5, color: colour("ink") } });
     }
     return {
-      data: [{ type: "scatter", mode: "lines", name: "set point", ...course(steps), line: { color: colour("soft"), width: 1.5 }, hoverinfo: "skip", showlegend: false }, ...marks],
+      data: [{ type: "scatter", mode: "lines", name: "set point", ...setPointCourse(steps), line: { color: colour("soft"), width: 1.5 }, hoverinfo: "skip", showlegend: false }, ...marks],
       layout: {
         margin: { l: 56, r: 12, t: live ? 44 : 24, b: 42 }, shapes, annotations: words, legend: { orientation: "h", y: 1.07, yanchor: "bottom", x: 0 },
         xaxis: { title: { text: `time since the beginning, ${unit_s === 3600 ? "h" : "min"}` }, anchor: "y2", range: [-0.01 * end, Math.max(end, (now_s || 0) / unit_s) * 1.01] },

@@ -1,20 +1,20 @@
 // Which recipe: one that comes with the house, or one's own as TOML.
 
-import { fill, fresh, h } from "../core/elements.js";
+import { setChildren, uniqueId, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
-import { card, chip, field } from "../core/components.js";
+import { card, chip, labelledField } from "../core/components.js";
 
-const TYPED_MS = 600;
+const TYPING_PAUSE_MS = 600;
 
 /** `choice` is {name, text}: `name` "own" means `text`. `chosen(choice)` is called with every other choice. */
-export function recipes(all, choice, chosen) {
-  const group = fresh("recipe");
+export function recipeChoice(all, choice, chosen) {
+  const group = uniqueId("recipe");
   const text = h("textarea", { rows: "16", spellcheck: "false", value: choice.text ?? "", oninput: () => {
     clearTimeout(waiting);
-    waiting = setTimeout(() => chosen({ name: "own", text: text.value }), TYPED_MS);
+    waiting = setTimeout(() => chosen({ name: "own", text: text.value }), TYPING_PAUSE_MS);
   } });
   let waiting = null;
-  const own = h("div", {}, field("Recipe as TOML", text, "Planned again as you type. Nothing moves before you start it."));
+  const own = h("div", {}, labelledField("Recipe as TOML", text, "Planned again as you type. Nothing moves before you start it."));
   const shipped = h("details", {}, h("summary", {}, "Its text"), h("pre", { class: "command" }));
   const edit = h("button", { type: "button", class: "button tiny", onclick: () => {
     text.value = shipped.querySelector("pre").textContent;
@@ -38,7 +38,7 @@ export function recipes(all, choice, chosen) {
   function show(name) {
     own.hidden = name !== "own";
     shipped.hidden = name === "own";
-    fill(shipped.querySelector("pre"), all.find((each) => each.name === name)?.text ?? "");
+    setChildren(shipped.querySelector("pre"), all.find((each) => each.name === name)?.text ?? "");
   }
   show(choice.name);
   return card("Recipe",

@@ -1,22 +1,22 @@
 // When it begins: now, at a time, again and again, or at once in simulation alone.
 
 import { post } from "../core/api.js";
-import { fill, h } from "../core/elements.js";
+import { setChildren, h } from "../core/elements.js";
 import { instant } from "../core/format.js";
-import { button, card, field, notice, tabs, toast } from "../core/components.js";
-import { go } from "../core/router.js";
+import { button, card, labelledField, notice, toggleGroup, toast } from "../core/components.js";
+import { navigate } from "../core/router.js";
 
-const ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone;
+const LOCAL_TIME_ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone;
 const HOUR_S = 3600;
 
 /** `order()` gives {recipe, clip, hide} as it is chosen; `bench` is the service's own, null without. */
-export function begin(bench, order) {
+export function startForm(bench, order) {
   const when = [...(bench ? [["now", "Now"], ["at", "At a time"], ["cron", "Again and again"]] : []), ["simulation", "In simulation, without a bench"]];
   const place = h("div", { class: "stack" });
   let chosen = when[0][0];
   const at = h("input", { type: "datetime-local" });
   const cron = h("input", { type: "text", value: "0 20 * * FRI", spellcheck: "false" });
-  const zone = h("input", { type: "text", value: ZONE, spellcheck: "false", list: "zones" });
+  const zone = h("input", { type: "text", value: LOCAL_TIME_ZONE, spellcheck: "false", list: "zones" });
   const zones = h("datalist", { id: "zones" }, (Intl.supportedValuesOf?.("timeZone") ?? []).map((value) => h("option", { value })));
   const priority = h("input", { type: "number", value: "0", min: "-100", max: "100", step: "1" });
   const late = h("input", { type: "number", min: "0", step: "any", placeholder: "any time" });
@@ -25,7 +25,7 @@ export function begin(bench, order) {
   async function now() {
     const made = await post("/api/campaigns", order());
     toast("good", `Campaign ${made.id} begins.`);
-    await go("/bench");
+    await navigate("/bench");
   }
   async function later() {
     const { hide, ...rest } = order();
@@ -33,23 +33,23 @@ export function begin(bench, order) {
     if (chosen === "at" && !at.value) throw new Error("Say when it is to begin.");
     const made = await post("/api/campaigns", { ...rest, ...(chosen === "at" ? { at: at.value } : { cron: cron.value }), time_zone: zone.value || null, priority: Number(priority.value), ...(late.value === "" ? {} : { late_limit_s: Number(late.value) * HOUR_S }) });
     toast("good", `It begins ${instant(made.due_at)}, your time.`);
-    await go("/campaigns");
+    await navigate("/campaigns");
   }
   async function simulated() {
     const made = await post("/api/recordings/simulated", { ...order(), seed: Number(seed.value) });
     toast("good", `Recording ${made.recording}: ${made.datasets} data sets.`);
-    await go(`/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}`);
+    await navigate(`/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}`);
   }
   const FORMS = {
     now: () => [bench.unconfirmed ? notice("bad", "The bench was not confirmed safe: ", h("a", { href: "/bench" }, "look at it first"), ".") : bench.campaign ? notice("warn", `Campaign ${bench.campaign} runs on ${bench.name} now; it has to end first. A start at a time waits for it.`) : null, h("div", { class: "row" }, button(`Start on ${bench.name}`, now, { kind: "first big" }))],
-    at: () => [h("div", { class: "row", style: "align-items: start" }, field("Begin at", at), field("Time zone", zone), field("Priority", priority, "Of starts that are due, the highest goes first."), field("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "first big" }))],
-    cron: () => [h("div", { class: "row", style: "align-items: start" }, field("Cron line", cron, "minute hour day month weekday"), field("Time zone", zone), field("Priority", priority, "Of starts that are due, the highest goes first."), field("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "first big" }))],
-    simulation: () => [h("p", { class: "soft" }, "A recording of this plan is made at once in simulation and taken in; no bench moves, no campaign is kept."), h("div", { class: "row", style: "align-items: end" }, field("Seed", seed, "Same seed, same recording."), button("Simulate the recording", simulated, { kind: "first big" }))],
+    at: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Begin at", at), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "first big" }))],
+    cron: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Cron line", cron, "minute hour day month weekday"), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "first big" }))],
+    simulation: () => [h("p", { class: "soft" }, "A recording of this plan is made at once in simulation and taken in; no bench moves, no campaign is kept."), h("div", { class: "row", style: "align-items: end" }, labelledField("Seed", seed, "Same seed, same recording."), button("Simulate the recording", simulated, { kind: "first big" }))],
   };
-  const show = () => fill(place, FORMS[chosen]());
+  const show = () => setChildren(place, FORMS[chosen]());
   show();
   const element = card("Begin", bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."),
-    h("div", {}, tabs("When", when, chosen, (value) => {
+    h("div", {}, toggleGroup("When", when, chosen, (value) => {
       chosen = value;
       show();
     })), place);

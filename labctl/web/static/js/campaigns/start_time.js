@@ -3,11 +3,11 @@
 import { h } from "../core/elements.js";
 import { instant } from "../core/format.js";
 
-const FORM = { weekday: "short", day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };
+const TIME_FORMAT = { weekday: "short", day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };
 
-export function due(row) {
+export function startTime(row) {
   if (!row.due_at) return "–";
-  const there = new Date(row.due_at).toLocaleString("en-GB", { ...FORM, timeZone: row.time_zone });
+  const there = new Date(row.due_at).toLocaleString("en-GB", { ...TIME_FORMAT, timeZone: row.time_zone });
   const here = instant(row.due_at);
   return h("span", {}, h("strong", { class: "nowrap" }, there), h("span", { class: "soft small beside" }, row.time_zone, there === here ? null : `; ${here} where you are`));
 }

@@ -1,28 +1,28 @@
 // What a plan could find, and what it could not, before anything is measured.
 
 import { h } from "../core/elements.js";
-import { sizeWords, words } from "../core/format.js";
+import { sizeText, idText } from "../core/format.js";
 import { notice, table } from "../core/components.js";
 
 /** Less than this of an effect left beside the usual model: the model takes it in by itself. */
-const TAKEN_IN = 0.02;
+const ABSORBED_SHARE = 0.02;
 
-const effect = (row) => h("a", { href: `/effects/${row.effect}` }, words(row.effect));
+const effectLink = (row) => h("a", { href: `/effects/${row.effect}` }, idText(row.effect));
 
-const size = (row) => (row.smallest_size === null ? "–" : sizeWords(row.smallest_size, row.unit));
+const smallestSize = (row) => (row.smallest_size === null ? "–" : sizeText(row.smallest_size, row.unit));
 
-export function visibility(rows) {
+export function visibilityReport(rows) {
   const seen = rows.filter((row) => row.visible).sort((a, b) => b.share - a.share);
-  const fitted = rows.filter((row) => !row.visible && row.why === "schedule" && row.share < TAKEN_IN);
+  const fitted = rows.filter((row) => !row.visible && row.why === "schedule" && row.share < ABSORBED_SHARE);
   const unseen = rows.filter((row) => !row.visible && !fitted.includes(row));
   return [
     h("p", {}, h("strong", {}, `It could find ${seen.length} of ${rows.length} effects`), unseen.length ? ` and could not find ${unseen.length}; ` : "; ", fitted.length ? `${fitted.length} are part of the usual model and are fitted.` : null),
-    h("ul", { class: "findable", "aria-label": "Effects this plan could find, from which size on" }, seen.map((row) => h("li", { title: `${Math.round(100 * row.share)} % of it is left beside the usual model` }, effect(row), h("span", { class: "nowrap" }, size(row))))),
+    h("ul", { class: "findable", "aria-label": "Effects this plan could find, from which size on" }, seen.map((row) => h("li", { title: `${Math.round(100 * row.share)} % of it is left beside the usual model` }, effectLink(row), h("span", { class: "nowrap" }, smallestSize(row))))),
     h("p", { class: "soft small" }, "Beside each: the smallest size that is just detectable, in the effect's unit. ppm: millionths, of the rate or of the full effect."),
     unseen.length ? table([
-      { title: "Could not be found", cell: effect },
-      { title: "Why, and what would show it", prose: true, cell: (row) => (row.why === "channel" ? `needs ${row.needs.map(words).join(", ")}, which is not logged` : [h("span", {}, "this schedule does not part it from the rest"), row.experiment ? h("span", { class: "soft small beside" }, `Try: ${row.experiment}`) : null]) },
+      { title: "Could not be found", cell: effectLink },
+      { title: "Why, and what would show it", prose: true, cell: (row) => (row.why === "channel" ? `needs ${row.needs.map(idText).join(", ")}, which is not logged` : [h("span", {}, "this schedule does not part it from the rest"), row.experiment ? h("span", { class: "soft small beside" }, `Try: ${row.experiment}`) : null]) },
     ], unseen, { label: "Effects this plan could not find" }) : notice("good", "Nothing of the catalogue stays hidden from it."),
-    fitted.length ? h("p", { class: "soft small" }, "In the usual model already: ", fitted.flatMap((row, k) => (k ? [", ", effect(row)] : [effect(row)])), ".") : null,
+    fitted.length ? h("p", { class: "soft small" }, "In the usual model already: ", fitted.flatMap((row, k) => (k ? [", ", effectLink(row)] : [effectLink(row)])), ".") : null,
   ];
 }

@@ -17,14 +17,14 @@ export class Unreachable extends Error {
   }
 }
 
-export const key = () => sessionStorage.getItem(KEY);
-export const setKey = (value) => (value ? sessionStorage.setItem(KEY, value) : sessionStorage.removeItem(KEY));
+export const accessKey = () => sessionStorage.getItem(KEY);
+export const setAccessKey = (value) => (value ? sessionStorage.setItem(KEY, value) : sessionStorage.removeItem(KEY));
 
 function headers(more = {}) {
-  return key() ? { ...more, Authorization: `Bearer ${key()}` } : more;
+  return accessKey() ? { ...more, Authorization: `Bearer ${accessKey()}` } : more;
 }
 
-async function answer(path, options) {
+async function request(path, options) {
   let response;
   try {
     response = await fetch(path, options);
@@ -39,7 +39,7 @@ async function answer(path, options) {
 }
 
 /** Path and query: `at("/api/x", {recording: 3, formula: ["a", "b"]})`; null is left out. */
-export function at(path, query = {}) {
+export function withQuery(path, query = {}) {
   const search = new URLSearchParams();
   for (const [name, value] of Object.entries(query)) {
     for (const one of Array.isArray(value) ? value : [value]) if (one !== null && one !== undefined && one !== "") search.append(name, one);
@@ -49,32 +49,32 @@ export function at(path, query = {}) {
 }
 
 export async function get(path, { query, signal } = {}) {
-  return (await answer(at(path, query), { headers: headers(), signal })).json();
+  return (await request(withQuery(path, query), { headers: headers(), signal })).json();
 }
 
 export async function post(path, body = {}, { signal } = {}) {
   const options = { method: "POST", headers: headers({ "Content-Type": "application/json" }), body: JSON.stringify(body), signal };
-  return (await answer(path, options)).json();
+  return (await request(path, options)).json();
 }
 
 export async function remove(path) {
-  return (await answer(path, { method: "DELETE", headers: headers() })).json();
+  return (await request(path, { method: "DELETE", headers: headers() })).json();
 }
 
 /** Send files as one form. */
 export async function upload(path, files) {
   const form = new FormData();
   for (const file of files) form.append("files", file, file.name);
-  return (await answer(path, { method: "POST", headers: headers(), body: form })).json();
+  return (await request(path, { method: "POST", headers: headers(), body: form })).json();
 }
 
 /** Fetch a file with the key and hand it to the reader. */
 export async function download(path, name) {
-  const blob = await (await answer(path, { headers: headers() })).blob();
-  save(blob, name);
+  const blob = await (await request(path, { headers: headers() })).blob();
+  saveBlob(blob, name);
 }
 
-export function save(blob, name) {
+export function saveBlob(blob, name) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
   link.download = name;
@@ -86,8 +86,8 @@ export function save(blob, name) {
  * Yield {event, id, data} of a stream of server-sent events until it ends; a comment, by which the service says that it
  * lives, is {event: "alive"}. EventSource cannot send a key.
  */
-export async function* events(path, { after, signal } = {}) {
-  const response = await answer(path, { headers: headers(after ? { "Last-Event-ID": String(after) } : {}), signal });
+export async function* eventStream(path, { after, signal } = {}) {
+  const response = await request(path, { headers: headers(after ? { "Last-Event-ID": String(after) } : {}), signal });
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";
   try {
@@ -97,14 +97,14 @@ export async function* events(path, { after, signal } = {}) {
       text += value;
       const messages = text.split(/\r?\n\r?\n/);
       text = messages.pop();
-      for (const message of messages) yield parsed(message);
+      for (const message of messages) yield parseMessage(message);
     }
   } finally {
     reader.cancel().catch(() => {});
   }
 }
 
-function parsed(message) {
+function parseMessage(message) {
   const found = { event: "message", id: null, data: null };
   for (const line of message.split(/\r?\n/)) {
     const [, field, value] = /^(\w*):? ?(.*)$/s.exec(line) ?? [];

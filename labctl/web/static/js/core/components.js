@@ -1,26 +1,26 @@
 // Parts that several pages are put together from.
 
 import { Problem, Unreachable } from "./api.js";
-import { fill, fresh, h } from "./elements.js";
+import { setChildren, uniqueId, h } from "./elements.js";
 
 /** A card with a heading; `beside` stands at the heading's right. */
 export function card(title, ...children) {
   return h("section", { class: "card stack", "aria-label": title }, h("h2", {}, title), ...children);
 }
 
-export function headed(title, beside, ...children) {
+export function cardWithHeader(title, beside, ...children) {
   return h("section", { class: "card stack", "aria-label": title }, h("div", { class: "card-head" }, h("h2", {}, title), beside), ...children);
 }
 
 /** The head of a page: its h1, a line below, and what can be done at the right. */
-export function head(title, line, ...acts) {
+export function pageHeader(title, line, ...acts) {
   return h("header", { class: "page-head" },
     h("div", {}, h("h1", {}, title), line ? h("p", { class: "soft" }, line) : null),
     acts.length ? h("div", { class: "row" }, ...acts) : null);
 }
 
 /** Facts side by side: [name, value, unit, beside]. */
-export function facts(rows) {
+export function factList(rows) {
   return h("dl", { class: "facts" }, rows.filter(Boolean).map(([name, value, unit, beside]) =>
     h("div", { class: "fact" }, h("dt", {}, name),
       h("dd", {}, value, unit ? [" ", h("span", { class: "unit" }, unit)] : null, beside ? h("span", { class: "beside" }, beside) : null))));
@@ -30,8 +30,8 @@ export const chip = (text, kind = "") => h("span", { class: `chip ${kind}` }, te
 /** A model's name, which may break after each part: yang2018+ scale_factor_asymmetry. */
 export const modelName = (name) => (name ?? "").split(/(?<=\+)/).flatMap((part, k) => (k ? [h("wbr"), part] : [part]));
 export const notice = (kind, ...children) => h("div", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : "status" }, ...children);
-export const empty = (...children) => h("div", { class: "empty stack" }, ...children);
-export const busy = (text) => h("p", { class: "busy soft", role: "status" }, text);
+export const emptyState = (...children) => h("div", { class: "empty stack" }, ...children);
+export const busyIndicator = (text) => h("p", { class: "busy soft", role: "status" }, text);
 
 /** A table: columns are {title, number?, prose?, cell(row)}. On a phone its rows become cards, unless they are `dense`. */
 export function table(columns, rows, { label, selected, onrow, first, dense } = {}) {
@@ -44,22 +44,22 @@ export function table(columns, rows, { label, selected, onrow, first, dense } = 
 }
 
 /** Labelled select: options are [value, text]. */
-export function choice(label, options, value, onchange) {
-  const id = fresh("choice");
+export function selectField(label, options, value, onchange) {
+  const id = uniqueId("choice");
   return h("div", { class: "field" }, h("label", { for: id }, label),
     h("select", { id, onchange: (event) => onchange(event.target.value) },
       options.map(([each, text]) => h("option", { value: each, selected: String(each) === String(value) }, text))));
 }
 
-export function field(label, input, hint) {
-  const id = fresh("field");
+export function labelledField(label, input, hint) {
+  const id = uniqueId("field");
   input.id = id;
   if (hint) input.setAttribute("aria-describedby", `${id}-hint`);
   return h("div", { class: "field" }, h("label", { for: id }, label), input, hint ? h("span", { class: "hint", id: `${id}-hint` }, hint) : null);
 }
 
 /** A row of buttons of which one is chosen: [value, text]. */
-export function tabs(label, options, value, onchange) {
+export function toggleGroup(label, options, value, onchange) {
   const buttons = options.map(([each, text]) =>
     h("button", { type: "button", "aria-pressed": String(each === value), onclick: () => {
       buttons.forEach((button, k) => button.setAttribute("aria-pressed", String(options[k][0] === each)));
@@ -87,7 +87,7 @@ export function button(text, act, { kind = "", done } = {}) {
 }
 
 /** What went wrong, in words, with a way to try again. */
-export function trouble(error, again) {
+export function errorPage(error, again) {
   const what = error instanceof Problem ? error.title : error instanceof Unreachable ? "No answer" : "Something went wrong on this page";
   if (!(error instanceof Problem || error instanceof Unreachable)) console.error(error);
   return h("div", { class: "page" }, h("h1", {}, what), notice("bad", h("p", {}, error.message)),
@@ -106,13 +106,13 @@ export function toast(kind, text) {
 export function dialog(title, fields, { text, confirm = "Go on", kind = "first" } = {}) {
   return new Promise((resolve) => {
     const inputs = fields.map((f) => h("input", { name: f.name, type: f.type ?? "text", value: f.value ?? "", required: f.required !== false, autocomplete: "off" }));
-    const name = fresh("dialog");
+    const name = uniqueId("dialog");
     const box = h("dialog", { "aria-labelledby": name }, h("form", { method: "dialog", onsubmit: (event) => {
       event.preventDefault();
       box.close("yes");
     } },
     h("h2", { id: name }, title), text ? h("p", { class: "soft" }, text) : null,
-    fields.map((f, k) => field(f.label, inputs[k], f.hint)),
+    fields.map((f, k) => labelledField(f.label, inputs[k], f.hint)),
     h("div", { class: "row", style: "justify-content: flex-end" },
       h("button", { class: "button quiet", type: "button", onclick: () => box.close() }, "Cancel"),
       h("button", { class: `button ${kind}`, type: "submit" }, confirm))));
@@ -127,12 +127,12 @@ export function dialog(title, fields, { text, confirm = "Go on", kind = "first" 
 }
 
 /** Fill a place with what a promise gives; until then and on failure it says so. */
-export async function later(place, text, make) {
-  fill(place, busy(text));
+export async function loadInto(place, text, make) {
+  setChildren(place, busyIndicator(text));
   try {
-    fill(place, await make());
+    setChildren(place, await make());
   } catch (error) {
-    if (error.name !== "AbortError") fill(place, notice("bad", error.message));
+    if (error.name !== "AbortError") setChildren(place, notice("bad", error.message));
   }
   return place;
 }

@@ -4,15 +4,15 @@ const SVG = "http://www.w3.org/2000/svg";
 
 /** Make an element: `h("a", {href, class, onclick, "aria-label"}, ...children)`. What is null, undefined or false is left out. */
 export function h(tag, attributes = {}, ...children) {
-  return filled(document.createElement(tag), attributes, children);
+  return applyAttributes(document.createElement(tag), attributes, children);
 }
 
 /** The same for SVG. */
-export function s(tag, attributes = {}, ...children) {
-  return filled(document.createElementNS(SVG, tag), attributes, children);
+export function svg(tag, attributes = {}, ...children) {
+  return applyAttributes(document.createElementNS(SVG, tag), attributes, children);
 }
 
-function filled(element, attributes, children) {
+function applyAttributes(element, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
     if (value === null || value === undefined || value === false) continue;
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
@@ -24,17 +24,17 @@ function filled(element, attributes, children) {
 }
 
 /** Put children in the place of whatever an element holds. */
-export function fill(element, ...children) {
+export function setChildren(element, ...children) {
   element.replaceChildren(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
   return element;
 }
 
 let numbers = 0;
 /** A name for a label and its field that nothing else on the page has. */
-export const fresh = (stem) => `${stem}-${++numbers}`;
+export const uniqueId = (stem) => `${stem}-${++numbers}`;
 
 /** Do something once, when an element comes near the window. */
-export function near(element, act) {
+export function whenNearViewport(element, act) {
   new IntersectionObserver((entries, observer) => {
     if (!entries.some((entry) => entry.isIntersecting)) return;
     observer.disconnect();

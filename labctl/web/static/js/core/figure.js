@@ -1,13 +1,13 @@
 // Every picture: drawn by Plotly in the page's colours, saved as PNG, SVG or the numbers behind it as CSV.
 
-import { save } from "./api.js";
-import { h, near } from "./elements.js";
+import { saveBlob } from "./api.js";
+import { h, whenNearViewport } from "./elements.js";
 
 let script = null;
-const drawn = new Set();
+const drawnFigures = new Set();
 
 /** Load Plotly once, when the first picture asks for it. */
-export function plotly() {
+export function loadPlotly() {
   script ??= new Promise((resolve, reject) => {
     const failed = () => {
       script = null; // asked for again by the next picture
@@ -23,7 +23,7 @@ export const axisColour = (axis) => colour(`axis-${axis}`) || colour("accent");
 /** Residual over floor, the same in every map: blue below, red above. */
 export const DIVERGING = [[0, "#1f5fa8"], [0.35, "#8db3d9"], [0.5, "#c9ccd0"], [0.65, "#dd9a8b"], [1, "#b3242f"]];
 /** Temperatures from cold to hot. */
-export function warmth(share) {
+export function temperatureColour(share) {
   const stops = [[45, 95, 190], [80, 170, 190], [190, 170, 90], [215, 110, 50], [180, 40, 50]];
   const at = Math.min(Math.max(share, 0), 1) * (stops.length - 1);
   const k = Math.min(Math.floor(at), stops.length - 2);
@@ -34,7 +34,7 @@ const TOOLS = [["zoom2d", "pan2d", "select2d", "lasso2d", "resetScale2d"]];
 const TOOLS_3D = [["orbitRotation", "pan3d", "resetCameraDefault3d"]];
 const config = (data) => ({ displaylogo: false, responsive: true, displayModeBar: "hover", modeBarButtons: data.some((trace) => /surface|3d/.test(trace.type)) ? TOOLS_3D : TOOLS });
 
-function dressed(layout) {
+function themedLayout(layout) {
   const axis = { gridcolor: colour("line"), zerolinecolor: colour("line-strong"), linecolor: colour("line-strong"), automargin: true, exponentformat: "power", ticks: "outside", tickcolor: colour("line") };
   const own = Object.fromEntries(Object.entries(layout).filter(([name]) => /^[xy]axis\d*$/.test(name)).map(([name, value]) => [name, { ...axis, ...value }]));
   return {
@@ -59,12 +59,12 @@ export function figure(name, caption, draw, { tall = "20rem", csv } = {}) {
   const tool = (text, act, label) => h("button", { type: "button", class: "button quiet tiny", "aria-label": `Save ${name} as ${label}`, onclick: act }, text);
   const element = h("figure", { class: "figure", style: `--tall: ${tall}` },
     plot, caption ? h("figcaption", {}, caption) : null,
-    h("div", { class: "toolbar" }, tool("PNG", () => picture("png"), "PNG"), tool("SVG", () => picture("svg"), "SVG"), tool("CSV", () => save(new Blob([text(rows())], { type: "text/csv" }), `${file(name)}.csv`), "CSV")));
+    h("div", { class: "toolbar" }, tool("PNG", () => picture("png"), "PNG"), tool("SVG", () => picture("svg"), "SVG"), tool("CSV", () => saveBlob(new Blob([text(rows())], { type: "text/csv" }), `${file(name)}.csv`), "CSV")));
 
   async function picture(format) {
-    const Plotly = await plotly();
+    const Plotly = await loadPlotly();
     const link = await Plotly.toImage(plot, { format, width: Math.max(plot.clientWidth, 800), height: Math.max(plot.clientHeight, 450), scale: format === "png" ? 2 : 1 });
-    save(await (await fetch(link)).blob(), `${file(name)}.${format}`);
+    saveBlob(await (await fetch(link)).blob(), `${file(name)}.${format}`);
   }
 
   const rows = () => csv?.() ?? traces(plot.data ?? []);
@@ -73,25 +73,25 @@ export function figure(name, caption, draw, { tall = "20rem", csv } = {}) {
   element.update = async () => {
     if (waiting) return;
     waiting = true;
-    const Plotly = await plotly();
+    const Plotly = await loadPlotly();
     await new Promise(requestAnimationFrame);
     waiting = false;
     const { data, layout = {} } = draw();
     const first = !plot.data;
-    await Plotly.react(plot, data, dressed(layout), config(data));
+    await Plotly.react(plot, data, themedLayout(layout), config(data));
     performance.mark("labctl:picture");
     if (first) {
-      drawn.add(element);
+      drawnFigures.add(element);
       element.ondrawn?.(plot);
     }
   };
   element.redraw = () => plot.data && element.update();
-  near(element, element.update); // a page with ten pictures opens as fast as one with two
+  whenNearViewport(element, element.update); // a page with ten pictures opens as fast as one with two
   return element;
 }
 
 window.addEventListener("labctl:theme", () => {
-  for (const element of drawn) element.isConnected ? element.update() : drawn.delete(element);
+  for (const element of drawnFigures) element.isConnected ? element.update() : drawnFigures.delete(element);
 });
 
 const file = (name) => name.toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, "");

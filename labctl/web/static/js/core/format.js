@@ -10,15 +10,15 @@ export function number(value, digits = 3) {
   return text.toFixed(Math.min(decimals, 8));
 }
 
-const RAISED = { "-": "⁻", "+": "", ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])) };
+const SUPERSCRIPTS = { "-": "⁻", "+": "", ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])) };
 function power(value, digits) {
   const [factor, exponent] = value.toExponential(digits - 1).split("e");
-  return `${factor} × 10${raised(exponent)}`;
+  return `${factor} × 10${superscript(exponent)}`;
 }
-const raised = (text) => [...String(text)].map((sign) => RAISED[sign] ?? sign).join("");
+const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? sign).join("");
 
 /** A setting as it was meant: -100, 12.5, 0.0042. */
-export const setting = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "–");
+export const plainNumber = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "–");
 export const withUnit = (value, unit, digits) => (Number.isFinite(value) ? `${number(value, digits)} ${unit}` : "–");
 export const count = (value) => (Number.isFinite(value) ? value.toLocaleString("en-GB") : "–");
 export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)} %` : "–");
@@ -45,26 +45,26 @@ export const day = (text) => (text ? new Date(text).toLocaleDateString("en-GB", 
 export const clock = (text) => (text ? new Date(text).toLocaleTimeString("en-GB") : "–");
 
 /** An id as words: scale_factor_asymmetry -> scale factor asymmetry. */
-export const words = (id) => String(id).replaceAll("_", " ");
+export const idText = (id) => String(id).replaceAll("_", " ");
 
 /** A unit as a person reads it: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none. */
-export const unitWords = (unit) => (unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => raised(power)));
+export const unitText = (unit) => (unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => superscript(power)));
 
 /** A size with its unit; a plain number is a share of the rate, or of the full effect: 14 ppm, 2.7 %. */
-export function sizeWords(value, unit, digits = 2) {
+export function sizeText(value, unit, digits = 2) {
   if (!Number.isFinite(value)) return "–";
-  if (unit !== "1") return `${value === 0 ? "0" : number(value, digits)} ${unitWords(unit)}`;
-  return Math.abs(value) >= 0.01 ? `${setting(100 * value, digits)} %` : `${setting(1e6 * value, digits)} ppm`;
+  if (unit !== "1") return `${value === 0 ? "0" : number(value, digits)} ${unitText(unit)}`;
+  return Math.abs(value) >= 0.01 ? `${plainNumber(100 * value, digits)} %` : `${plainNumber(1e6 * value, digits)} ppm`;
 }
 
 /** A result with its expanded uncertainty, to the same place: 201.3 ± 3.1 ppm, (9.06 ± 0.02) × 10⁻⁷ (deg/s)⁻¹. */
-export function measured(value, expanded, unit) {
-  if (!Number.isFinite(value) || !(expanded > 0)) return sizeWords(value, unit, 3);
-  const [factor, suffix] = unit !== "1" ? [1, unitWords(unit)] : Math.abs(value) >= 0.01 ? [100, "%"] : [1e6, "ppm"];
+export function withUncertainty(value, expanded, unit) {
+  if (!Number.isFinite(value) || !(expanded > 0)) return sizeText(value, unit, 3);
+  const [factor, suffix] = unit !== "1" ? [1, unitText(unit)] : Math.abs(value) >= 0.01 ? [100, "%"] : [1e6, "ppm"];
   const size = Math.floor(Math.log10(Math.max(Math.abs(value), expanded) * factor));
   const power = size < -4 || size > 5 ? size : 0;
   const [middle, half] = [value, expanded].map((each) => (each * factor) / 10 ** power);
   const decimals = Math.min(Math.max(1 - Math.floor(Math.log10(half)), 0), 8);
   const text = `${middle.toFixed(decimals)} ± ${half.toFixed(decimals)}`;
-  return `${power ? `(${text}) × 10${raised(power)}` : text}${suffix ? ` ${suffix}` : ""}`;
+  return `${power ? `(${text}) × 10${superscript(power)}` : text}${suffix ? ` ${suffix}` : ""}`;
 }

@@ -1,11 +1,11 @@
 // What stands around every page: the rail, the key, the theme, and whether the service still answers.
 
-import { key, setKey } from "./api.js";
-import { fill, h, s } from "./elements.js";
+import { accessKey, setAccessKey } from "./api.js";
+import { setChildren, h, svg } from "./elements.js";
 import { dialog } from "./components.js";
 import { show } from "./router.js";
 
-const PLACES = [
+const NAVIGATION = [
   ["/bench", "Bench", "M4 20h16M6 20V9l6-5 6 5v11M10 20v-5h4v5"],
   ["/campaigns", "Campaigns", "M4 5h16M4 12h10M4 19h7M17 14v6m-3-3h6"],
   ["/units", "Units", "M12 3l8 4.5v9L12 21l-8-4.5v-9zM4 7.5l8 4.5 8-4.5M12 12v9"],
@@ -14,10 +14,10 @@ const PLACES = [
   ["/effects", "Effects", "M5 4h11a3 3 0 013 3v13H8a3 3 0 01-3-3zM5 17a3 3 0 013-3h11"],
 ];
 
-const icon = (path) => s("svg", { viewBox: "0 0 24 24", fill: "none", stroke: "currentColor", "stroke-width": "1.8", "stroke-linecap": "round", "stroke-linejoin": "round", "aria-hidden": "true" }, s("path", { d: path }));
+const icon = (path) => svg("svg", { viewBox: "0 0 24 24", fill: "none", stroke: "currentColor", "stroke-width": "1.8", "stroke-linecap": "round", "stroke-linejoin": "round", "aria-hidden": "true" }, svg("path", { d: path }));
 
-export function shell() {
-  const links = PLACES.map(([path, name, drawing]) => h("a", { href: path }, icon(drawing), name));
+export function buildLayout() {
+  const links = NAVIGATION.map(([path, name, drawing]) => h("a", { href: path }, icon(drawing), name));
   const [themes, keys] = [[], []];
   /** The buttons of the theme and the key: in the rail, and on a phone below the page. */
   const controls = () => {
@@ -26,8 +26,8 @@ export function shell() {
     return [themes.at(-1), keys.at(-1)];
   };
   const name = () => {
-    for (const each of themes) fill(each, document.documentElement.dataset.theme === "dark" ? "Light colours" : "Dark colours");
-    for (const each of keys) fill(each, key() ? "Forget the key" : "Use a key");
+    for (const each of themes) setChildren(each, document.documentElement.dataset.theme === "dark" ? "Light colours" : "Dark colours");
+    for (const each of keys) setChildren(each, accessKey() ? "Forget the key" : "Use a key");
   };
 
   function swap() {
@@ -40,8 +40,8 @@ export function shell() {
 
   let asking = false;
   async function askKey(why) {
-    if (key() && !why) {
-      setKey(null);
+    if (accessKey() && !why) {
+      setAccessKey(null);
       name();
       return show();
     }
@@ -50,7 +50,7 @@ export function shell() {
     const given = await dialog("This service asks for a key", [{ name: "key", label: "Key", type: "password", hint: "Made by `labctl key create`; kept in this tab until it is closed." }], { text: why, confirm: "Use it" });
     asking = false;
     if (!given) return null;
-    setKey(given.key.trim());
+    setAccessKey(given.key.trim());
     name();
     return show();
   }

@@ -1,13 +1,13 @@
 // Every state has an address; the page is what the address says.
 
 const routes = [];
-let leave = new AbortController();
-let moved = false; // the first page is where a reader begins, not where one was led
+let pageAbort = new AbortController();
+let navigated = false; // the first page is where a reader begins, not where one was led
 
 /** Say which module shows addresses like `/units/:serial`. A module has `page(context)`, which returns an element. */
 export const route = (pattern, load) => routes.push({ parts: pattern.split("/").filter(Boolean), load });
 
-function match(path) {
+function matchRoute(path) {
   const parts = path.split("/").filter(Boolean).map(decodeURIComponent);
   for (const { parts: pattern, load } of routes) {
     if (pattern.length !== parts.length) continue;
@@ -19,13 +19,13 @@ function match(path) {
 }
 
 /** Go to an address as if its link had been pressed. */
-export function go(path) {
+export function navigate(path) {
   history.pushState(null, "", path);
   return show();
 }
 
 /** Write a choice into the address without leaving the page; null takes it out. */
-export function remember(choice) {
+export function updateQuery(choice) {
   const query = new URLSearchParams(location.search);
   for (const [name, value] of Object.entries(choice)) {
     if (value === null || value === undefined || value === "") query.delete(name);
@@ -39,11 +39,11 @@ export const query = () => Object.fromEntries(new URLSearchParams(location.searc
 
 /** Show what the address says. */
 export async function show() {
-  leave.abort();
-  leave = new AbortController();
-  const { signal } = leave;
+  pageAbort.abort();
+  pageAbort = new AbortController();
+  const { signal } = pageAbort;
   const main = document.querySelector("main");
-  const found = match(location.pathname);
+  const found = matchRoute(location.pathname);
   window.dispatchEvent(new CustomEvent("labctl:moved"));
   main.setAttribute("aria-busy", "true");
   try {
@@ -54,8 +54,8 @@ export async function show() {
     performance.mark("labctl:page"); // for the browser's own profiler, and benchmarks
     const heading = element.querySelector("h1");
     document.title = heading ? `${heading.textContent} · labctl` : "labctl";
-    if (moved && (document.activeElement === document.body || main.contains(document.activeElement))) main.focus({ preventScroll: true });
-    moved = true;
+    if (navigated && (document.activeElement === document.body || main.contains(document.activeElement))) main.focus({ preventScroll: true });
+    navigated = true;
   } catch (error) {
     if (signal.aborted || error.name === "AbortError") return;
     const { trouble } = await import("./components.js");
@@ -66,7 +66,7 @@ export async function show() {
 }
 
 /** Bring a part of the page into view, and go on from there with the keyboard where it can be held. */
-function look(hash) {
+function scrollToAnchor(hash) {
   const part = document.getElementById(hash.slice(1));
   part?.scrollIntoView();
   part?.focus({ preventScroll: true });
@@ -78,10 +78,10 @@ export function start() {
     const link = event.target.closest?.("a[href]");
     if (!link || event.defaultPrevented || event.button || event.metaKey || event.ctrlKey || event.shiftKey || link.download || link.target) return;
     const url = new URL(link.href);
-    if (url.origin !== location.origin || url.pathname.startsWith("/api") || url.pathname.startsWith("/static") || !match(url.pathname)) return;
+    if (url.origin !== location.origin || url.pathname.startsWith("/api") || url.pathname.startsWith("/static") || !matchRoute(url.pathname)) return;
     event.preventDefault();
-    if (url.hash && url.pathname === location.pathname && url.search === location.search) return look(url.hash);
-    go(url.pathname + url.search + url.hash).then(() => url.hash && look(url.hash));
+    if (url.hash && url.pathname === location.pathname && url.search === location.search) return scrollToAnchor(url.hash);
+    navigate(url.pathname + url.search + url.hash).then(() => url.hash && scrollToAnchor(url.hash));
     window.scrollTo(0, 0);
   });
   window.addEventListener("popstate", show);

@@ -1,41 +1,41 @@
 // The catalogue as a book: by origin, searched as one types.
 
-import { fill, h } from "../core/elements.js";
-import { words } from "../core/format.js";
-import { chip, empty, field, head, tabs } from "../core/components.js";
-import { remember } from "../core/router.js";
-import { thumbnail } from "./signature_plot.js";
+import { setChildren, h } from "../core/elements.js";
+import { idText } from "../core/format.js";
+import { chip, emptyState, labelledField, pageHeader, toggleGroup } from "../core/components.js";
+import { updateQuery } from "../core/router.js";
+import { signatureThumbnail } from "./signature_plot.js";
 import { CHANNELS, ORIGINS } from "./labels.js";
 
-export function book(all, query) {
+export function effectList(all, query) {
   let [asked, origin] = [query.q ?? "", query.origin ?? ""];
   const [place, found] = [h("div", { class: "page" }), h("p", { class: "soft small", "aria-live": "polite" })];
-  const texts = new Map(all.map((each) => [each, [each.id, words(each.id), each.term, each.sentence, each.experiment, ...each.needs].join(" ").toLowerCase()]));
+  const texts = new Map(all.map((each) => [each, [each.id, idText(each.id), each.term, each.sentence, each.experiment, ...each.needs].join(" ").toLowerCase()]));
   function show() {
     const wanted = asked.toLowerCase().split(/\s+/).filter(Boolean);
     const shown = all.filter((each) => (!origin || each.origin === origin) && wanted.every((word) => texts.get(each).includes(word)));
     found.textContent = shown.length === all.length ? "" : `${shown.length} of ${all.length}`;
     const chapters = Object.entries(ORIGINS).map(([name, [title, about]]) => [title, about, shown.filter((each) => each.origin === name)]).filter(([, , effects]) => effects.length);
-    fill(place, chapters.length ? chapters.map(chapter) : empty(`No effect speaks of "${asked}".`));
+    setChildren(place, chapters.length ? chapters.map(originSection) : emptyState(`No effect speaks of "${asked}".`));
   }
   const input = h("input", { type: "search", value: asked, placeholder: "rate, temperature, gravity ...", oninput: () => {
     asked = input.value;
-    remember({ q: asked });
+    updateQuery({ q: asked });
     show();
   } });
   show();
   return h("div", { class: "page" },
-    head("Effects", `${all.length} physical causes of a gyro's error: what each does, how it looks, and what tells it from its likes.`),
-    h("div", { class: "row", style: "align-items: end" }, h("div", { style: "flex: 0 1 18rem" }, field("Search", input)), tabs("Origin", [["", "all"], ...Object.entries(ORIGINS).map(([name, [title]]) => [name, title.toLowerCase()])], origin, (value) => {
+    pageHeader("Effects", `${all.length} physical causes of a gyro's error: what each does, how it looks, and what tells it from its likes.`),
+    h("div", { class: "row", style: "align-items: end" }, h("div", { style: "flex: 0 1 18rem" }, labelledField("Search", input)), toggleGroup("Origin", [["", "all"], ...Object.entries(ORIGINS).map(([name, [title]]) => [name, title.toLowerCase()])], origin, (value) => {
       origin = value;
-      remember({ origin });
+      updateQuery({ origin });
       show();
     }), found),
     place);
 }
 
-const chapter = ([title, about, effects]) => h("section", { class: "stack", "aria-label": title },
+const originSection = ([title, about, effects]) => h("section", { class: "stack", "aria-label": title },
   h("div", {}, h("h2", {}, title), h("p", { class: "soft" }, about)),
   h("div", { class: "book" }, effects.map((effect) => h("a", { class: "card leaf", href: `/effects/${effect.id}` },
-    thumbnail(effect.id),
-    h("span", { class: "leaf-words" }, h("strong", {}, effect.term), h("span", { class: "soft small" }, effect.sentence), h("span", { class: "row leaf-foot" }, h("code", { class: "soft small" }, effect.id), effect.needs.length ? chip(`needs ${effect.needs.map((name) => CHANNELS[name] ?? words(name)).join(", ")}`) : null))))));
+    signatureThumbnail(effect.id),
+    h("span", { class: "leaf-words" }, h("strong", {}, effect.term), h("span", { class: "soft small" }, effect.sentence), h("span", { class: "row leaf-foot" }, h("code", { class: "soft small" }, effect.id), effect.needs.length ? chip(`needs ${effect.needs.map((name) => CHANNELS[name] ?? idText(name)).join(", ")}`) : null))))));

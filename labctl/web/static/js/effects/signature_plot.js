@@ -1,41 +1,41 @@
 // The signature of an effect as a picture: small for the list, large to be read and saved.
 
-import { s } from "../core/elements.js";
-import { colour, figure, warmth } from "../core/figure.js";
+import { svg } from "../core/elements.js";
+import { colour, figure, temperatureColour } from "../core/figure.js";
 import { POSITIONS, signature } from "./signatures.js";
 
 const [WIDE, HIGH] = [116, 62];
 
 /** A small drawing beside the words; the words say all of it. */
-export function thumbnail(id) {
+export function signatureThumbnail(id) {
   const found = signature(id);
-  const picture = s("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, class: "signature", "aria-hidden": "true" },
-    s("line", { x1: 4, y1: HIGH / 2, x2: WIDE - 4, y2: HIGH / 2, class: "zero" }));
+  const picture = svg("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, class: "signature", "aria-hidden": "true" },
+    svg("line", { x1: 4, y1: HIGH / 2, x2: WIDE - 4, y2: HIGH / 2, class: "zero" }));
   if (!found) return picture;
   const at = (x, y) => `${(6 + ((x - found.from) / (found.to - found.from)) * (WIDE - 12)).toFixed(1)},${(HIGH / 2 - (y * (HIGH - 12)) / 2.1).toFixed(1)}`;
-  if (found.from < 0) picture.append(s("line", { x1: WIDE / 2, y1: 5, x2: WIDE / 2, y2: HIGH - 5, class: "zero" }));
+  if (found.from < 0) picture.append(svg("line", { x1: WIDE / 2, y1: 5, x2: WIDE / 2, y2: HIGH - 5, class: "zero" }));
   if (found.over === "position") {
     picture.append(...found.lines[0].y.map((y, k) => {
       const [x, top] = at(k, y).split(",").map(Number);
-      return s("rect", { x: x * 0.88 + 4, width: 8, y: Math.min(top, HIGH / 2), height: Math.max(Math.abs(top - HIGH / 2), 1), class: "bar" });
+      return svg("rect", { x: x * 0.88 + 4, width: 8, y: Math.min(top, HIGH / 2), height: Math.max(Math.abs(top - HIGH / 2), 1), class: "bar" });
     }));
     return picture;
   }
-  if (found.course) picture.append(s("polyline", { points: found.course.x.map((x, k) => at(x, 1.7 * found.course.y[k] - 0.85)).join(" "), class: "course" }));
-  found.lines.forEach((line, k) => picture.append(s("polyline", { points: line.x.map((x, i) => at(x, Math.min(Math.max(line.y[i], -1.05), 1.05))).join(" "), class: `curve of-${found.lines.length} nr-${k}` })));
+  if (found.course) picture.append(svg("polyline", { points: found.course.x.map((x, k) => at(x, 1.7 * found.course.y[k] - 0.85)).join(" "), class: "course" }));
+  found.lines.forEach((line, k) => picture.append(svg("polyline", { points: line.x.map((x, i) => at(x, Math.min(Math.max(line.y[i], -1.05), 1.05))).join(" "), class: `curve of-${found.lines.length} nr-${k}` })));
   return picture;
 }
 
-const shade = (k, n) => (n === 1 ? colour("accent") : n === 3 ? warmth(k / 2) : colour(k ? "axis-y" : "axis-x"));
+const lineColour = (k, n) => (n === 1 ? colour("accent") : n === 3 ? temperatureColour(k / 2) : colour(k ? "axis-y" : "axis-x"));
 
-export function large(effect) {
+export function signatureFigure(effect) {
   const found = signature(effect.id);
   if (!found) return null;
   const draw = () => ({
     data: [
       ...(found.over === "position"
         ? [{ type: "bar", name: "error at rest", x: POSITIONS.map((each) => `${each} up`), y: found.lines[0].y, marker: { color: colour("accent") }, hoverinfo: "skip" }]
-        : found.lines.map((line, k) => ({ type: "scatter", mode: "lines", name: line.name, x: line.x, y: line.y, line: { color: shade(k, found.lines.length), width: 2.5 }, hoverinfo: "skip" }))),
+        : found.lines.map((line, k) => ({ type: "scatter", mode: "lines", name: line.name, x: line.x, y: line.y, line: { color: lineColour(k, found.lines.length), width: 2.5 }, hoverinfo: "skip" }))),
       ...(found.course ? [{ type: "scatter", mode: "lines", name: "temperature", x: found.course.x, y: found.course.y.map((y) => 1.7 * y - 0.85), line: { color: colour("soft"), dash: "dot", width: 1.5 }, hoverinfo: "skip" }] : []),
     ],
     layout: {

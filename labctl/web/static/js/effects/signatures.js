@@ -1,13 +1,13 @@
 // What each effect draws, as a shape: error against the variable that shows it best. Schematic: no sizes, own words.
 
-const wave = (degrees) => Math.cos((degrees * Math.PI) / 180);
-const exceeds = (x, knee) => Math.sign(x) * Math.max(0, Math.abs(x) - knee);
+const cosine = (degrees) => Math.cos((degrees * Math.PI) / 180);
+const excess = (x, knee) => Math.sign(x) * Math.max(0, Math.abs(x) - knee);
 /** Three plateaus with ramps between, 0 to 1 over a campaign: what the temperature does. */
-const climb = (t) => [[0.15, 0.3], [0.6, 0.75]].reduce((sum, [from, to]) => sum + 0.5 * Math.min(Math.max((t - from) / (to - from), 0), 1), 0);
-const climbing = (t) => ((t > 0.15 && t < 0.3) || (t > 0.6 && t < 0.75) ? 1 : 0);
+const temperatureCourse = (t) => [[0.15, 0.3], [0.6, 0.75]].reduce((sum, [from, to]) => sum + 0.5 * Math.min(Math.max((t - from) / (to - from), 0), 1), 0);
+const temperatureSlope = (t) => ((t > 0.15 && t < 0.3) || (t > 0.6 && t < 0.75) ? 1 : 0);
 /** What is left of two ramps, fading after each. */
-const behind = (t) => [[0.15, 0.3], [0.6, 0.75]].reduce((sum, [from, to]) => sum + (t < from ? 0 : t < to ? 1 - Math.exp(-(t - from) / 0.08) : (1 - Math.exp(-(to - from) / 0.08)) * Math.exp(-(t - to) / 0.08)), 0);
-const steps = (at, levels) => (t) => levels[at.filter((edge) => t >= edge).length];
+const laggedTemperature = (t) => [[0.15, 0.3], [0.6, 0.75]].reduce((sum, [from, to]) => sum + (t < from ? 0 : t < to ? 1 - Math.exp(-(t - from) / 0.08) : (1 - Math.exp(-(to - from) / 0.08)) * Math.exp(-(t - to) / 0.08)), 0);
+const stepFunction = (at, levels) => (t) => levels[at.filter((edge) => t >= edge).length];
 
 /** Variables: what stands under the picture, from, to. */
 export const VARIABLES = {
@@ -17,49 +17,49 @@ export const VARIABLES = {
 };
 export const POSITIONS = ["x", "-x", "y", "-y", "z", "-z"];
 
-const one = (over, f, more = {}) => ({ over, lines: [["error", f]], ...more });
+const single = (over, f, more = {}) => ({ over, lines: [["error", f]], ...more });
 const family = (over, names, f) => ({ over, lines: names.map((name, k) => [name, (x) => f(x, names.length > 1 ? (2 * k) / (names.length - 1) - 1 : 0)]) });
 const LEVELS = ["cold", "room", "hot"];
 const ALL = {
-  bias: one("rate", () => 0.6),
-  bias_temperature: one("temperature", (x) => 0.6 * x + 0.5 * x * x),
-  scale_factor: one("rate", (x) => x),
+  bias: single("rate", () => 0.6),
+  bias_temperature: single("temperature", (x) => 0.6 * x + 0.5 * x * x),
+  scale_factor: single("rate", (x) => x),
   scale_factor_temperature: family("rate", LEVELS, (x, warm) => warm * x),
-  scale_factor_asymmetry: one("rate", (x) => Math.abs(x)),
-  scale_factor_even: one("rate", (x) => x * x),
-  scale_factor_odd: one("rate", (x) => x ** 3),
-  sine_response: one("rate", (x) => 2.2 * (Math.sin(1.6 * x) / 1.6 - x)),
-  saturation: one("rate", (x) => -2 * exceeds(x, 0.6)),
+  scale_factor_asymmetry: single("rate", (x) => Math.abs(x)),
+  scale_factor_even: single("rate", (x) => x * x),
+  scale_factor_odd: single("rate", (x) => x ** 3),
+  sine_response: single("rate", (x) => 2.2 * (Math.sin(1.6 * x) / 1.6 - x)),
+  saturation: single("rate", (x) => -2 * excess(x, 0.6)),
   rate_temperature_surface: family("rate", LEVELS, (x, warm) => 0.5 * x ** 3 + 0.45 * warm * x + 0.35 * warm * warm - 0.2),
-  misalignment: one("other", (x) => x),
-  non_orthogonality: one("other", (x) => x),
-  cross_axis_nonlinearity: one("other", (x) => x * x),
-  vibration_rectification: one("rate", (x) => (x === 0 ? 0 : Math.exp(-((Math.log(Math.abs(x) / 0.5) / 0.2) ** 2)))),
-  dead_band: one("rate", (x) => (Math.abs(x) < 0.2 ? -x * 3.5 : -0.7 * Math.sign(x) * Math.exp(-(Math.abs(x) - 0.2) / 0.12))),
-  quantization: one("rate", (x) => 3 * (Math.round(x * 4) / 4 - x) * 2),
-  g_sensitivity: one("position", (k) => [0, 0, 0, 0, 1, -1][k]),
-  cross_g_sensitivity: one("position", (k) => [0.8, -0.8, -0.5, 0.5, 0, 0][k]),
-  g_squared_sensitivity: one("position", (k) => [0, 0, 0, 0, 1, 1][k]),
-  centripetal_acceleration: one("rate", (x) => 0.9 * x * x),
-  earth_rate: one("position", (k) => [0, 0, 0, 0, 0.7, -0.7][k]),
-  earth_rate_tilt: one("angle", (x) => wave(x - 60)),
-  magnetic_sensitivity: one("angle", (x) => wave(x + 110)),
-  table_tilt: one("angle", (x) => 0.7 * wave(x - 20) + 0.35 * wave(2 * x + 40)),
-  table_rate_ratio: one("rate", (x) => 0.8 * x),
-  table_rate_ripple: { over: "angle", lines: [["slow", (x) => 0.3 * wave(4 * x)], ["fast", (x) => wave(4 * x)]] },
-  missed_steps: one("rate", (x) => (Math.abs(x) > 0.75 ? -Math.sign(x) * (0.5 + 2 * (Math.abs(x) - 0.75)) : 0)),
-  temperature_rate: one("time", (t) => 0.9 * climbing(t), { course: climb }),
-  thermal_lag: one("time", behind, { course: climb }),
+  misalignment: single("other", (x) => x),
+  non_orthogonality: single("other", (x) => x),
+  cross_axis_nonlinearity: single("other", (x) => x * x),
+  vibration_rectification: single("rate", (x) => (x === 0 ? 0 : Math.exp(-((Math.log(Math.abs(x) / 0.5) / 0.2) ** 2)))),
+  dead_band: single("rate", (x) => (Math.abs(x) < 0.2 ? -x * 3.5 : -0.7 * Math.sign(x) * Math.exp(-(Math.abs(x) - 0.2) / 0.12))),
+  quantization: single("rate", (x) => 3 * (Math.round(x * 4) / 4 - x) * 2),
+  g_sensitivity: single("position", (k) => [0, 0, 0, 0, 1, -1][k]),
+  cross_g_sensitivity: single("position", (k) => [0.8, -0.8, -0.5, 0.5, 0, 0][k]),
+  g_squared_sensitivity: single("position", (k) => [0, 0, 0, 0, 1, 1][k]),
+  centripetal_acceleration: single("rate", (x) => 0.9 * x * x),
+  earth_rate: single("position", (k) => [0, 0, 0, 0, 0.7, -0.7][k]),
+  earth_rate_tilt: single("angle", (x) => cosine(x - 60)),
+  magnetic_sensitivity: single("angle", (x) => cosine(x + 110)),
+  table_tilt: single("angle", (x) => 0.7 * cosine(x - 20) + 0.35 * cosine(2 * x + 40)),
+  table_rate_ratio: single("rate", (x) => 0.8 * x),
+  table_rate_ripple: { over: "angle", lines: [["slow", (x) => 0.3 * cosine(4 * x)], ["fast", (x) => cosine(4 * x)]] },
+  missed_steps: single("rate", (x) => (Math.abs(x) > 0.75 ? -Math.sign(x) * (0.5 + 2 * (Math.abs(x) - 0.75)) : 0)),
+  temperature_rate: single("time", (t) => 0.9 * temperatureSlope(t), { course: temperatureCourse }),
+  thermal_lag: single("time", laggedTemperature, { course: temperatureCourse }),
   thermal_hysteresis: { over: "temperature", lines: [["from below", (x) => 0.6 * (1 - x * x)], ["from above", (x) => -0.6 * (1 - x * x)]] },
-  warm_up: one("power", (t) => Math.exp(-t / 0.2)),
+  warm_up: single("power", (t) => Math.exp(-t / 0.2)),
   self_heating: { over: "power", lines: [["error", (t) => 1 - Math.exp(-t / 0.25)]] },
-  thermometer_error: one("temperature", (x) => 0.7 * x),
-  bias_drift: one("time", (t) => 1.6 * t - 0.8),
-  run_shift: one("time", steps([0.3, 0.65], [-0.2, 0.7, -0.6]), { marks: [[0.3, "power-on"], [0.65, "power-on"]] }),
-  mounting_shift: one("time", steps([0.33, 0.67], [0.1, -0.7, 0.6]), { marks: [[0.33, "mounted"], [0.67, "mounted"]] }),
-  rate_hysteresis: one("previous", (x) => 0.8 * x),
-  start_transient: one("inside", (t) => -Math.exp(-t / 0.15)),
-  supply_sensitivity: one("supply", (x) => 0.8 * x),
+  thermometer_error: single("temperature", (x) => 0.7 * x),
+  bias_drift: single("time", (t) => 1.6 * t - 0.8),
+  run_shift: single("time", stepFunction([0.3, 0.65], [-0.2, 0.7, -0.6]), { marks: [[0.3, "power-on"], [0.65, "power-on"]] }),
+  mounting_shift: single("time", stepFunction([0.33, 0.67], [0.1, -0.7, 0.6]), { marks: [[0.33, "mounted"], [0.67, "mounted"]] }),
+  rate_hysteresis: single("previous", (x) => 0.8 * x),
+  start_transient: single("inside", (t) => -Math.exp(-t / 0.15)),
+  supply_sensitivity: single("supply", (x) => 0.8 * x),
 };
 
 const POINTS = 181;

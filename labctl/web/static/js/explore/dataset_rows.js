@@ -1,15 +1,15 @@
 // Data sets as a table of columns: what criticism says of each, for one axis of the gyro.
 
 /** Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length. */
-export function rowsOf(criticism, axis) {
+export function datasetRows(criticism, axis) {
   const sets = criticism.views.sets;
   return { n: sets.dataset.length, dataset: sets.dataset, position: sets.position, channels: sets.channels, residual: sets.residual_dps[axis], score: sets.over_floor[axis] };
 }
 
-export const axesOf = (criticism) => Object.keys(criticism.views.sets?.residual_dps ?? {});
+export const axisNames = (criticism) => Object.keys(criticism.views.sets?.residual_dps ?? {});
 
 /** Group numbers that lie within `width` of each other: [centre of each group], [group of each number]. */
-export function levels(values, width, most = 60) {
+export function groupLevels(values, width, most = 60) {
   const order = values.map((_, k) => k).sort((a, b) => values[a] - values[b]);
   let near = width;
   for (;;) {
@@ -27,7 +27,7 @@ export function levels(values, width, most = 60) {
 }
 
 /** Data-set numbers as `1-20,35`, short enough for an address. */
-export function asRanges(numbers) {
+export function toRanges(numbers) {
   const sorted = [...numbers].sort((a, b) => a - b);
   const parts = [];
   for (const number of sorted) {

@@ -2,53 +2,53 @@
 
 import { get } from "../core/api.js";
 import { h } from "../core/elements.js";
-import { axisColour, colour, figure, warmth } from "../core/figure.js";
-import { setting } from "../core/format.js";
-import { headed, later, tabs } from "../core/components.js";
-import { query, remember } from "../core/router.js";
-import { levels } from "./dataset_rows.js";
+import { axisColour, colour, figure, temperatureColour } from "../core/figure.js";
+import { plainNumber } from "../core/format.js";
+import { cardWithHeader, loadInto, toggleGroup } from "../core/components.js";
+import { query, updateQuery } from "../core/router.js";
+import { groupLevels } from "./dataset_rows.js";
 
 const VIEWS = [["lines", "Error over rate"], ["warm", "Error over temperature"], ["surface", "Surface"], ["rest", "At rest"], ["turn", "Per full turn"]];
 /** Slower than this is at rest, deg/s: the Earth turns by 0.004. */
-const AT_REST = 0.01;
+const AT_REST_DPS = 0.01;
 
-export function compare(state, path, signal) {
+export function errorComparison(state, path, signal) {
   const place = h("div", { style: "min-height: 28rem" });
   let view = query().view ?? "lines";
   let columns = null;
-  const shown = () => later(place, "Reading the data sets", async () => {
+  const shown = () => loadInto(place, "Reading the data sets", async () => {
     columns ??= (await get(`${path}/residuals`, { query: { recording: state.recording }, signal })).columns;
-    const rows = own(columns, state.axis);
-    return PICTURES[view](rows, state, path, signal);
+    const rows = axisRows(columns, state.axis);
+    return FIGURES[view](rows, state, path, signal);
   });
   shown();
   state.onchange((what) => what === "axis" && shown());
-  return headed("Compare", tabs("What to compare", VIEWS, view, (value) => {
+  return cardWithHeader("Compare", toggleGroup("What to compare", VIEWS, view, (value) => {
     view = value;
-    remember({ view: value === "lines" ? null : value });
+    updateQuery({ view: value === "lines" ? null : value });
     shown();
   }), place);
 }
 
 /** The rows of one axis, where it is the one that turns, if it ever is. */
-function own(columns, axis) {
+function axisRows(columns, axis) {
   const all = columns.axis.map((a, k) => (a === axis ? k : -1)).filter((k) => k >= 0);
   const along = all.filter((k) => columns.position[k].replace("-", "") === axis);
   const rows = along.length ? along : all;
   return Object.fromEntries(Object.entries(columns).map(([name, values]) => [name, rows.map((k) => values[k])]));
 }
 
-const PICTURES = { lines: (rows, state) => family(rows, state, "own_rate_dps", "temperature_c", "rate", "deg/s", "deg C"), warm: (rows, state) => family(rows, state, "temperature_c", "own_rate_dps", "gyro temperature", "deg C", "deg/s"), surface, rest, turn };
+const FIGURES = { lines: (rows, state) => levelFigure(rows, state, "own_rate_dps", "temperature_c", "rate", "deg/s", "deg C"), warm: (rows, state) => levelFigure(rows, state, "temperature_c", "own_rate_dps", "gyro temperature", "deg C", "deg/s"), surface: surfaceFigure, rest: restFigure, turn: turnFigure };
 
 /** A line of the model and dots of the measurement for each level of the other variable. */
-function family(rows, state, along, by, name, unit, other) {
-  const [centres, which] = levels(rows[by], by === "temperature_c" ? 1 : 1e-3, 24);
+function levelFigure(rows, state, along, by, name, unit, other) {
+  const [centres, which] = groupLevels(rows[by], by === "temperature_c" ? 1 : 1e-3, 24);
   const draw = () => ({
     data: centres.flatMap((centre, g) => {
       const here = which.map((w, k) => (w === g ? k : -1)).filter((k) => k >= 0).sort((a, b) => rows[along][a] - rows[along][b]);
-      const shade = warmth(centres.length > 1 ? g / (centres.length - 1) : 0.5);
+      const shade = temperatureColour(centres.length > 1 ? g / (centres.length - 1) : 0.5);
       const x = here.map((k) => rows[along][k]);
-      const label = `${setting(centre, 3)} ${other}`;
+      const label = `${plainNumber(centre, 3)} ${other}`;
       return [
         { type: "scatter", mode: "lines", name: label, legendgroup: label, x, y: here.map((k) => rows.modelled_error_dps[k]), line: { color: shade, width: 1.5 }, hoverinfo: "skip" },
         { type: "scatter", mode: "markers", name: `measured at ${label}`, legendgroup: label, showlegend: false, x, y: here.map((k) => rows.measured_error_dps[k]), marker: { color: shade, size: 5 }, customdata: here.map((k) => rows.dataset[k]), hovertemplate: `${label}, data set %{customdata}<br>%{x:.5g} ${unit}: %{y:.4g} deg/s<extra></extra>` },
@@ -59,7 +59,7 @@ function family(rows, state, along, by, name, unit, other) {
   return figure(`Error over ${name}`, `Dots are measured, lines the model of axis ${state.axis}; cold is blue, hot is red. Where dots leave their line, the model fails.`, draw, { tall: "24rem" });
 }
 
-async function surface(rows, state, path, signal) {
+async function surfaceFigure(rows, state, path, signal) {
   const grid = (await get(`${path}/surface`, { signal })).axes[state.axis];
   const draw = () => ({
     data: [
@@ -71,8 +71,8 @@ async function surface(rows, state, path, signal) {
   return figure("Error surface", `The model of axis ${state.axis} as a surface, the data sets as dots. Drag to turn it.`, draw, { tall: "28rem" });
 }
 
-function rest(rows, state) {
-  const here = rows.own_rate_dps.map((rate, k) => (Math.abs(rate) < AT_REST ? k : -1)).filter((k) => k >= 0).sort((a, b) => rows.temperature_c[a] - rows.temperature_c[b]);
+function restFigure(rows, state) {
+  const here = rows.own_rate_dps.map((rate, k) => (Math.abs(rate) < AT_REST_DPS ? k : -1)).filter((k) => k >= 0).sort((a, b) => rows.temperature_c[a] - rows.temperature_c[b]);
   if (!here.length) return h("p", { class: "soft" }, "No data set of this recording is at rest.");
   const at = (name) => here.map((k) => rows[name][k]);
   const draw = () => ({
@@ -85,7 +85,7 @@ function rest(rows, state) {
   return figure("Output at rest", `Axis ${state.axis} at rest over temperature; bars are two noise floors.`, draw, { tall: "22rem" });
 }
 
-function turn(rows, state) {
+function turnFigure(rows, state) {
   const here = rows.own_rate_dps.map((rate, k) => (Math.abs(rate) > 1 ? k : -1)).filter((k) => k >= 0);
   if (!here.length) return h("p", { class: "soft" }, "No data set of this recording turns fast enough.");
   const perTurn = (name) => here.map((k) => (360 * rows[name][k]) / Math.abs(rows.own_rate_dps[k]));

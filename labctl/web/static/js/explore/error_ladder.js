@@ -3,19 +3,19 @@
 import { get } from "../core/api.js";
 import { h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
-import { number, words } from "../core/format.js";
-import { headed, later, modelName, table } from "../core/components.js";
-import { map, rowsFor, scaleOf } from "./residual_map.js";
-import { rowsOf } from "./dataset_rows.js";
+import { number, idText } from "../core/format.js";
+import { cardWithHeader, loadInto, modelName, table } from "../core/components.js";
+import { residualMap, selectedRows, colourLimit } from "./residual_map.js";
+import { datasetRows } from "./dataset_rows.js";
 
 /** What the unit is off by itself is left out of the picture, at first, where it would squeeze the fall into a line. */
-const DWARFING = 10;
+const RAW_ERROR_RATIO = 10;
 
 export function ladderFigure(ladder) {
   const steps = ladder.steps;
   const x = steps.map((step) => `v${step.version}`);
-  const dwarfs = Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) > DWARFING * Math.max(...steps.map((step) => step.rms_dps ?? 0));
-  const line = (key, name, line, symbol) => ({ type: "scatter", mode: "lines+markers", name, x, y: steps.map((step) => step[key]), line, marker: { size: 9, symbol }, text: steps.map((step) => `${step.model}: ${step.effects.map(words).join(", ")}`), hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>" });
+  const dwarfs = Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) > RAW_ERROR_RATIO * Math.max(...steps.map((step) => step.rms_dps ?? 0));
+  const line = (key, name, line, symbol) => ({ type: "scatter", mode: "lines+markers", name, x, y: steps.map((step) => step[key]), line, marker: { size: 9, symbol }, text: steps.map((step) => `${step.model}: ${step.effects.map(idText).join(", ")}`), hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>" });
   const draw = () => ({
     data: [
       { ...line("raw_rms_dps", "as the unit is", { color: colour("line-strong"), dash: "dot" }, "diamond-open"), visible: dwarfs ? "legendonly" : true },
@@ -31,34 +31,34 @@ export function ladderFigure(ladder) {
   return figure("Error ladder", "Each version's RMS error on its own data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.", draw, { tall: "19rem" });
 }
 
-export function watch(state, signal) {
+export function errorLadder(state, signal) {
   const place = h("div", { class: "stack" });
   const base = `/api/units/${encodeURIComponent(state.serial)}`;
-  later(place, "Climbing down the ladder", async () => {
+  loadInto(place, "Climbing down the ladder", async () => {
     const ladder = await get(`${base}/ladder`, { signal });
     const here = ladder.steps.find((step) => step.version === state.version);
-    const parts = [ladderFigure(ladder), steps(ladder, state)];
+    const parts = [ladderFigure(ladder), versionTable(ladder, state)];
     if (here?.parent) parts.push(await faded(here.parent));
     return h("div", { class: "stack" }, parts);
   });
 
   async function faded(parent) {
     const before = await get(`${base}/calibrations/${parent}/criticism`, { query: { recording: state.recording }, signal });
-    const pair = () => [rowsOf(before, state.axis), rowsFor(state)];
-    const one = (k, name) => map(name, null, () => ({ rows: pair()[k], limit: scaleOf(...pair()) }), { pickable: false, tall: "16rem" });
+    const pair = () => [datasetRows(before, state.axis), selectedRows(state)];
+    const one = (k, name) => residualMap(name, null, () => ({ rows: pair()[k], limit: colourLimit(...pair()) }), { pickable: false, tall: "16rem" });
     const both = [one(0, `Version ${parent}`), one(1, `Version ${state.version}`)];
     state.onchange((what) => what === "axis" && both.forEach((each) => each.redraw()));
     return h("div", { class: "columns" }, both.map((each, k) => h("div", {}, h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`), each)));
   }
 
-  return headed("Watch the error fall", null, place);
+  return cardWithHeader("Watch the error fall", null, place);
 }
 
-function steps(ladder, state) {
+function versionTable(ladder, state) {
   return table([
     { title: "Version", cell: (step) => (step.version === state.version ? h("strong", {}, `${step.version}`) : h("a", { href: `/explore?unit=${encodeURIComponent(state.serial)}&version=${step.version}` }, `${step.version}`)) },
     { title: "Model", cell: (step) => h("span", {}, modelName(step.model), h("span", { class: "soft small" }, step.parent ? ` from version ${step.parent}` : "")) },
-    { title: "Effects", cell: (step) => step.effects.map(words).join(", ") },
+    { title: "Effects", cell: (step) => step.effects.map(idText).join(", ") },
     { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
     { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
   ], ladder.steps, { label: "Versions", selected: (step) => step.version === state.version });

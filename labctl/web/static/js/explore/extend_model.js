@@ -1,37 +1,37 @@
 // Add: look at the changed model first, then make it the next version.
 
 import { post } from "../core/api.js";
-import { fill, h } from "../core/elements.js";
+import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { number, words } from "../core/format.js";
-import { button, choice, field, headed, notice, table, toast } from "../core/components.js";
-import { go } from "../core/router.js";
-import { rowsFor } from "./residual_map.js";
+import { number, idText } from "../core/format.js";
+import { button, selectField, labelledField, cardWithHeader, notice, table, toast } from "../core/components.js";
+import { navigate } from "../core/router.js";
+import { selectedRows } from "./residual_map.js";
 
 const ERRORS = [["raw_rms_dps", "As the unit is"], ["rms_dps", "Left after the fit"], ["heldout_rms_dps", "At unseen temperatures"], ["noise_floor_dps", "Noise floor"]];
 
 /** Returns {element, put(effect)}: `put` enters an effect and previews it. */
-export function add(state, path, effects) {
+export function extendModel(state, path, effects) {
   const change = { add: new Set(), remove: new Set(), formula: "" };
   const has = state.calibration.model.effects;
   const chosen = h("div", { class: "row", "aria-live": "polite" });
   const result = h("div", { class: "stack" });
   const formula = h("input", { placeholder: "wet_scale: (humidity_pct - 40) * rate_dps", oninput: () => { change.formula = formula.value.trim(); stale(); } });
-  const pick = choice("Add an effect", [["", "choose one"], ...effects.filter((e) => !has.includes(e.id)).map((e) => [e.id, words(e.id)])], "", (value) => { if (value) { change.add.add(value); show(); } });
-  const drop = choice("Take one out", [["", "choose one"], ...has.map((id) => [id, words(id)])], "", (value) => { if (value) { change.remove.add(value); show(); } });
+  const pick = selectField("Add an effect", [["", "choose one"], ...effects.filter((e) => !has.includes(e.id)).map((e) => [e.id, idText(e.id)])], "", (value) => { if (value) { change.add.add(value); show(); } });
+  const drop = selectField("Take one out", [["", "choose one"], ...has.map((id) => [id, idText(id)])], "", (value) => { if (value) { change.remove.add(value); show(); } });
 
-  const tag = (set, id, sign) => h("button", { type: "button", class: "chip accent", "aria-label": `leave ${words(id)} as it is`, onclick: () => { set.delete(id); show(); } }, `${sign} ${words(id)} ✕`);
+  const tag = (set, id, sign) => h("button", { type: "button", class: "chip accent", "aria-label": `leave ${idText(id)} as it is`, onclick: () => { set.delete(id); show(); } }, `${sign} ${idText(id)} ✕`);
   const body = () => ({ add: [...change.add], remove: [...change.remove], formula: change.formula ? [change.formula] : [], recording: state.recording });
   const isEmpty = () => !change.add.size && !change.remove.size && !change.formula;
-  const stale = () => fill(result, isEmpty() ? h("p", { class: "soft small" }, "Choose what to change, or press Add at a suspect.") : null);
+  const stale = () => setChildren(result, isEmpty() ? h("p", { class: "soft small" }, "Choose what to change, or press Add at a suspect.") : null);
   const show = () => {
-    fill(chosen, [...change.add].map((id) => tag(change.add, id, "+")), [...change.remove].map((id) => tag(change.remove, id, "–")));
+    setChildren(chosen, [...change.add].map((id) => tag(change.add, id, "+")), [...change.remove].map((id) => tag(change.remove, id, "–")));
     stale();
   };
 
   async function preview() {
     const found = await post(`${path}/preview`, body());
-    fill(result, shown(found));
+    setChildren(result, shown(found));
   }
 
   function shown(found) {
@@ -41,11 +41,11 @@ export function add(state, path, effects) {
         { title: "deg/s", cell: ([, title]) => title },
         { title: `Version ${state.version}`, number: true, cell: ([key]) => number(found.before[key]) },
         { title: "Changed", number: true, cell: ([key]) => h("strong", {}, number(found.error[key])) },
-        { title: "", cell: ([key]) => (key === "rms_dps" || key === "heldout_rms_dps" ? fall(found.before[key], found.error[key]) : null) },
+        { title: "", cell: ([key]) => (key === "rms_dps" || key === "heldout_rms_dps" ? relativeChange(found.before[key], found.error[key]) : null) },
       ], ERRORS, { label: "Errors before and after" }),
-      beforeAfter(state, found, floor),
-      coefficients(state, found, change),
-      found.left_out.length ? notice("", `Fitted, but it stays here when the calibration leaves the house: ${found.left_out.map((line) => `${words(line.effect)} (${line.origin ?? "bench"})`).join(", ")}.`) : null,
+      residualFigure(state, found, floor),
+      plausibility(state, found, change),
+      found.left_out.length ? notice("", `Fitted, but it stays here when the calibration leaves the house: ${found.left_out.map((line) => `${idText(line.effect)} (${line.origin ?? "bench"})`).join(", ")}.`) : null,
       h("div", { class: "row" }, button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "first" }), h("span", { class: "soft small" }, "Versions are never changed; this one stays as it is.")),
     ];
   }
@@ -53,33 +53,33 @@ export function add(state, path, effects) {
   async function make() {
     const made = await post(`${path}/improve`, body());
     toast("good", `Version ${made.version} of ${state.serial} is made.`);
-    await go(`/explore?unit=${encodeURIComponent(state.serial)}&version=${made.version}&recording=${state.recording}&axis=${state.axis}#watch`);
+    await navigate(`/explore?unit=${encodeURIComponent(state.serial)}&version=${made.version}&recording=${state.recording}&axis=${state.axis}#watch`);
   }
 
   show();
-  const element = headed("Add it", null,
-    h("div", { class: "columns", style: "--least: 14rem" }, pick, drop, field("A formula of your own", formula, "name: expression over channels")),
+  const element = cardWithHeader("Add it", null,
+    h("div", { class: "columns", style: "--least: 14rem" }, pick, drop, labelledField("A formula of your own", formula, "name: expression over channels")),
     chosen, h("div", { class: "row" }, button("Preview", preview, { kind: "first" })), result);
   return { element, put: async (effect) => { change.add.add(effect); show(); element.scrollIntoView({ behavior: "smooth", block: "start" }); await preview(); } };
 }
 
-function fall(before, after) {
+function relativeChange(before, after) {
   if (!before || !after) return null;
   const share = after / before - 1;
   return h("span", { class: share < -0.02 ? "good-ink" : share > 0.02 ? "bad-ink" : "soft" }, `${share < 0 ? "–" : "+"}${Math.abs(Math.round(100 * share))} %`);
 }
 
 /** The values of an axis in the order of the criticism's data sets. */
-export function inOrder(state, columns, name) {
+export function inDatasetOrder(state, columns, name) {
   const values = new Map(columns.dataset.map((set, k) => [`${set} ${columns.axis[k]}`, columns[name][k]]));
-  return rowsFor(state).dataset.map((set) => values.get(`${set} ${state.axis}`) ?? null);
+  return selectedRows(state).dataset.map((set) => values.get(`${set} ${state.axis}`) ?? null);
 }
 
-function beforeAfter(state, found, floor) {
+function residualFigure(state, found, floor) {
   const draw = () => {
-    const rows = rowsFor(state);
+    const rows = selectedRows(state);
     const x = rows.channels.table_rate_dps;
-    const after = inOrder(state, found.residuals, "residual_dps");
+    const after = inDatasetOrder(state, found.residuals, "residual_dps");
     const dots = (y, name, marker) => ({ type: "scatter", mode: "markers", name, x, y, marker, customdata: rows.dataset, hovertemplate: `data set %{customdata}<br>%{x:.5g} deg/s: %{y:.3g} deg/s<extra>${name}</extra>` });
     const line = (y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: colour("line-strong"), dash: "dash", width: 1 } });
     return {
@@ -90,11 +90,11 @@ function beforeAfter(state, found, floor) {
   return figure("Residual before and after", "Dashed: two noise floors.", draw, { tall: "18rem" });
 }
 
-function coefficients(state, found, change) {
+function plausibility(state, found, change) {
   const own = found.axes[state.axis]?.coefficients;
   const added = [...change.add].map((id) => id.split(":")[0]);
   if (!own || !added.length) return null;
   const ranges = added.map((id) => [id, found.plausible[id]]).filter(([, range]) => range);
   return ranges.length ? h("ul", { class: "plain" }, ranges.map(([id, range]) =>
-    h("li", {}, `${words(id)}: `, range.inside ? h("span", { class: "good-ink" }, "of a usual size") : h("span", { class: "bad-ink" }, "larger than is usual"), h("span", { class: "soft" }, ` (${number(range.from, 2)} to ${number(range.to, 2)})`)))) : null;
+    h("li", {}, `${idText(id)}: `, range.inside ? h("span", { class: "good-ink" }, "of a usual size") : h("span", { class: "bad-ink" }, "larger than is usual"), h("span", { class: "soft" }, ` (${number(range.from, 2)} to ${number(range.to, 2)})`)))) : null;
 }

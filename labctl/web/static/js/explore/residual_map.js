@@ -1,25 +1,25 @@
 // Residual over floor in rate x temperature: where the model fails, at a glance. Cells can be picked.
 
 import { colour, DIVERGING, figure } from "../core/figure.js";
-import { number, setting } from "../core/format.js";
-import { levels, rowsOf } from "./dataset_rows.js";
+import { number, plainNumber } from "../core/format.js";
+import { groupLevels, datasetRows } from "./dataset_rows.js";
 
 const LIMITS = [3, 10];
 const DIMMED_BELOW = 2;
 /** On a phone panels stand below each other, each as high as this, px. */
-const PANEL = 210;
+const PANEL_PX = 210;
 
 /** The largest residual over floor of several criticisms, within what a scale should end at. */
-export function scaleOf(...all) {
+export function colourLimit(...all) {
   const largest = Math.max(...all.map((rows) => rows.score.reduce((most, score) => Math.max(most, Math.abs(score)), 0)));
   return Math.min(Math.max(largest, LIMITS[0]), LIMITS[1]);
 }
 
 /** Cells of one position: their centres, mean scores and data sets. */
-function cells(rows, position) {
+function mapCells(rows, position) {
   const here = rows.position.map((p, k) => (p === position ? k : -1)).filter((k) => k >= 0);
-  const [rates, across] = levels(here.map((k) => rows.channels.table_rate_dps[k]), 1e-3);
-  const [warm, down] = levels(here.map((k) => rows.channels.temperature_c[k]), 1, 30);
+  const [rates, across] = groupLevels(here.map((k) => rows.channels.table_rate_dps[k]), 1e-3);
+  const [warm, down] = groupLevels(here.map((k) => rows.channels.temperature_c[k]), 1, 30);
   const found = new Map();
   here.forEach((k, i) => {
     const id = `${down[i]} ${across[i]}`;
@@ -27,12 +27,12 @@ function cells(rows, position) {
     cell.sum += rows.score[k];
     cell.sets.push(rows.dataset[k]);
   });
-  return { rates: rates.map((v) => setting(v)), warm: warm.map((v) => setting(v, 3)), cells: [...found.values()] };
+  return { rates: rates.map((v) => plainNumber(v)), warm: warm.map((v) => plainNumber(v, 3)), cells: [...found.values()] };
 }
 
 /** The traces and axes of one position; `id` is "" or the panel's number from 2 on, as Plotly counts axes. */
-function panel(rows, position, id, limit, pick) {
-  const { rates, warm, cells: all } = cells(rows, position);
+function positionPanel(rows, position, id, limit, pick) {
+  const { rates, warm, cells: all } = mapCells(rows, position);
   const grid = () => warm.map(() => rates.map(() => null));
   const [z, dim, sets, texts] = [grid(), grid(), grid(), grid()];
   for (const cell of all) {
@@ -63,18 +63,18 @@ function panel(rows, position, id, limit, pick) {
 }
 
 /** The map of an axis, a panel for each position. `give()` returns {rows, limit, pick}. */
-export function map(name, caption, give, { pickable = true, tall = "22rem" } = {}) {
+export function residualMap(name, caption, give, { pickable = true, tall = "22rem" } = {}) {
   const draw = () => {
     const { rows, limit, pick = new Set() } = give();
     const positions = [...new Set(rows.position)];
     const several = positions.length > 1;
     const layout = { margin: { l: 52, r: 8, t: several ? 28 : 10, b: 46 }, dragmode: pickable ? "select" : false };
     const below = several && window.innerWidth < 760;
-    if (below) layout.height = positions.length * PANEL;
+    if (below) layout.height = positions.length * PANEL_PX;
     if (several) layout.grid = below ? { rows: positions.length, columns: 1, pattern: "independent", ygap: 0.4 } : { rows: 1, columns: positions.length, pattern: "independent", xgap: 0.14 };
     const data = positions.flatMap((position, k) => {
       const id = k ? String(k + 1) : "";
-      const { data: traces, x, y } = panel(rows, position, id, limit, pick);
+      const { data: traces, x, y } = positionPanel(rows, position, id, limit, pick);
       layout[`xaxis${id}`] = below && k < positions.length - 1 ? { ...x, title: undefined } : x; // one title says it for all
       layout[`yaxis${id}`] = y;
       return traces;
@@ -86,6 +86,6 @@ export function map(name, caption, give, { pickable = true, tall = "22rem" } = {
 }
 
 /** The data sets under a Plotly click or selection on a map. */
-export const setsUnder = (event) => [...new Set((event?.points ?? []).flatMap((point) => point.customdata ?? []))];
+export const datasetsUnder = (event) => [...new Set((event?.points ?? []).flatMap((point) => point.customdata ?? []))];
 
-export const rowsFor = (state) => rowsOf(state.criticism, state.axis);
+export const selectedRows = (state) => datasetRows(state.criticism, state.axis);

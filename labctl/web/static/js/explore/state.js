@@ -1,9 +1,9 @@
 // What is looked at, picked and drawn over; whoever shows it is told when it changes.
 
-import { remember } from "../core/router.js";
-import { asRanges, fromRanges } from "./dataset_rows.js";
+import { updateQuery } from "../core/router.js";
+import { toRanges, fromRanges } from "./dataset_rows.js";
 
-export class State {
+export class ExploreState {
   constructor(given) {
     Object.assign(this, given); // serial, version, recording, axis, criticism, unit, versions
     this.pick = fromRanges(given.pick);
@@ -18,7 +18,7 @@ export class State {
   /** Pick data sets by number; an empty pick lets go of all. */
   choose(numbers) {
     this.pick = new Set(numbers);
-    remember({ pick: this.pick.size ? asRanges(this.pick) : null });
+    updateQuery({ pick: this.pick.size ? toRanges(this.pick) : null });
     this.tell("pick");
   }
 
@@ -30,7 +30,7 @@ export class State {
   look(axis) {
     this.axis = axis;
     this.overlay = null;
-    remember({ axis });
+    updateQuery({ axis });
     this.tell("axis");
   }
 

@@ -3,38 +3,38 @@
 import { get } from "../core/api.js";
 import { h } from "../core/elements.js";
 import { instant } from "../core/format.js";
-import { chip, head, notice } from "../core/components.js";
+import { chip, pageHeader, notice } from "../core/components.js";
 import { show } from "../core/router.js";
 import { clearButton } from "../bench/actions.js";
-import { idle, withoutBench } from "../bench/idle_bench.js";
-import { running } from "../bench/running_campaign.js";
-import { runs } from "../campaigns/states.js";
+import { idleBench, noBenchCard } from "../bench/idle_bench.js";
+import { runningCampaign } from "../bench/running_campaign.js";
+import { isRunning } from "../campaigns/states.js";
 
-const LOOK_MS = 5000;
+const POLL_MS = 5000;
 const AFTER_END_MS = 1500;
 
 export async function page({ signal }) {
   const [benches, states, campaigns, schedule] = await Promise.all(["/api/benches", "/api/benches/status", "/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })));
   const bench = benches[0];
-  if (!bench) return h("div", { class: "page" }, head("Bench"), withoutBench());
-  const now = campaigns.find((campaign) => campaign.id === bench.campaign) ?? campaigns.find((campaign) => campaign.bench === bench.name && runs(campaign));
+  if (!bench) return h("div", { class: "page" }, pageHeader("Bench"), noBenchCard());
+  const now = campaigns.find((campaign) => campaign.id === bench.campaign) ?? campaigns.find((campaign) => campaign.bench === bench.name && isRunning(campaign));
   const unit = (each) => h("a", { href: `/units/${encodeURIComponent(each.serial)}` }, each.serial);
   const element = h("div", { class: "page bench" },
-    head("Bench", h("span", { class: "row" }, h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null, h("span", {}, "with ", bench.units.flatMap((each, k) => (k ? [", ", unit(each)] : [unit(each)]))), now ? h("span", {}, "runs ", h("a", { href: `/campaigns/${now.id}` }, `campaign ${now.id}`), `, ${now.recipe}`) : null)));
+    pageHeader("Bench", h("span", { class: "row" }, h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null, h("span", {}, "with ", bench.units.flatMap((each, k) => (k ? [", ", unit(each)] : [unit(each)]))), now ? h("span", {}, "runs ", h("a", { href: `/campaigns/${now.id}` }, `campaign ${now.id}`), `, ${now.recipe}`) : null)));
   const unsafe = states.filter((each) => each.unconfirmed);
-  for (const each of unsafe) element.append(unconfirmed(each));
+  for (const each of unsafe) element.append(unconfirmedNotice(each));
   if (now) {
     const plan = await get(`/api/campaigns/${now.id}/plan`, { signal });
-    element.append(...running(now, plan, bench, { signal, over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS) }));
+    element.append(...runningCampaign(now, plan, bench, { signal, over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS) }));
   } else {
-    element.append(idle(bench, campaigns.find((campaign) => campaign.bench === bench.name), schedule.find((each) => each.bench === bench.name)));
-    begun(signal);
+    element.append(idleBench(bench, campaigns.find((campaign) => campaign.bench === bench.name), schedule.find((each) => each.bench === bench.name)));
+    watchForStart(signal);
   }
   return element;
 }
 
 /** While nothing runs, look whether something has begun; the schedule or another person may start it. */
-function begun(signal) {
+function watchForStart(signal) {
   const looking = setInterval(async () => {
     try {
       const [bench] = await get("/api/benches", { signal });
@@ -42,11 +42,11 @@ function begun(signal) {
     } catch {
       // asked again soon; the page says nothing of its own that could be out of date
     }
-  }, LOOK_MS);
+  }, POLL_MS);
   signal.addEventListener("abort", () => clearInterval(looking));
 }
 
-function unconfirmed(bench) {
+function unconfirmedNotice(bench) {
   return notice("bad", h("p", { class: "told" }, `Bench ${bench.name} was not confirmed safe`),
     h("p", {}, `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${instant(bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`),
     h("div", { class: "row" }, clearButton(bench.name, show)));

@@ -1,38 +1,38 @@
 // One campaign: its plan with what became of it, its events, and why it ended.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/elements.js";
+import { setChildren, h } from "../core/elements.js";
 import { count, duration, instant, percent } from "../core/format.js";
-import { card, chip, facts, head, headed, notice, tabs } from "../core/components.js";
-import { go, remember, show as showAgain } from "../core/router.js";
-import { link, resumeButton, stopButton } from "../bench/actions.js";
+import { card, chip, factList, pageHeader, cardWithHeader, notice, toggleGroup } from "../core/components.js";
+import { navigate, updateQuery, show as showAgain } from "../core/router.js";
+import { linkButton, resumeButton, stopButton } from "../bench/actions.js";
 import { eventList } from "../bench/event_list.js";
-import { ENDED, follow } from "../bench/campaign_stream.js";
-import { left } from "../bench/campaign_history.js";
-import { planPicture } from "../campaigns/plan_chart.js";
-import { canResume, runs, stateChip } from "../campaigns/states.js";
+import { FINAL_STATES, followCampaign } from "../bench/campaign_stream.js";
+import { remainingSeconds } from "../bench/campaign_history.js";
+import { planChart } from "../campaigns/plan_chart.js";
+import { canResume, isRunning, stateChip } from "../campaigns/states.js";
 
 const LEVELS = [["info", "all"], ["warning", "warnings and errors"], ["error", "errors"]];
-const MOST = 200;
-const PLAN_AGAIN_MS = 2500;
+const MAX_EVENTS = 200;
+const PLAN_REFRESH_MS = 2500;
 
 export async function page({ params, query, signal }) {
   const path = `/api/campaigns/${encodeURIComponent(params.id)}`;
   let [now, plan, benches] = await Promise.all([get(path, { signal }), get(`${path}/plan`, { signal }), get("/api/benches", { signal })]);
   const here = benches[0]?.name === now.bench;
   const level = LEVELS.some(([each]) => each === query.level) ? query.level : "info";
-  const events = eventList(MOST, level);
+  const events = eventList(MAX_EVENTS, level);
   const [about, said, silent] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
-  const picture = planPicture(`Campaign ${now.id} plan`, () => ({ timeline: plan.timeline, now_s: runs(now) ? now.t_s : null, live: true }), { pick: (dataset) => Object.values(now.recordings)[0] && go(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
+  const picture = planChart(`Campaign ${now.id} plan`, () => ({ timeline: plan.timeline, now_s: isRunning(now) ? now.t_s : null, live: true }), { pick: (dataset) => Object.values(now.recordings)[0] && navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
   let asked = Date.now();
 
   function show(next) {
-    const ended = ENDED.has(next.state) && !ENDED.has(now.state);
+    const ended = FINAL_STATES.has(next.state) && !FINAL_STATES.has(now.state);
     now = next;
-    fill(about, summary(now, plan));
-    fill(said, verdict(now));
+    setChildren(about, summary(now, plan));
+    setChildren(said, reasonNotices(now));
     if (ended) showAgain();
-    else if (Date.now() - asked > PLAN_AGAIN_MS) again();
+    else if (Date.now() - asked > PLAN_REFRESH_MS) again();
   }
   async function again() {
     asked = Date.now();
@@ -40,20 +40,20 @@ export async function page({ params, query, signal }) {
     picture.redraw();
   }
   show(now);
-  follow(now.id, {
+  followCampaign(now.id, {
     progress: show,
     event: (event) => events.add(event),
-    link: ({ stale, since, why }) => fill(silent, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `${why}. Trying again.`) : null),
+    link: ({ stale, since, why }) => setChildren(silent, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `${why}. Trying again.`) : null),
   }, signal);
 
-  const acts = runs(now) ? [link("To the bench", "/bench"), here ? stopButton(now.id) : null] : [here && canResume(now) ? resumeButton(now.id, { whole: true }) : null, link("Plan the same again", `/campaigns/new?${plan.text ? `toml=${encodeURIComponent(plan.text)}` : `recipe=${encodeURIComponent(now.recipe)}`}`)];
+  const acts = isRunning(now) ? [linkButton("To the bench", "/bench"), here ? stopButton(now.id) : null] : [here && canResume(now) ? resumeButton(now.id, { whole: true }) : null, linkButton("Plan the same again", `/campaigns/new?${plan.text ? `toml=${encodeURIComponent(plan.text)}` : `recipe=${encodeURIComponent(now.recipe)}`}`)];
   return h("div", { class: "page" },
-    head(`Campaign ${now.id}`, h("span", {}, h("strong", {}, now.recipe), ` on bench ${now.bench}`), ...acts.filter(Boolean)),
+    pageHeader(`Campaign ${now.id}`, h("span", {}, h("strong", {}, now.recipe), ` on bench ${now.bench}`), ...acts.filter(Boolean)),
     silent, said, about,
-    headed("Plan", h("span", { class: "soft small" }, "A press on a data set opens its readings."), picture),
-    measured(now),
-    Object.assign(headed("Events", tabs("Events to show", LEVELS, level, (value) => {
-      remember({ level: value === "info" ? null : value });
+    cardWithHeader("Plan", h("span", { class: "soft small" }, "A press on a data set opens its readings."), picture),
+    recordingsCard(now),
+    Object.assign(cardWithHeader("Events", toggleGroup("Events to show", LEVELS, level, (value) => {
+      updateQuery({ level: value === "info" ? null : value });
       events.from(value);
     }), events), { id: "events" }));
 }
@@ -62,26 +62,26 @@ function summary(now, plan) {
   const states = plan.timeline.dataset.map((dataset, k) => (dataset === null ? null : plan.timeline.state[k])).filter(Boolean);
   const done = states.filter((state) => state === "done").length;
   const took = now.started_at && now.ended_at ? duration((Date.parse(now.ended_at) - Date.parse(now.started_at)) / 1000) : null;
-  return h("div", { class: "card" }, facts([
+  return h("div", { class: "card" }, factList([
     ["State", stateChip(now), "", percent(now.progress)],
     ["Data sets", `${count(done)} of ${count(states.length)}`, "", `step ${now.step ?? "–"} of ${now.steps}`],
     ["Begun", instant(now.started_at)],
-    runs(now) ? ["Expected end", instant(now.expected_end), "", `${duration(left(now, plan.expected_s))} left`] : ["Ended", instant(now.ended_at), "", took ? `took ${took}` : null],
+    isRunning(now) ? ["Expected end", instant(now.expected_end), "", `${duration(remainingSeconds(now, plan.expected_s))} left`] : ["Ended", instant(now.ended_at), "", took ? `took ${took}` : null],
     ["Expected", duration(plan.expected_s), "", "as planned, without interruptions"],
   ]));
 }
 
 /** Why it stands where it stands, in the service's words. */
-function verdict(now) {
+function reasonNotices(now) {
   const kind = { done: "good", failed: "bad", aborted: "bad" }[now.state] ?? "warn";
-  return [runs(now) && now.state === "running" ? null : notice(kind, h("p", { class: "told" }, now.reason || `It is ${now.state}.`), now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null),
+  return [isRunning(now) && now.state === "running" ? null : notice(kind, h("p", { class: "told" }, now.reason || `It is ${now.state}.`), now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null),
     ...Object.entries(now.dropped).map(([unit, why]) => notice("warn", h("strong", {}, unit), ` took no further part: ${why}`))].filter(Boolean);
 }
 
-function measured(now) {
+function recordingsCard(now) {
   const rows = Object.entries(now.recordings);
   if (!rows.length) return card("Units and recordings", h("p", { class: "soft" }, "Nothing was recorded."));
   return card("Units and recordings", h("ul", { class: "plain" }, rows.map(([serial, recording]) => h("li", { class: "row spread" },
     h("span", { class: "row" }, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), now.dropped[serial] ? chip("dropped", "warn") : null),
-    h("span", { class: "row" }, link(`Recording ${recording}`, `/recordings/${recording}`, "tiny"), link("Fit and explore", `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`, "tiny first"))))));
+    h("span", { class: "row" }, linkButton(`Recording ${recording}`, `/recordings/${recording}`, "tiny"), linkButton("Fit and explore", `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`, "tiny first"))))));
 }

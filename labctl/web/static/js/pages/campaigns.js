@@ -1,23 +1,23 @@
 // All campaigns, and what the schedule will begin.
 
 import { get, remove } from "../core/api.js";
-import { fill, h } from "../core/elements.js";
+import { setChildren, h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
-import { button, card, chip, empty, head, headed, table } from "../core/components.js";
-import { link } from "../bench/actions.js";
-import { runs, stateChip } from "../campaigns/states.js";
-import { due } from "../campaigns/start_time.js";
+import { button, card, chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
+import { linkButton } from "../bench/actions.js";
+import { isRunning, stateChip } from "../campaigns/states.js";
+import { startTime } from "../campaigns/start_time.js";
 
-const AGAIN_MS = 4000;
+const POLL_MS = 4000;
 
 export async function page({ signal }) {
   const place = h("div", { class: "page" });
   const ask = () => Promise.all(["/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })));
   async function show() {
     const [campaigns, schedule] = await ask();
-    fill(place, schedule.length ? scheduled(schedule, show) : null,
-      headed(campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`, null, campaigns.length ? listed(campaigns) : empty(h("p", {}, "No campaign has been run yet."), h("p", {}, link("Plan the first", "/campaigns/new", "first")))));
-    return campaigns.some(runs);
+    setChildren(place, schedule.length ? scheduleCard(schedule, show) : null,
+      cardWithHeader(campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`, null, campaigns.length ? campaignTable(campaigns) : emptyState(h("p", {}, "No campaign has been run yet."), h("p", {}, linkButton("Plan the first", "/campaigns/new", "first")))));
+    return campaigns.some(isRunning);
   }
   let moving = await show();
   const looking = setInterval(async () => {
@@ -27,29 +27,29 @@ export async function page({ signal }) {
     } catch {
       // asked again soon
     }
-  }, AGAIN_MS);
+  }, POLL_MS);
   signal.addEventListener("abort", () => clearInterval(looking));
-  return h("div", { class: "page" }, head("Campaigns", "One run of a recipe on a bench.", link("Plan a campaign", "/campaigns/new", "first")), place);
+  return h("div", { class: "page" }, pageHeader("Campaigns", "One run of a recipe on a bench.", linkButton("Plan a campaign", "/campaigns/new", "first")), place);
 }
 
-const took = (row) => (row.started_at && row.ended_at ? `took ${duration((Date.parse(row.ended_at) - Date.parse(row.started_at)) / 1000)}` : null);
+const durationText = (row) => (row.started_at && row.ended_at ? `took ${duration((Date.parse(row.ended_at) - Date.parse(row.started_at)) / 1000)}` : null);
 
-function listed(rows) {
+function campaignTable(rows) {
   return table([
     { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "soft small beside" }, `${row.recipe} on ${row.bench}`)] },
     { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.state !== "running" && row.reason ? h("span", { class: "soft small beside two-lines", title: row.reason }, row.reason) : null] },
     { title: "Progress", cell: (row) => h("div", { class: "progress-cell" }, h("div", { class: "meter", role: "img", "aria-label": percent(row.progress) }, h("i", { style: `width: ${100 * row.progress}%` })), h("span", { class: "small" }, percent(row.progress))) },
-    { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, instant(row.started_at)), h("span", { class: "soft small beside nowrap" }, runs(row) ? `ends ${instant(row.expected_end)}` : took(row))] },
+    { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, instant(row.started_at)), h("span", { class: "soft small beside nowrap" }, isRunning(row) ? `ends ${instant(row.expected_end)}` : durationText(row))] },
     { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("div", {}, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), h("span", { class: "small beside" }, h("a", { href: `/recordings/${recording}` }, `Recording ${recording}`)))) },
   ], rows, { label: "Every campaign", first: "8rem" });
 }
 
 const OUTCOMES = { started: "good", refused: "bad", missed: "warn", claimed: "accent" };
 
-function scheduled(rows, again) {
+function scheduleCard(rows, again) {
   const came = (event) => h("span", { class: "small beside" }, chip(event.outcome, OUTCOMES[event.outcome] ?? ""), ` ${instant(event.at)} `, event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message);
   return card("Schedule", table([
-    { title: "Begins", cell: due },
+    { title: "Begins", cell: startTime },
     { title: "Recipe", cell: (row) => [row.recipe, row.clip ? h("span", { class: "soft small beside" }, "without what the bench cannot do") : null] },
     { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
     { title: "Priority", number: true, cell: (row) => row.priority },

@@ -1,11 +1,11 @@
 // All recordings, and the place to bring one in.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/elements.js";
+import { setChildren, h } from "../core/elements.js";
 import { count, day } from "../core/format.js";
-import { chip, choice, empty, head, headed, table } from "../core/components.js";
-import { remember } from "../core/router.js";
-import { importing } from "../recordings/import_form.js";
+import { chip, selectField, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
+import { updateQuery } from "../core/router.js";
+import { importForm } from "../recordings/import_form.js";
 
 export async function page({ query, signal }) {
   const list = h("div", {});
@@ -15,27 +15,27 @@ export async function page({ query, signal }) {
   const choose = h("div", {});
   function show() {
     const units = [...new Set(rows.map((row) => row.serial))].sort();
-    fill(choose, units.length > 1 ? choice("Unit", [["", "all units"], ...units.map((serial) => [serial, serial])], unit, (value) => {
+    setChildren(choose, units.length > 1 ? selectField("Unit", [["", "all units"], ...units.map((serial) => [serial, serial])], unit, (value) => {
       unit = value;
-      remember({ unit });
+      updateQuery({ unit });
       show();
     }) : null);
     const shown = rows.filter((row) => !unit || row.serial === unit);
-    fill(list, shown.length ? listed(shown) : nothing());
+    setChildren(list, shown.length ? recordingTable(shown) : noRecordings());
   }
   show();
   const taken = async () => {
     rows = await get("/api/recordings", { signal });
     show();
   };
-  return h("div", { class: "page" }, head("Recordings", "All data sets of one unit in one campaign, or brought in as files."),
-    importing(taken),
-    headed(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list));
+  return h("div", { class: "page" }, pageHeader("Recordings", "All data sets of one unit in one campaign, or brought in as files."),
+    importForm(taken),
+    cardWithHeader(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list));
 }
 
 const KINDS = { samples: "every reading", points: "means", coefficients: "a published table" };
 
-function listed(rows) {
+function recordingTable(rows) {
   return table([
     { title: "Recording", cell: (row) => [h("a", { href: `/recordings/${row.id}` }, `Recording ${row.id}`), row.notes ? h("span", { class: "soft small beside two-lines", title: row.notes }, row.notes) : null] },
     { title: "Unit", cell: (row) => h("a", { href: `/units/${encodeURIComponent(row.serial)}`, class: "nowrap" }, row.serial) },
@@ -48,4 +48,4 @@ function listed(rows) {
   ], rows, { label: "Recordings", first: "13rem" });
 }
 
-const nothing = () => empty(h("p", {}, "There is no recording yet."), h("p", {}, "Drop one above, ", h("a", { href: "/campaigns/new" }, "run a campaign"), ", or ", h("a", { href: "/start" }, "begin with an example"), "."));
+const noRecordings = () => emptyState(h("p", {}, "There is no recording yet."), h("p", {}, "Drop one above, ", h("a", { href: "/campaigns/new" }, "run a campaign"), ", or ", h("a", { href: "/start" }, "begin with an example"), "."));

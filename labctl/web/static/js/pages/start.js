@@ -2,22 +2,22 @@
 
 import { get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
-import { button, card, head } from "../core/components.js";
-import { go } from "../core/router.js";
-import { runs } from "../campaigns/states.js";
+import { button, card, pageHeader } from "../core/components.js";
+import { navigate } from "../core/router.js";
+import { isRunning } from "../campaigns/states.js";
 
 export async function page({ signal }) {
   const [units, campaigns, benches] = await Promise.all(["/api/units", "/api/campaigns", "/api/benches"].map((path) => get(path, { signal })));
   if (units.length || campaigns.length) return overview(units, campaigns, benches);
   return h("div", { class: "page" },
-    head("Begin", "Nothing has been measured yet. Three ways to the first calibration, one press each."),
+    pageHeader("Begin", "Nothing has been measured yet. Three ways to the first calibration, one press each."),
     h("div", { class: "columns" },
       card("See it find a hidden effect",
         h("p", {}, "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out what is missing."),
-        button("Simulate a recording", simulated, { kind: "first" })),
+        button("Simulate a recording", openSimulated, { kind: "first" })),
       card("Look at a real gyro",
         h("p", {}, "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. Why is the fit fifteen times worse than the noise?"),
-        button("Open the real gyro", example)),
+        button("Open the real gyro", openExample)),
       card("Bring your own data",
         h("p", {}, "A folder in the interchange format: recording.toml and its data file, as CSV or Parquet."),
         h("a", { class: "button", href: "/recordings" }, "Import a recording")),
@@ -27,25 +27,25 @@ export async function page({ signal }) {
 }
 
 /** Made, fitted, and opened where it fails. */
-async function simulated() {
+async function openSimulated() {
   const made = await post("/api/recordings/simulated", { recipe: "ojeda2000-121", hide: ["scale_factor_asymmetry=0.0002"], seed: 1 });
-  await explored(made.serial, made.recording, "ojeda2000");
+  await openExplore(made.serial, made.recording, "ojeda2000");
 }
 
-async function example() {
+async function openExample() {
   const made = await post("/api/recordings/example", { name: "osu-fog" });
-  await explored(made.serial, made.recording, "bias_scale");
+  await openExplore(made.serial, made.recording, "bias_scale");
 }
 
-async function explored(serial, recording, model) {
+async function openExplore(serial, recording, model) {
   const fitted = await post(`/api/units/${encodeURIComponent(serial)}/calibrations`, { recording, model });
-  await go(`/explore?unit=${encodeURIComponent(serial)}&version=${fitted.version}&recording=${recording}`);
+  await navigate(`/explore?unit=${encodeURIComponent(serial)}&version=${fitted.version}&recording=${recording}`);
 }
 
 function overview(units, campaigns, benches) {
-  const running = campaigns.find(runs);
+  const running = campaigns.find(isRunning);
   return h("div", { class: "page" },
-    head("labctl", "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall."),
+    pageHeader("labctl", "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall."),
     h("div", { class: "columns", style: "--least: 17rem" },
       card("Bench", benches.length
         ? h("p", {}, running ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.` : `${benches[0].name} is free.`)
@@ -54,5 +54,5 @@ function overview(units, campaigns, benches) {
       card("Units", h("ul", { class: "plain" }, units.slice(0, 6).map((unit) => h("li", { class: "row spread" },
         h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
         h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"))))),
-      card("Data", h("div", { class: "row" }, h("a", { class: "button", href: "/recordings" }, "Import a recording"), button("Simulate a hidden effect", simulated), button("Open the real gyro", example)))));
+      card("Data", h("div", { class: "row" }, h("a", { class: "button", href: "/recordings" }, "Import a recording"), button("Simulate a hidden effect", openSimulated), button("Open the real gyro", openExample)))));
 }

@@ -3,8 +3,8 @@
 import { download, get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
 import { day, instant, number } from "../core/format.js";
-import { button, card, chip, dialog, empty, facts, head, headed, later, modelName, notice, table } from "../core/components.js";
-import { query, remember, show } from "../core/router.js";
+import { button, card, chip, dialog, emptyState, factList, pageHeader, cardWithHeader, loadInto, modelName, notice, table } from "../core/components.js";
+import { query, updateQuery, show } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
 
@@ -16,12 +16,12 @@ export async function page({ params, signal }) {
   const force = history.find((act) => act.version === unit.certified_version && act.act === "certify");
   const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
   return h("div", { class: "page" },
-    head(unit.serial, [unit.model, unit.technology?.toUpperCase()].filter(Boolean).join(" · "), h("a", { class: "button first", href: explore }, "Explore")),
+    pageHeader(unit.serial, [unit.model, unit.technology?.toUpperCase()].filter(Boolean).join(" · "), h("a", { class: "button first", href: explore }, "Explore")),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force, base)),
-    rows.length ? [versions(unit, rows, base, explore), ladder(base, signal), shapes(base, rows, signal)] : empty(h("p", {}, "No calibration yet."), h("p", {}, h("a", { class: "button first", href: explore }, "Fit a model"))),
+    rows.length ? [versions(unit, rows, base, explore), ladder(base, signal), coefficientCard(base, rows, signal)] : emptyState(h("p", {}, "No calibration yet."), h("p", {}, h("a", { class: "button first", href: explore }, "Fit a model"))),
     h("div", { class: "columns" },
       card("Recordings", h("ul", { class: "plain" }, unit.recordings.map((id) => h("li", {}, h("a", { href: `/recordings/${id}` }, `Recording ${id}`))))),
-      card("Certifications", history.length ? acts(history) : h("p", { class: "soft" }, "Nothing has been certified yet."))));
+      card("Certifications", history.length ? certificationTable(history) : h("p", { class: "soft" }, "Nothing has been certified yet."))));
 }
 
 function inForce(unit, rows, force, base) {
@@ -30,7 +30,7 @@ function inForce(unit, rows, force, base) {
   }
   const row = rows.find((each) => each.version === unit.certified_version);
   const left = force?.due ? Math.ceil((new Date(force.due) - Date.now()) / 86_400_000) : null;
-  return h("div", { class: "stack" }, facts([
+  return h("div", { class: "stack" }, factList([
     ["In force", `version ${unit.certified_version}`, null, row ? modelName(row.model) : null],
     ["Certified by", force?.by ?? "–", null, force ? instant(force.at) : null],
     ["Due", force?.due ? day(force.due) : "no date", null, left === null ? null : left < 0 ? `${-left} days ago` : `in ${left} days`],
@@ -42,9 +42,9 @@ function inForce(unit, rows, force, base) {
 
 function versions(unit, rows, base, explore) {
   const act = (row) => row.certified
-    ? button("Revoke", () => certify(base, row.version, "revoke"), { kind: "tiny" })
-    : button("Certify", () => certify(base, row.version, "certify"), { kind: "tiny" });
-  return headed("Calibrations", null, table([
+    ? button("Revoke", () => askCertification(base, row.version, "revoke"), { kind: "tiny" })
+    : button("Certify", () => askCertification(base, row.version, "certify"), { kind: "tiny" });
+  return cardWithHeader("Calibrations", null, table([
     { title: "Version", cell: (row) => h("span", { class: "row tight" }, h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`), row.certified ? chip("in force", "good") : null) },
     { title: "Model", cell: (row) => h("span", {}, modelName(row.model), row.parent ? h("span", { class: "soft small" }, ` from ${row.parent}`) : null) },
     { title: "Made", cell: (row) => h("div", { class: "nowrap" }, instant(row.created_at), h("div", { class: "soft small" }, h("code", { title: `hash ${row.hash}` }, row.hash.slice(0, 10)))) },
@@ -54,7 +54,7 @@ function versions(unit, rows, base, explore) {
   ], rows, { label: "Calibrations", selected: (row) => row.certified }));
 }
 
-async function certify(base, version, what) {
+async function askCertification(base, version, what) {
   const fields = [{ name: "by", label: "Who" }, { name: "reason", label: "Why" }];
   if (what === "certify") fields.push({ name: "due_days", label: "Due again in days", type: "number", value: "365", required: false });
   const said = await dialog(what === "certify" ? `Put version ${version} in force` : `Take version ${version} out of force`, fields, {
@@ -70,29 +70,29 @@ async function certify(base, version, what) {
 
 function ladder(base, signal) {
   const place = h("div", { style: "min-height: 20rem" });
-  later(place, "Climbing down the ladder", async () => ladderFigure(await get(`${base}/ladder`, { signal })));
-  return headed("How the error fell", null, place);
+  loadInto(place, "Climbing down the ladder", async () => ladderFigure(await get(`${base}/ladder`, { signal })));
+  return cardWithHeader("How the error fell", null, place);
 }
 
 /** Coefficients of one version, or of two beside each other. */
-function shapes(base, rows, signal) {
+function coefficientCard(base, rows, signal) {
   const newest = rows[0].version;
   let [one, other] = [Number(query().version) || newest, Number(query().beside) || null];
   const place = h("div");
   const select = (label, value, none, onchange) => h("label", { class: "row small" }, label, h("select", { onchange: (event) => onchange(Number(event.target.value) || null) },
     none ? h("option", { value: "" }, "none") : null, rows.map((row) => h("option", { value: row.version, selected: row.version === value }, `version ${row.version}`))));
   const draw = () => {
-    remember({ version: one === newest ? null : one, beside: other });
-    later(place, "Reading the coefficients", async () => {
+    updateQuery({ version: one === newest ? null : one, beside: other });
+    loadInto(place, "Reading the coefficients", async () => {
       const [first, second] = await Promise.all([one, other].map((version) => (version ? get(`${base}/calibrations/${version}`, { signal }) : null)));
       return h("div", { class: "stack" }, second ? comparison(first, second) : null, coefficients(first, second));
     });
   };
   draw();
-  return headed("Coefficients", h("div", { class: "row" }, select("of", one, false, (value) => { one = value; draw(); }), select("beside", other, true, (value) => { other = value; draw(); })), place);
+  return cardWithHeader("Coefficients", h("div", { class: "row" }, select("of", one, false, (value) => { one = value; draw(); }), select("beside", other, true, (value) => { other = value; draw(); })), place);
 }
 
-function acts(history) {
+function certificationTable(history) {
   return table([
     { title: "When", cell: (act) => instant(act.at) },
     { title: "What", cell: (act) => `${act.act} version ${act.version}` },

@@ -1,12 +1,12 @@
 // Noise at rest: the Allan deviation of each axis, and N, B, K with what they mean and why one may be missing.
 
 import { get, Problem } from "../core/api.js";
-import { fill, h, near } from "../core/elements.js";
+import { setChildren, h, whenNearViewport } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
-import { headed, later, notice, table, tabs } from "../core/components.js";
+import { cardWithHeader, loadInto, notice, table, toggleGroup } from "../core/components.js";
 
-const FIGURES = [["N", "angle random walk"], ["B", "bias instability"], ["K", "rate random walk"]];
+const NOISE_FIGURES = [["N", "angle random walk"], ["B", "bias instability"], ["K", "rate random walk"]];
 
 /** Of the longest stretch at rest, or of the picked data set. */
 export function allan(state, signal) {
@@ -15,29 +15,29 @@ export function allan(state, signal) {
   let [own, seen] = [false, false];
   const show = () => {
     if (!seen) return; // the readings at rest are not read for a page that nobody scrolls down
-    fill(which, state.dataset ? tabs("Of what", [["rest", "longest stretch at rest"], ["set", `data set ${state.dataset}`]], own ? "set" : "rest", (value) => {
+    setChildren(which, state.dataset ? toggleGroup("Of what", [["rest", "longest stretch at rest"], ["set", `data set ${state.dataset}`]], own ? "set" : "rest", (value) => {
       own = value === "set";
       show();
     }) : null);
     const dataset = own ? state.dataset : null;
-    later(place, "Working out the Allan deviation", async () => {
+    loadInto(place, "Working out the Allan deviation", async () => {
       try {
-        return shown(await get(`/api/recordings/${state.id}/allan`, { query: { dataset }, signal }));
+        return allanFigure(await get(`/api/recordings/${state.id}/allan`, { query: { dataset }, signal }));
       } catch (error) {
         if (error instanceof Problem && error.status < 500) return notice("", error.message); // too little at rest is no fault
         throw error;
       }
     });
   };
-  const element = headed("Noise at rest", which, place);
-  near(element, () => {
+  const element = cardWithHeader("Noise at rest", which, place);
+  whenNearViewport(element, () => {
     seen = true;
     show();
   });
   return Object.assign(element, { redraw: show });
 }
 
-function shown(found) {
+function allanFigure(found) {
   const axes = Object.entries(found.axes);
   const [first, last] = [found.datasets[0], found.datasets.at(-1)];
   const where = `Data set${first === last ? ` ${first}` : `s ${first} to ${last}`}, ${duration(found.duration_s)} at ${withUnit(found.temperature_c, "deg C")}.`;
@@ -54,12 +54,12 @@ function shown(found) {
     figure(`Recording ${found.recording} Allan deviation`, "Band: 95 % interval. Dotted: the fit that N, B and K come from.", draw, { tall: "21rem", csv }),
     table([
       { title: "Figure", cell: ([id, name]) => [h("strong", {}, id), h("span", { class: "soft nowrap" }, `, ${name}`)] },
-      ...axes.map(([axis, noise]) => ({ title: `Axis ${axis}`, cell: ([id]) => figureOf(noise[id]) })),
-    ], FIGURES, { label: "Figures of IEEE Std 952", first: "11rem" })];
+      ...axes.map(([axis, noise]) => ({ title: `Axis ${axis}`, cell: ([id]) => noiseFigure(noise[id]) })),
+    ], NOISE_FIGURES, { label: "Figures of IEEE Std 952", first: "11rem" })];
 }
 
 /** A figure with its uncertainty, or how large it may be at most, and why it has no value. */
-function figureOf(noise) {
+function noiseFigure(noise) {
   if (noise?.value !== null && noise?.value !== undefined) return [h("strong", { class: "nowrap" }, `${number(noise.value)} ${noise.unit}`), h("span", { class: "soft small beside" }, `u = ${number(noise.u, 2)} ${noise.unit}`)];
   return [h("span", { class: "soft nowrap" }, noise?.at_most ? `below ${number(noise.at_most, 2)} ${noise.unit}` : "not seen"), noise?.why ? h("span", { class: "soft small beside" }, noise.why) : null];
 }

@@ -1,16 +1,16 @@
 // The data sets of a recording: a table to leaf through, from which one is picked.
 
-import { fill, h } from "../core/elements.js";
-import { count, duration, mean, number, setting } from "../core/format.js";
-import { chip, choice, headed, table } from "../core/components.js";
-import { remember } from "../core/router.js";
-import { nameOf, unitOf } from "./channels.js";
+import { setChildren, h } from "../core/elements.js";
+import { count, duration, mean, number, plainNumber } from "../core/format.js";
+import { chip, selectField, cardWithHeader, table } from "../core/components.js";
+import { updateQuery } from "../core/router.js";
+import { channelName, channelUnit } from "./channels.js";
 
-const A_PAGE = 25;
-const KIND = { complete: "good", running: "accent", open: "accent" };
+const PAGE_SIZE = 25;
+const CHIP_KINDS = { complete: "good", running: "accent", open: "accent" };
 
 /** `state` has {sets, dataset, pick(number), output}; `page` is the leaf that the address names, from 1. */
-export function dataSets(state, asked) {
+export function datasetTable(state, asked) {
   const { sets } = state;
   const place = h("div", {});
   const leaf = h("div", { class: "row" });
@@ -19,33 +19,33 @@ export function dataSets(state, asked) {
 
   function show() {
     const rows = sets.number.map((_, k) => k).filter((k) => !position || sets.position[k] === position);
-    const pages = Math.max(1, Math.ceil(rows.length / A_PAGE));
+    const pages = Math.max(1, Math.ceil(rows.length / PAGE_SIZE));
     const picked = rows.findIndex((k) => sets.number[k] === state.dataset);
-    at = Math.min(Math.max(at ?? (picked >= 0 ? Math.floor(picked / A_PAGE) + 1 : 1), 1), pages);
-    fill(place, listed(state, rows.slice((at - 1) * A_PAGE, at * A_PAGE)));
+    at = Math.min(Math.max(at ?? (picked >= 0 ? Math.floor(picked / PAGE_SIZE) + 1 : 1), 1), pages);
+    setChildren(place, pageTable(state, rows.slice((at - 1) * PAGE_SIZE, at * PAGE_SIZE)));
     const turn = (text, label, to) => h("button", { type: "button", class: "button tiny", "aria-label": label, disabled: to < 1 || to > pages, onclick: () => {
       at = to;
-      remember({ page: at === 1 ? null : at });
+      updateQuery({ page: at === 1 ? null : at });
       show();
     } }, text);
-    fill(leaf, pages > 1 ? [turn("« First", "First page", at === 1 ? 0 : 1), turn("‹ Back", "Page before", at - 1), h("span", { class: "soft small", "aria-live": "polite" }, `${at} of ${pages}`), turn("On ›", "Next page", at + 1), turn("Last »", "Last page", at === pages ? 0 : pages)] : null);
+    setChildren(leaf, pages > 1 ? [turn("« First", "First page", at === 1 ? 0 : 1), turn("‹ Back", "Page before", at - 1), h("span", { class: "soft small", "aria-live": "polite" }, `${at} of ${pages}`), turn("On ›", "Next page", at + 1), turn("Last »", "Last page", at === pages ? 0 : pages)] : null);
   }
   show();
   const positions = [...new Set(sets.position)];
-  const filter = positions.length > 1 ? choice("Position", [["", "all"], ...positions.map((each) => [each, `${each} up`])], position, (value) => {
+  const filter = positions.length > 1 ? selectField("Position", [["", "all"], ...positions.map((each) => [each, `${each} up`])], position, (value) => {
     position = value;
     at = 1;
-    remember({ position, page: null });
+    updateQuery({ position, page: null });
     show();
   }) : null;
   const redraw = () => {
     at = null;
     show();
   };
-  return Object.assign(headed(`${count(sets.number.length)} data sets`, filter, place, leaf), { redraw });
+  return Object.assign(cardWithHeader(`${count(sets.number.length)} data sets`, filter, place, leaf), { redraw });
 }
 
-function listed(state, rows) {
+function pageTable(state, rows) {
   const { sets, output } = state;
   const gyros = Object.keys(sets.channels).filter((name) => name.startsWith("gyro_"));
   const of = (name, k, digits) => (sets.channels[name] ? number(sets.channels[name].mean[k], digits) : "–");
@@ -56,12 +56,12 @@ function listed(state, rows) {
       event.stopPropagation();
       state.pick(sets.number[k]);
     } }, `${sets.number[k]}`) },
-    { title: "State", cell: (k) => h("span", { title: sets.reason[k] }, chip(sets.state[k], KIND[sets.state[k]] ?? "warn")) },
+    { title: "State", cell: (k) => h("span", { title: sets.reason[k] }, chip(sets.state[k], CHIP_KINDS[sets.state[k]] ?? "warn")) },
     { title: "Up", cell: (k) => sets.position[k] },
-    { title: "Table rate, deg/s", number: true, cell: (k) => setting(sets.table_rate_dps[k], 6) },
-    warm ? { title: "Set point, deg C", number: true, cell: (k) => setting(sets.chamber_setpoint_c[k] ?? NaN) } : null,
+    { title: "Table rate, deg/s", number: true, cell: (k) => plainNumber(sets.table_rate_dps[k], 6) },
+    warm ? { title: "Set point, deg C", number: true, cell: (k) => plainNumber(sets.chamber_setpoint_c[k] ?? NaN) } : null,
     { title: "Gyro, deg C", number: true, cell: (k) => of("temperature_c", k, 4) },
-    ...gyros.map((name) => ({ title: `${nameOf(name).replace("gyro output", "Output")}, ${unitOf(name, output)}`, number: true, cell: (k) => [mean(sets.channels[name].mean[k], sets.channels[name].std[k]), sets.channels[name].std[k] === null ? null : h("span", { class: "soft small beside" }, ` ± ${number(sets.channels[name].std[k], 2)}`)] })),
+    ...gyros.map((name) => ({ title: `${channelName(name).replace("gyro output", "Output")}, ${channelUnit(name, output)}`, number: true, cell: (k) => [mean(sets.channels[name].mean[k], sets.channels[name].std[k]), sets.channels[name].std[k] === null ? null : h("span", { class: "soft small beside" }, ` ± ${number(sets.channels[name].std[k], 2)}`)] })),
     { title: "Readings", number: true, cell: (k) => count(sets.n[k]) },
     timed ? { title: "Begins after", number: true, cell: (k) => duration(sets.t_from_s[k] ?? NaN) } : null,
   ].filter(Boolean), rows, { dense: true, label: "Data sets", selected: (k) => sets.number[k] === state.dataset, onrow: (k) => state.pick(sets.number[k]) });

@@ -1,31 +1,31 @@
 // Taking a recording in: dropped or picked, and what the service says to it.
 
 import { upload } from "../core/api.js";
-import { fill, h } from "../core/elements.js";
+import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
-import { busy, notice } from "../core/components.js";
-import { filesOf, sorted } from "./file_input.js";
+import { busyIndicator, notice } from "../core/components.js";
+import { droppedFiles, recordingFiles } from "./file_input.js";
 
-const size = (files) => {
+const totalSize = (files) => {
   const bytes = files.reduce((sum, file) => sum + file.size, 0);
   return bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
 };
 
 /** The card to drop a recording on; `taken(imported)` is called when one is in the database. */
-export function importing(taken) {
+export function importForm(taken) {
   const told = h("div", { "aria-live": "polite" });
   const pick = (folder) => {
     const input = h("input", { type: "file", multiple: true, webkitdirectory: folder, accept: folder ? null : ".toml,.csv,.parquet", "aria-label": folder ? "Folder of a recording" : "Files of a recording", class: "visually-hidden", tabindex: "-1", onchange: () => {
       const files = [...input.files];
       input.value = "";
-      if (files.length) take(folder ? sorted(files) : { files, left: [] });
+      if (files.length) take(folder ? recordingFiles(files) : { files, left: [] });
     } });
     return [h("button", { type: "button", class: "button", onclick: () => input.click() }, folder ? "Choose a folder" : "Choose files"), input];
   };
   const zone = h("div", { class: "drop stack", ondragover: over, ondragenter: over, ondragleave: (event) => zone.contains(event.relatedTarget) || zone.classList.remove("over"), ondrop: async (event) => {
     event.preventDefault();
     zone.classList.remove("over");
-    take(await filesOf(event.dataTransfer));
+    take(await droppedFiles(event.dataTransfer));
   } },
   h("p", { class: "drop-title" }, "Drop a recording here"),
   h("p", { class: "small" }, h("code", {}, "recording.toml"), ", its data as CSV or Parquet, and the environment file if there is one; or the folder that holds them."),
@@ -37,14 +37,14 @@ export function importing(taken) {
   }
 
   async function take({ files, left }) {
-    if (!files.length) return fill(told, refused(new Error("None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.")));
-    fill(told, busy(`Reading ${files.map((file) => file.name).join(", ")} (${size(files)})`));
+    if (!files.length) return setChildren(told, refusedNotice(new Error("None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.")));
+    setChildren(told, busyIndicator(`Reading ${files.map((file) => file.name).join(", ")} (${totalSize(files)})`));
     try {
       const made = await upload("/api/recordings", files);
-      fill(told, accepted(made, left));
+      setChildren(told, acceptedNotice(made, left));
       taken(made);
     } catch (error) {
-      fill(told, refused(error));
+      setChildren(told, refusedNotice(error));
     }
     return told;
   }
@@ -52,7 +52,7 @@ export function importing(taken) {
   return h("section", { class: "card stack", "aria-label": "Import" }, h("h2", {}, "Import"), zone, told);
 }
 
-function accepted(made, left) {
+function acceptedNotice(made, left) {
   return notice("good", h("p", { class: "told" }, `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`),
     left.length ? h("p", { class: "small" }, `Left out of the folder: ${left.join(", ")}.`) : null,
     h("div", { class: "row" },
@@ -61,6 +61,6 @@ function accepted(made, left) {
 }
 
 /** What is wrong, large: it names file, column and row, and that is what has to be looked up. */
-function refused(error) {
+function refusedNotice(error) {
   return notice("bad", h("p", { class: "told" }, error.message), h("p", { class: "small" }, "Nothing of it was kept."));
 }

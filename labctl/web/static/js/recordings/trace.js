@@ -1,15 +1,15 @@
 // One channel over time, however many readings there are: the service sends as many columns as the picture has.
 
 import { get } from "../core/api.js";
-import { fill, h } from "../core/elements.js";
+import { setChildren, h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { count, duration, number } from "../core/format.js";
-import { busy, choice, headed, notice } from "../core/components.js";
-import { remember } from "../core/router.js";
-import { nameOf, titleOf } from "./channels.js";
+import { busyIndicator, selectField, cardWithHeader, notice } from "../core/components.js";
+import { updateQuery } from "../core/router.js";
+import { channelName, channelTitle } from "./channels.js";
 
 const COLUMNS = 1200;
-const SETTLED_MS = 200;
+const SETTLE_MS = 200;
 const UNITS = [[7200, "h", 3600], [600, "min", 60], [0, "s", 1]];
 
 /** The trace of a recording. `state` has {id, channel, from, until, dataset, sets}; it is changed and written to the address. */
@@ -18,7 +18,7 @@ export function trace(state, signal) {
   let asked = new AbortController();
   let waiting = null;
   const told = h("p", { class: "soft small", "aria-live": "polite" });
-  const place = h("div", { style: "min-height: 24rem" }, busy("Reading"));
+  const place = h("div", { style: "min-height: 24rem" }, busyIndicator("Reading"));
   const picture = figure(`Recording ${state.id} trace`, "Band: from the least to the greatest reading of a column; line: their mean. Drag across to look closer, press a data set to open its readings.", draw, { tall: "21rem", csv: () => [["t_s", `min_${state.channel}`, `max_${state.channel}`, `mean_${state.channel}`, "n"], ...found.t_s.map((t, k) => [t, found.min[k], found.max[k], found.mean[k], found.n[k]])] });
   const channels = h("div", {});
 
@@ -28,16 +28,16 @@ export function trace(state, signal) {
     const [, unit, seconds] = UNITS.find(([from]) => high - low >= from);
     picture.seconds = seconds;
     const t = found.t_s.map((value) => value / seconds);
-    const pieces = apart(found.t_s, (high - low) / COLUMNS);
+    const pieces = continuousPieces(found.t_s, (high - low) / COLUMNS);
     const line = colour("accent");
-    const name = titleOf(state.channel, found.unit);
+    const name = channelTitle(state.channel, found.unit);
     const few = found.n.every((n) => n === 1) && t.length < 800;
     const tips = found.t_s.map((_, k) => (found.n[k] === 1 ? "1 reading" : `${number(found.min[k], 5)} to ${number(found.max[k], 5)}, ${count(found.n[k])} readings`));
     const set = state.sets.number.indexOf(state.dataset);
     return {
       data: [
-        { type: "scatter", mode: "lines", name: "least to greatest", fill: "toself", fillcolor: `color-mix(in srgb, ${line} 28%, transparent)`, line: { width: 0 }, hoverinfo: "skip", ...band(t, found, pieces) },
-        { type: "scatter", mode: few ? "lines+markers" : "lines", name: "mean", line: { color: line, width: 1.3 }, marker: { size: 4 }, ...joined(t, found.mean, tips, pieces), hovertemplate: `%{y:.6~g} ${found.unit}<br>at %{x:.6~f} ${unit}<br>%{text}<extra></extra>` },
+        { type: "scatter", mode: "lines", name: "least to greatest", fill: "toself", fillcolor: `color-mix(in srgb, ${line} 28%, transparent)`, line: { width: 0 }, hoverinfo: "skip", ...envelopeOutline(t, found, pieces) },
+        { type: "scatter", mode: few ? "lines+markers" : "lines", name: "mean", line: { color: line, width: 1.3 }, marker: { size: 4 }, ...meanLine(t, found.mean, tips, pieces), hovertemplate: `%{y:.6~g} ${found.unit}<br>at %{x:.6~f} ${unit}<br>%{text}<extra></extra>` },
       ],
       layout: {
         labctlConfig: { showTips: false }, showlegend: false, xaxis: { title: { text: `time, ${unit}` }, range: [low / seconds, high / seconds] }, yaxis: { title: { text: name }, fixedrange: true }, margin: { l: 64, r: 12, t: 8, b: 46 },
@@ -52,20 +52,20 @@ export function trace(state, signal) {
     try {
       found = await get(`/api/recordings/${state.id}/trace`, { query: { channel: state.channel, from_s: state.from, until_s: state.until, points: COLUMNS }, signal: AbortSignal.any([signal, asked.signal]) });
     } catch (error) {
-      if (error.name !== "AbortError") fill(place, notice("", error.message));
+      if (error.name !== "AbortError") setChildren(place, notice("", error.message));
       return;
     }
-    if (!picture.isConnected) fill(place, picture);
-    fill(channels, choice("Channel", found.channels.map((name) => [name, nameOf(name)]), state.channel, (value) => show({ channel: value })));
+    if (!picture.isConnected) setChildren(place, picture);
+    setChildren(channels, selectField("Channel", found.channels.map((name) => [name, channelName(name)]), state.channel, (value) => show({ channel: value })));
     const shown = found.n.reduce((sum, n) => sum + n, 0);
-    fill(told, `${count(shown)} readings${found.raw ? "" : ", from envelopes of each data set"}; ${duration((state.until ?? found.until_s) - (state.from ?? found.from_s))} shown.`);
+    setChildren(told, `${count(shown)} readings${found.raw ? "" : ", from envelopes of each data set"}; ${duration((state.until ?? found.until_s) - (state.from ?? found.from_s))} shown.`);
     picture.redraw();
   }
 
   /** Show another channel or window: {channel, from, until}; null is all. */
   function show(change) {
     Object.assign(state, change);
-    remember({ channel: state.channel, from: rounded(state.from), until: rounded(state.until) });
+    updateQuery({ channel: state.channel, from: rounded(state.from), until: rounded(state.until) });
     return load();
   }
 
@@ -82,8 +82,8 @@ export function trace(state, signal) {
       clearTimeout(waiting);
       const [low, high] = event["xaxis.range"] ?? [event["xaxis.range[0]"], event["xaxis.range[1]"]];
       const seconds = picture.seconds;
-      if (event["xaxis.autorange"]) waiting = setTimeout(() => show({ from: null, until: null }), SETTLED_MS);
-      else if (Number.isFinite(low)) waiting = setTimeout(() => show({ from: low * seconds, until: high * seconds }), SETTLED_MS);
+      if (event["xaxis.autorange"]) waiting = setTimeout(() => show({ from: null, until: null }), SETTLE_MS);
+      else if (Number.isFinite(low)) waiting = setTimeout(() => show({ from: low * seconds, until: high * seconds }), SETTLE_MS);
     });
     plot.on("plotly_click", (event) => {
       const t = event.points[0].x * picture.seconds;
@@ -94,14 +94,14 @@ export function trace(state, signal) {
   const tool = (text, label, act) => h("button", { type: "button", class: "button tiny", "aria-label": label, title: label, onclick: act }, text);
   const tools = h("div", { class: "row tight", role: "group", "aria-label": "Window" }, tool("◀", "Earlier", () => move(-0.5, -0.5)), tool("▶", "Later", () => move(0.5, 0.5)), tool("+", "Look closer", () => move(0.25, -0.25)), tool("−", "Look wider", () => move(-0.5, 0.5)), tool("All", "The whole recording", () => show({ from: null, until: null })));
   load();
-  const element = headed("Trace", h("div", { class: "row", style: "align-items: end" }, channels, tools), place, told);
+  const element = cardWithHeader("Trace", h("div", { class: "row", style: "align-items: end" }, channels, tools), place, told);
   return Object.assign(element, { show, redraw: () => picture.redraw() });
 }
 
 const rounded = (value) => (Number.isFinite(value) ? Number(value.toFixed(3)) : null);
 
 /** Where bins hang together: [first, last] of each piece; a gap is longer than three columns. */
-function apart(t, column) {
+function continuousPieces(t, column) {
   const steps = t.slice(1).map((value, k) => value - t[k]).sort((a, b) => a - b);
   const gap = 3 * Math.max(column, steps[Math.floor(steps.length / 2)] ?? 0);
   const pieces = [];
@@ -113,7 +113,7 @@ function apart(t, column) {
   return pieces;
 }
 
-function joined(t, values, texts, pieces) {
+function meanLine(t, values, texts, pieces) {
   const [x, y, text] = [[], [], []];
   for (const [from, to] of pieces) {
     x.push(...t.slice(from, to + 1), null);
@@ -124,7 +124,7 @@ function joined(t, values, texts, pieces) {
 }
 
 /** Around each piece once: along the greatest, back along the least. */
-function band(t, found, pieces) {
+function envelopeOutline(t, found, pieces) {
   const [x, y] = [[], []];
   for (const [from, to] of pieces) {
     x.push(...t.slice(from, to + 1), ...t.slice(from, to + 1).reverse(), t[from], null);

@@ -2,8 +2,8 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { number, unitWords, words } from "../core/format.js";
-import { facts, table } from "../core/components.js";
+import { number, unitText, idText } from "../core/format.js";
+import { factList, table } from "../core/components.js";
 
 const ERRORS = [["rms_dps", "RMS"], ["heldout_rms_dps", "at unseen temperatures"], ["noise_floor_dps", "noise floor"]];
 /** Coverage factor of the bars: expanded uncertainty. */
@@ -15,8 +15,8 @@ export function comparison(first, second) {
   const more = [...own].filter((id) => !other.has(id));
   const less = [...other].filter((id) => !own.has(id));
   return h("div", { class: "stack" },
-    facts(ERRORS.map(([key, title]) => [title, number(first.error[key]), "deg/s", `version ${second.version}: ${number(second.error[key])}`])),
-    h("p", {}, `Version ${first.version} `, more.length ? `has ${more.map(words).join(", ")} more` : "has nothing more", less.length ? ` and lacks ${less.map(words).join(", ")}` : "", ` than version ${second.version}.`));
+    factList(ERRORS.map(([key, title]) => [title, number(first.error[key]), "deg/s", `version ${second.version}: ${number(second.error[key])}`])),
+    h("p", {}, `Version ${first.version} `, more.length ? `has ${more.map(idText).join(", ")} more` : "has nothing more", less.length ? ` and lacks ${less.map(idText).join(", ")}` : "", ` than version ${second.version}.`));
 }
 
 export function coefficients(first, second) {
@@ -28,7 +28,7 @@ const tableOf = (axis) => axis.coefficients?.temperature_c ? axis.coefficients :
 
 /** By what values are multiplied, and the unit they are then in: plain numbers are shares, ppm below 1 %. */
 function scaleOf(values, unit) {
-  if (unit !== "1") return [1, unitWords(unit)];
+  if (unit !== "1") return [1, unitText(unit)];
   return Math.max(...values.map(Math.abs)) < 0.01 ? [1e6, "ppm"] : [100, "%"];
 }
 
@@ -46,8 +46,8 @@ function overTemperature(first, second) {
       const { temperature_c: x, [name]: { value, u } } = tableOf(values);
       return { type: "scatter", mode: "lines+markers", name: `axis ${axis}${second ? `, v${version.version}` : ""}`, x, y: value.map((each) => (each === null ? null : factor * each)), error_y: faint || !u ? undefined : { type: "data", array: u.map((each) => K * factor * each), thickness: 1, width: 2 }, line: { color: axisColour(axis), dash: faint ? "dot" : "solid", width: faint ? 1.2 : 2 }, marker: { size: faint ? 4 : 6 }, opacity: faint ? 0.7 : 1 };
     });
-    const draw = () => ({ data: [...lines(first, false), ...lines(second, true)], layout: { xaxis: { title: { text: "temperature, deg C" } }, yaxis: { title: { text: shown ? `${words(name)}, ${shown}` : words(name), font: { color: colour("soft") } } } } });
-    return h("div", {}, h("h3", {}, words(name)), figure(`Coefficient ${words(name)}`, "Bars: expanded uncertainty, k = 2.", draw, { tall: "17rem", csv: () => [["version", "axis", "temperature_c", name, "u", "unit"], ...rows] }));
+    const draw = () => ({ data: [...lines(first, false), ...lines(second, true)], layout: { xaxis: { title: { text: "temperature, deg C" } }, yaxis: { title: { text: shown ? `${idText(name)}, ${shown}` : idText(name), font: { color: colour("soft") } } } } });
+    return h("div", {}, h("h3", {}, idText(name)), figure(`Coefficient ${idText(name)}`, "Bars: expanded uncertainty, k = 2.", draw, { tall: "17rem", csv: () => [["version", "axis", "temperature_c", name, "u", "unit"], ...rows] }));
   }));
 }
 
