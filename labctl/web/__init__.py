@@ -1,4 +1,4 @@
-"""The pages: files that a browser puts together, and asks the HTTP interface with, as anybody else does."""
+"""The pages: static files for the browser, which uses the same HTTP API as every other client."""
 
 from labctl.web.pages import install, is_page
 

@@ -1,4 +1,4 @@
-"""Serves the pages: one shell for every address, and the files it loads. No page knows what the API does not say."""
+"""Serves the pages: one HTML document for every address, and the files it loads. All data comes from the HTTP API."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 FOLDER = Path(__file__).parent / "static"
 PLOTLY = Path(plotly.__file__).parent / "package_data" / "plotly.min.js"
 STATIC = "/static/"
-#: Every address that a page has; what follows is the page's own business.
+#: Address prefixes of the pages; the router in the browser handles the rest of an address.
 PAGES = ("/start", "/bench", "/campaigns", "/units", "/explore", "/recordings", "/effects")
-#: Only our own files, and no frame around them. Plotly writes styles, and compiles the shaders of surfaces.
+#: Scripts and styles of labctl only, and no embedding in a frame. Plotly writes inline styles, and compiles shaders for
+#: surfaces, which needs 'unsafe-eval'.
 POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data: blob:; connect-src 'self' data: blob:; frame-ancestors 'none'; base-uri 'none'; "
@@ -25,33 +26,33 @@ HEADERS = {
     b"content-security-policy": POLICY.encode(),
     b"x-content-type-options": b"nosniff",
     b"referrer-policy": b"no-referrer",
-    b"cache-control": b"no-cache",  # asked for again each time, answered 304 while nothing changed
+    b"cache-control": b"no-cache",  # revalidated on each request, answered 304 while unchanged
 }
 
 
 def install(app: FastAPI) -> None:
-    """Add the pages to an application."""
+    """Add the routes of the pages, the static files and the security headers to an application."""
 
-    def shell() -> FileResponse:
+    def index() -> FileResponse:
         return FileResponse(FOLDER / "index.html", media_type="text/html")
 
-    def script() -> FileResponse:
+    def plotly_script() -> FileResponse:
         return FileResponse(PLOTLY, media_type="text/javascript")
 
-    app.add_api_route(f"{STATIC}plotly.js", script, include_in_schema=False)
+    app.add_api_route(f"{STATIC}plotly.js", plotly_script, include_in_schema=False)
     app.mount(STATIC.rstrip("/"), StaticFiles(directory=FOLDER))
     for path in ("/", *PAGES, *(f"{page}/{{rest:path}}" for page in PAGES)):
-        app.add_api_route(path, shell, include_in_schema=False)
-    app.add_middleware(_Dressed)
+        app.add_api_route(path, index, include_in_schema=False)
+    app.add_middleware(_SecurityHeaders)
 
 
 def is_page(path: str) -> bool:
-    """Whether an address is a page or a file of one, which hold nothing of the house and are shown without a key."""
+    """Return whether a path is a page or a static file; both hold no data of the laboratory and need no API key."""
     return path == "/" or path.startswith(STATIC) or any(path == page or path.startswith(f"{page}/") for page in PAGES)
 
 
-class _Dressed:
-    """Gives pages and their files the headers that keep strangers' scripts out."""
+class _SecurityHeaders:
+    """ASGI middleware that adds `HEADERS` to every page and static file; responses of the API pass unchanged."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -61,9 +62,9 @@ class _Dressed:
             await self._app(scope, receive, send)
             return
 
-        async def dressed(message: Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 message["headers"] = [*message["headers"], *HEADERS.items()]
             await send(message)
 
-        await self._app(scope, receive, dressed)
+        await self._app(scope, receive, send_with_headers)

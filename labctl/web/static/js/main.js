@@ -1,13 +1,13 @@
-// Which module shows which address.
+// Entry point: the routes of all pages.
 
 import { loadPlotly } from "./core/figure.js";
 import { route, start } from "./core/router.js";
 import { buildLayout } from "./core/layout.js";
 
-/** Begin to load what draws pictures; a picture that then lacks it asks again, and says so. */
+/** Preload Plotly; a figure loads it again where that failed, and reports the error. */
 const preloadPlotly = () => loadPlotly().catch(() => {});
 
-/** A page with pictures: what draws them loads beside the page and what it asks for. */
+/** A page with plots: Plotly loads in parallel with the module and its requests. */
 const withPlots = (load) => () => {
   preloadPlotly();
   return load();
@@ -29,5 +29,5 @@ route("/effects/:id", withPlots(() => import("./pages/effects.js")));
 
 buildLayout();
 await start();
-// The first page stands: the next may have pictures.
+// The first page is shown; the next one may need Plotly.
 (window.requestIdleCallback ?? setTimeout)(preloadPlotly);

@@ -1,4 +1,4 @@
-// What a person does to a campaign or a bench. Each asks who, and why where that will be read later.
+// Buttons that act on a campaign or a bench. Each asks for the operator's name, and for a reason where one is recorded.
 
 import { get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
@@ -9,59 +9,59 @@ const OPERATOR_NAME_KEY = "labctl.who";
 const operatorNameField = () => ({ name: "by", label: "Your name", value: localStorage.getItem(OPERATOR_NAME_KEY) ?? "" });
 
 async function askOperator(title, fields, options) {
-  const said = await dialog(title, fields, options);
-  if (said?.by) localStorage.setItem(OPERATOR_NAME_KEY, said.by);
-  return said;
+  const answers = await dialog(title, fields, options);
+  if (answers?.by) localStorage.setItem(OPERATOR_NAME_KEY, answers.by);
+  return answers;
 }
 
 const postAction = (id, name, body) => post(`/api/campaigns/${id}/${name}`, body);
 
-/** The one red button: the campaign ends now, table at rest, chamber at its safe set point. */
+/** Safe stop: the campaign ends now, table at rest, chamber at its safe set point. */
 export const stopButton = (id) => Object.assign(button("Safe stop", async () => {
-  const said = await askOperator("Stop now and leave the bench safe?", [{ ...operatorNameField(), required: false }, { name: "reason", label: "Why", value: "stopped by hand", hint: "It is written beside the campaign." }],
-    { text: "The table comes to rest, the chamber goes to its safe set point, the campaign ends. What was measured is kept, and the campaign can be resumed.", confirm: "Stop now", kind: "stop" });
-  if (!said) return;
-  const answer = await postAction(id, "abort", said);
+  const answers = await askOperator("Stop now and leave the bench safe?", [{ ...operatorNameField(), required: false }, { name: "reason", label: "Why", value: "stopped by hand", hint: "It is written beside the campaign." }],
+    { text: "The table comes to rest, the chamber goes to its safe set point, the campaign ends. What was measured is kept, and the campaign can be resumed.", confirm: "Stop now", kind: "danger" });
+  if (!answers) return;
+  const answer = await postAction(id, "abort", answers);
   const unsafe = (await get("/api/benches")).find((bench) => bench.unconfirmed);
   if (answer.state !== "aborted") toast("bad", `The campaign is ${answer.state}: ${answer.reason}`);
   else if (unsafe) toast("bad", `Stopped, but the safe state was not confirmed: ${unsafe.unconfirmed}`);
   else toast("good", "Stopped. The bench is in its safe state.");
-}, { kind: "stop big" }), { title: "End the campaign now, in the safe state" });
+}, { kind: "danger large" }), { title: "End the campaign now, in the safe state" });
 
 export const pauseButton = (id) => button("Pause", async () => {
-  const said = await askOperator("Pause after the present data set?", [operatorNameField(), { name: "reason", label: "Why" }], { confirm: "Pause" });
-  if (said) await postAction(id, "pause", said);
+  const answers = await askOperator("Pause after the present data set?", [operatorNameField(), { name: "reason", label: "Why" }], { confirm: "Pause" });
+  if (answers) await postAction(id, "pause", answers);
 });
 
-/** Go on: `whole` when it takes up a campaign that had ended or was interrupted. */
+/** Continue a paused campaign, or with `whole` resume one that had ended or was interrupted. */
 export const resumeButton = (id, { whole = false } = {}) => button(whole ? "Resume where it was" : "Go on", async () => {
-  const said = await askOperator(whole ? "Take the campaign up where it was?" : "Go on with the campaign?", [operatorNameField(), { name: "reason", label: "Why", required: false }],
+  const answers = await askOperator(whole ? "Take the campaign up where it was?" : "Go on with the campaign?", [operatorNameField(), { name: "reason", label: "Why", required: false }],
     { text: whole ? "First the safe state, then home, temperature and soak again; the first incomplete data set is measured anew." : null, confirm: whole ? "Resume" : "Go on" });
-  if (!said) return;
-  await postAction(id, "resume", { by: said.by, reason: said.reason });
+  if (!answers) return;
+  await postAction(id, "resume", { by: answers.by, reason: answers.reason });
   toast("good", whole ? `Campaign ${id} is taken up.` : "It goes on.");
   if (whole) await navigate("/bench");
-}, { kind: "first" });
+}, { kind: "primary" });
 
-/** Answer the question that waits: it is done, or it cannot be done. */
+/** Buttons that answer the open prompt: done, or cannot be done. */
 export const answerButtons = (id, prompt) => [
   button("Done", async () => {
-    const said = await askOperator("Is it done?", [operatorNameField()], { text: prompt.text, confirm: "It is done" });
-    if (said) await postAction(id, "confirm", { prompt: prompt.id, by: said.by, confirmed: true });
-  }, { kind: "first" }),
+    const answers = await askOperator("Is it done?", [operatorNameField()], { text: prompt.text, confirm: "It is done" });
+    if (answers) await postAction(id, "confirm", { prompt: prompt.id, by: answers.by, confirmed: true });
+  }, { kind: "primary" }),
   button("Cannot be done", async () => {
-    const said = await askOperator("It cannot be done?", [operatorNameField(), { name: "reason", label: "Why" }], { text: "The campaign ends, in the safe state.", confirm: "It cannot be done", kind: "stop" });
-    if (said) await postAction(id, "confirm", { prompt: prompt.id, by: said.by, reason: said.reason, confirmed: false });
+    const answers = await askOperator("It cannot be done?", [operatorNameField(), { name: "reason", label: "Why" }], { text: "The campaign ends, in the safe state.", confirm: "It cannot be done", kind: "danger" });
+    if (answers) await postAction(id, "confirm", { prompt: prompt.id, by: answers.by, reason: answers.reason, confirmed: false });
   }),
 ];
 
-/** Say that somebody has looked at a bench whose safe state was not confirmed. */
+/** Confirm by inspection that a bench is safe whose safe state was not confirmed. */
 export const clearButton = (bench, then) => button("I have looked, it is safe", async () => {
-  const said = await askOperator(`Is bench ${bench} safe?`, [operatorNameField(), { name: "reason", label: "What you saw", value: "looked at the bench" }], { confirm: "It is safe" });
-  if (!said) return;
-  await post(`/api/benches/${encodeURIComponent(bench)}/clear`, said);
+  const answers = await askOperator(`Is bench ${bench} safe?`, [operatorNameField(), { name: "reason", label: "What you saw", value: "looked at the bench" }], { confirm: "It is safe" });
+  if (!answers) return;
+  await post(`/api/benches/${encodeURIComponent(bench)}/clear`, answers);
   toast("good", `Bench ${bench} may be used again.`);
   then();
-}, { kind: "first" });
+}, { kind: "primary" });
 
 export const linkButton = (text, href, kind = "") => h("a", { class: `button ${kind}`, href }, text);

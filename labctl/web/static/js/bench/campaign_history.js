@@ -1,15 +1,15 @@
-// What the event stream has told of a campaign since this tab was opened, as columns for a rolling picture.
+// Progress messages of a campaign since this tab was opened, as columns for a plot.
 
 const MAX_POINTS = 3000;
 const histories = new Map();
 
-/** The history of a campaign; it outlives the page, so that coming back does not begin anew. */
+/** The history of a campaign; kept when the page is left, so that it continues on return. */
 export function campaignHistory(campaign) {
   if (!histories.has(campaign)) histories.set(campaign, { t_s: [], chamber_c: [], gyro_c: [], rate_dps: [], setpoint_c: [] });
   return histories.get(campaign);
 }
 
-/** Take a progress message in. Its time is the campaign's own: a simulated bench may run faster than the wall's clock. */
+/** Append a progress message. Its time is campaign time: a simulated bench may run faster than wall-clock time. */
 export function appendStatus(history, status, setpoint_c) {
   const { t_s } = status;
   if (!Number.isFinite(t_s) || (history.t_s.length && t_s <= history.t_s.at(-1))) return;
@@ -20,5 +20,5 @@ export function appendStatus(history, status, setpoint_c) {
   }
 }
 
-/** Seconds that are left: progress is the share of what was expected that has passed. */
+/** Remaining time, s: `progress` is the elapsed share of the expected duration. */
 export const remainingSeconds = (status, expected_s) => expected_s * (1 - status.progress);

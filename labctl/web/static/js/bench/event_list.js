@@ -1,4 +1,4 @@
-// What happened, newest first, by level.
+// List of events, newest first, filtered by level.
 
 import { setChildren, h } from "../core/elements.js";
 import { clock, day, plainNumber } from "../core/format.js";
@@ -8,7 +8,7 @@ const KINDS = { info: "", warning: "warn", error: "bad" };
 const LEVELS = ["info", "warning", "error"];
 const REDRAW_MS = 250;
 
-/** A list that events are given to with `add(event)`; at most `most` are shown, from `level` on upwards. */
+/** A list with `add(event)`; shows at most `most` events of `level` or above. */
 export function eventList(most, level = "info") {
   const all = [];
   const element = h("ol", { class: "events", "aria-live": "off" });
@@ -18,7 +18,7 @@ export function eventList(most, level = "info") {
     waiting = null;
     const shown = all.filter((event) => LEVELS.indexOf(event.level) >= LEVELS.indexOf(least));
     const from = shown.slice(-most).reverse();
-    setChildren(element, from.length ? from.map(eventItem) : h("li", { class: "empty" }, all.length ? "Nothing of this kind has happened." : "No event has been heard yet."), shown.length > most ? h("li", { class: "soft small" }, `and ${shown.length - most} before`) : null);
+    setChildren(element, from.length ? from.map(eventItem) : h("li", { class: "empty" }, all.length ? "Nothing of this kind has happened." : "No event has been heard yet."), shown.length > most ? h("li", { class: "muted small" }, `and ${shown.length - most} before`) : null);
   }
   element.add = (event) => {
     all.push(event);
@@ -34,10 +34,10 @@ export function eventList(most, level = "info") {
 }
 
 function eventItem(event) {
-  const said = event.message.replace(/ \[question [^\]]+\]$/, "");
-  const limit = !said.includes("limit") && event.value !== null && event.value !== undefined && event.limit !== null && event.limit !== undefined ? ` (${plainNumber(event.value)} ${event.unit ?? ""}, limit ${plainNumber(event.limit)} ${event.unit ?? ""})` : "";
+  const message = event.message.replace(/ \[question [^\]]+\]$/, "");
+  const limit = !message.includes("limit") && event.value !== null && event.value !== undefined && event.limit !== null && event.limit !== undefined ? ` (${plainNumber(event.value)} ${event.unit ?? ""}, limit ${plainNumber(event.limit)} ${event.unit ?? ""})` : "";
   return h("li", {},
     h("time", { datetime: event.at, title: `${day(event.at)}, ${event.t_s.toFixed(1)} s of the campaign` }, clock(event.at)),
     chip(event.level, KINDS[event.level] ?? ""),
-    h("span", {}, event.device && !said.startsWith(event.device) ? h("strong", {}, `${event.device}: `) : null, said, limit));
+    h("span", {}, event.device && !message.startsWith(event.device) ? h("strong", {}, `${event.device}: `) : null, message, limit));
 }

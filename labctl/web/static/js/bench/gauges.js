@@ -1,19 +1,19 @@
-// Now, in large figures: temperatures against the set point and the rate of the table, each on a small scale.
+// Gauges: chamber and gyro temperature against the set point, and table rate, each on a scale.
 
 import { setChildren, h, svg } from "../core/elements.js";
 import { plainNumber } from "../core/format.js";
 
-/** A gyro is warmer than its chamber: the scale goes on beyond the plan. */
+/** Margin of the scale beyond the plan: a gyro is warmer than its chamber. */
 const MARGIN_C = 5;
 
 /** One instrument: `set(value, target)` shows a reading on the scale from `low` to `high`. */
 function gauge(title, unit, low, high, digits) {
-  const figure = h("span", { class: "gauge-figure" }, "–");
-  const beside = h("span", { class: "gauge-beside" });
+  const figure = h("span", { class: "gauge-value" }, "–");
+  const beside = h("span", { class: "gauge-note" });
   const share = (value) => Math.min(Math.max((value - low) / Math.max(high - low, 1e-9), 0), 1) * 200;
   const zero = share(low < 0 && high > 0 ? 0 : low);
   const bar = svg("rect", { y: 5, height: 6, rx: 3, class: "gauge-bar" });
-  const wanted = svg("path", { class: "gauge-wanted" });
+  const wanted = svg("path", { class: "gauge-setpoint" });
   const scale = svg("svg", { viewBox: "-4 0 208 26", class: "gauge-scale", "aria-hidden": "true" },
     svg("rect", { x: 0, y: 5, width: 200, height: 6, rx: 3, class: "gauge-track" }), bar, wanted,
     svg("text", { x: 0, y: 24 }, plainNumber(low)), svg("text", { x: 200, y: 24, "text-anchor": "end" }, plainNumber(high)));

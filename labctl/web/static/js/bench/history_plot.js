@@ -1,4 +1,4 @@
-// The last minutes of the bench as lines: temperatures above, table rate below.
+// History plot: temperatures above, table rate below.
 
 import { colour, figure } from "../core/figure.js";
 
@@ -14,7 +14,7 @@ export function historyPlot(history) {
     const line = (name, values, shade, more = {}) => ({ type: "scatter", mode: "lines", name, x, y: values, line: { color: colour(shade), width: 1.8, ...more.line }, hovertemplate: `%{y:.5~g} ${more.unit ?? "deg C"}<extra>${name}</extra>`, ...more.trace });
     return {
       data: [
-        line("set point", history.setpoint_c, "line-strong", { line: { dash: "dot", shape: "hv" } }),
+        line("set point", history.setpoint_c, "border-strong", { line: { dash: "dot", shape: "hv" } }),
         line("chamber", history.chamber_c, "axis-x"),
         line("gyro", history.gyro_c, "axis-y"),
         line("table rate", history.rate_dps, "axis-z", { unit: "deg/s", line: { shape: "hv" }, trace: { yaxis: "y2" } }),
@@ -26,11 +26,11 @@ export function historyPlot(history) {
       },
     };
   };
-  const element = figure("Bench since this page was opened", "From the event stream, since this tab began to listen.", draw, { tall: "21rem", csv: () => [Object.keys(history), ...history.t_s.map((_, k) => Object.values(history).map((values) => values[k]))] });
+  const element = figure("Bench since this page was opened", "From the event stream, since this tab began to listen.", draw, { height: "21rem", csv: () => [Object.keys(history), ...history.t_s.map((_, k) => Object.values(history).map((values) => values[k]))] });
   let next = 0;
   let waiting = null;
-  /** Drawn at most once a second: a bench in virtual time tells far more often. */
-  element.tell = () => {
+  /** Redraw at most once a second: a bench in virtual time sends far more messages. */
+  element.onStatus = () => {
     if (waiting) return;
     waiting = setTimeout(() => {
       waiting = null;

@@ -1,4 +1,4 @@
-// A bench at which nothing runs: what was last, what comes next, and how to begin.
+// A bench without a running campaign: the last campaign, the next scheduled one, and how to start.
 
 import { h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
@@ -11,19 +11,19 @@ export function noBenchCard() {
   return card("This service drives no bench",
     h("p", {}, "It serves calibrations and takes recordings in. A bench comes with it when it is started so:"),
     h("pre", { class: "command" }, "labctl serve --simulate\nlabctl serve --bench FILE"),
-    h("p", { class: "soft" }, "The first has a simulated tri-axial bench, as fast as you like with --speed; the second drives the instruments that the bench file names."),
+    h("p", { class: "muted" }, "The first has a simulated tri-axial bench, as fast as you like with --speed; the second drives the instruments that the bench file names."),
     h("div", { class: "row" }, linkButton("To the recordings", "/recordings")));
 }
 
-/** `next` is the schedule's next entry, `last` the newest campaign; either may be missing. */
+/** `next` is the next entry of the schedule, `last` the newest campaign; either may be undefined. */
 export function idleBench(bench, last, next) {
-  return h("div", { class: "columns", style: "--least: 17rem" },
+  return h("div", { class: "columns", style: "--column-min: 17rem" },
     card("Nothing runs",
       h("p", {}, bench.unconfirmed ? "No campaign starts before the bench was looked at." : `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`),
-      h("div", { class: "row" }, linkButton("Plan a campaign", "/campaigns/new", "first"), linkButton("All campaigns", "/campaigns"))),
+      h("div", { class: "row" }, linkButton("Plan a campaign", "/campaigns/new", "primary"), linkButton("All campaigns", "/campaigns"))),
     card("Next on the schedule", next
-      ? [h("p", { class: "told" }, startTime(next)), h("p", { class: "soft" }, `${next.recipe} on ${next.bench}`, next.cron ? [", then again: ", h("code", {}, next.cron)] : null)]
-      : h("p", { class: "soft" }, "Nothing is scheduled.")),
+      ? [h("p", { class: "lead" }, startTime(next)), h("p", { class: "muted" }, `${next.recipe} on ${next.bench}`, next.cron ? [", then again: ", h("code", {}, next.cron)] : null)]
+      : h("p", { class: "muted" }, "Nothing is scheduled.")),
     last ? card(`Last: campaign ${last.id}`,
       h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),
       factList([["Ended", last.ended_at ? instant(last.ended_at) : "not", "", last.started_at && last.ended_at ? `took ${duration((Date.parse(last.ended_at) - Date.parse(last.started_at)) / 1000)}` : null], ["Progress", percent(last.progress)]]),

@@ -1,4 +1,4 @@
-// The readings of the newest finished data set of the campaign.
+// The readings of the newest finished data set of a campaign.
 
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -9,10 +9,10 @@ import { cardWithHeader } from "../core/components.js";
 const MAX_READINGS = 4000;
 const MIN_INTERVAL_MS = 3000;
 
-/** A card that follows the data sets as they are finished: `tell(status)`. Quiet while there is none. */
+/** A card with `onStatus(status)`: shows each data set when it is finished. */
 export function lastDataset(timeline, signal) {
-  const about = h("span", { class: "soft small" });
-  const place = h("div", {}, h("p", { class: "soft" }, "The first data set has not been measured yet."));
+  const about = h("span", { class: "muted small" });
+  const place = h("div", {}, h("p", { class: "muted" }, "The first data set has not been measured yet."));
   let columns = null;
   let [shown, next, busy, unit] = [null, 0, false, null];
   const picture = figure("Gyro output of the last data set", `As recorded; of a long data set the first ${MAX_READINGS} readings.`, () => {
@@ -26,9 +26,9 @@ export function lastDataset(timeline, signal) {
         ...Object.fromEntries(axes.map((name, k) => [k ? `yaxis${k + 1}` : "yaxis", { title: { text: `${name.slice(5)}, ${columns.unit}` }, domain: [1 - (k + 1) / thirds + (k + 1 < thirds ? 0.04 : 0), 1 - k / thirds - (k ? 0.04 : 0)] }])),
       },
     };
-  }, { tall: "21rem", csv: () => [["t_s", ...Object.keys(columns).filter((name) => name.startsWith("gyro_"))], ...columns.t_s.map((t, k) => [t, ...Object.keys(columns).filter((name) => name.startsWith("gyro_")).map((name) => columns[name][k])])] });
+  }, { height: "21rem", csv: () => [["t_s", ...Object.keys(columns).filter((name) => name.startsWith("gyro_"))], ...columns.t_s.map((t, k) => [t, ...Object.keys(columns).filter((name) => name.startsWith("gyro_")).map((name) => columns[name][k])])] });
 
-  async function tell(status) {
+  async function onStatus(status) {
     const until = (status.step ?? 1) - (status.state === "done" ? 0 : 1);
     const dataset = timeline.dataset.slice(0, until).findLast((each) => each !== null) ?? null;
     const recording = Object.values(status.recordings)[0];
@@ -44,15 +44,15 @@ export function lastDataset(timeline, signal) {
       picture.redraw();
       shown = dataset;
     } catch {
-      // not written yet, or given up: the next one comes soon
+      // not written yet, or aborted: the next status tries again
     } finally {
       busy = false;
     }
   }
-  return Object.assign(cardWithHeader("Last data set", about, place), { tell });
+  return Object.assign(cardWithHeader("Last data set", about, place), { onStatus });
 }
 
-/** The unit of an output: the trace names it, also of a few seconds. */
+/** The unit of a gyro output, from a short trace of it. */
 async function outputUnit(recording, columns, signal) {
   const channel = Object.keys(columns).find((name) => name.startsWith("gyro_"));
   const asked = { channel, from_s: columns.t_s[0], until_s: columns.t_s.at(-1), points: 200 };

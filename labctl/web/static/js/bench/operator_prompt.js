@@ -1,13 +1,13 @@
-// A question to the person at the bench, with a picture of how the unit has to lie.
+// Operator prompt: the open question of a campaign, with a drawing of the position to mount.
 
 import { h, svg } from "../core/elements.js";
 import { answerButtons } from "./actions.js";
 
 const AXES = ["x", "y", "z"];
-/** Where the eye sees "left in front", "right in front" and "up": 2D steps of a unit length; right-handed. */
+/** Projection of the directions front left, front right and up to 2D, per unit of length; right-handed. */
 const VIEW = [[-0.8, 0.42], [0.8, 0.42], [0, -1]];
 
-/** The body axes as directions (left in front, right in front, up) when `position` points up; right-handed also upside down. */
+/** The body axes as directions (front left, front right, up) when `position` points up; right-handed also upside down. */
 function bodyAxes(position) {
   const up = AXES.indexOf(position.replace("-", ""));
   const down = position.startsWith("-");
@@ -26,7 +26,7 @@ const project = ([a, b, c], size = SCALE) => {
 };
 const polygonPoints = (corners) => corners.map((corner) => project(corner).map((v) => v.toFixed(1)).join(",")).join(" ");
 
-/** A cube on the table with its axes; the one that points up is drawn strong. Ids of positions: x, y, z, -x, -y, -z. */
+/** A cube on the table with its axes; the one that points up is emphasised. Ids of positions: x, y, z, -x, -y, -z. */
 export function mountingDrawing(position) {
   const axes = bodyAxes(position);
   const face = (corners, kind) => svg("polygon", { points: polygonPoints(corners), class: `cube ${kind}` });
@@ -51,17 +51,17 @@ export function mountingDrawing(position) {
     AXES.filter((name) => axes[name][2] < 0).map((name) => arrow(name)),
     face([[high, low, low], [high, high, low], [high, high, high], [high, low, high]], "left"),
     face([[low, high, low], [high, high, low], [high, high, high], [low, high, high]], "right"),
-    face([[low, low, high], [high, low, high], [high, high, high], [low, high, high]], "lid"),
+    face([[low, low, high], [high, low, high], [high, high, high], [low, high, high]], "top"),
     AXES.filter((name) => axes[name][2] === 0).map((name) => arrow(name)),
-    down ? svg("g", { class: "axis up away" }, svg("line", { x1: 150, y1: project([0, 0, 1])[1], x2: 150, y2: project([0, 0, 1.75])[1] }), svg("text", { x: up[0], y: up[1] + 5, "text-anchor": "middle" }, `${position} up`))
+    down ? svg("g", { class: "axis up inverted" }, svg("line", { x1: 150, y1: project([0, 0, 1])[1], x2: 150, y2: project([0, 0, 1.75])[1] }), svg("text", { x: up[0], y: up[1] + 5, "text-anchor": "middle" }, `${position} up`))
       : svg("g", { class: "up" }, arrow(position, 20)));
 }
 
-/** The card of an open question; `again` is called with it when the answer was given. */
+/** The card of an open question. */
 export function operatorPrompt(campaign, prompt) {
   return h("section", { class: "card prompt", role: "alert", "aria-label": "A question for you" },
     prompt.position ? mountingDrawing(prompt.position) : null,
     h("div", { class: "stack" }, h("h2", {}, prompt.kind === "mount" ? `Turn the unit: ${prompt.position} up` : "The bench asks"), h("p", {}, `${prompt.text[0].toUpperCase()}${prompt.text.slice(1)}.`),
-      h("p", { class: "soft" }, "The table is at rest and waits for you."),
+      h("p", { class: "muted" }, "The table is at rest and waits for you."),
       h("div", { class: "row" }, answerButtons(campaign, prompt))));
 }

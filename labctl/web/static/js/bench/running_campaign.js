@@ -1,4 +1,4 @@
-// A campaign while it runs: the strip that stays in view, the question that waits, and what the bench is doing.
+// A running campaign: status bar, operator prompt, warnings, gauges and plots.
 
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -20,42 +20,42 @@ import { historyPlot } from "./history_plot.js";
 const MAX_EVENTS = 8;
 const PLAN_REFRESH_MS = 2500;
 
-/** `over()` is called when it has ended. */
+/** `over()` is called when the campaign has ended. */
 export function runningCampaign(status, plan, bench, { signal, over }) {
   const { timeline } = plan;
   const history = campaignHistory(status.id);
-  const strip = statusBar(status, plan, bench);
-  const [silent, question, trouble] = [h("div", { "aria-live": "assertive" }), h("div", {}), h("div", { class: "stack", "aria-live": "polite" })];
+  const bar = statusBar(status, plan, bench);
+  const [connection, prompt, warningList] = [h("div", { "aria-live": "assertive" }), h("div", {}), h("div", { class: "stack", "aria-live": "polite" })];
   const dials = gauges(timeline);
-  const [lines, heard, sound, events] = [historyPlot(history), liveOutput(status.id), lastDataset(timeline, signal), eventList(MAX_EVENTS)];
+  const [historyFigure, outputCard, datasetCard, events] = [historyPlot(history), liveOutput(status.id), lastDataset(timeline, signal), eventList(MAX_EVENTS)];
   let [now, asked, planned] = [status, null, 0];
-  const picture = planChart(`Campaign ${status.id} plan`, () => ({ timeline: plan.timeline, now_s: now.t_s, live: true }), { tall: "22rem", pick: (dataset) => Object.values(now.recordings)[0] && navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
+  const picture = planChart(`Campaign ${status.id} plan`, () => ({ timeline: plan.timeline, now_s: now.t_s, live: true }), { height: "22rem", pick: (dataset) => Object.values(now.recordings)[0] && navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
   const setpoint = () => now.setpoint_c ?? timeline.temperature_c[Math.max((now.step ?? 1) - 1, 0)];
 
   function show(next) {
     now = next;
-    strip.show(now);
+    bar.show(now);
     dials.set(now, setpoint());
     appendStatus(history, now, setpoint());
-    lines.tell();
-    heard.tell(now);
-    sound.tell(now);
+    historyFigure.onStatus();
+    outputCard.onStatus(now);
+    datasetCard.onStatus(now);
     if (now.prompt?.id !== asked) {
       asked = now.prompt?.id;
-      setChildren(question, now.prompt ? operatorPrompt(now.id, now.prompt) : null);
+      setChildren(prompt, now.prompt ? operatorPrompt(now.id, now.prompt) : null);
     }
-    setChildren(trouble, warnings(now));
+    setChildren(warningList, warnings(now));
     if (FINAL_STATES.has(now.state)) over();
     else if (Date.now() > planned) again();
   }
-  /** The states of the steps, asked for again while they change. */
+  /** Reload the plan for the states of its steps. */
   async function again() {
     planned = Date.now() + PLAN_REFRESH_MS;
     try {
       plan.timeline = (await get(`/api/campaigns/${status.id}/plan`, { signal })).timeline;
       picture.redraw();
     } catch {
-      // the stream says that the service is silent
+      // the event stream reports a silent service
     }
   }
   show(status);
@@ -63,25 +63,25 @@ export function runningCampaign(status, plan, bench, { signal, over }) {
     progress: show,
     event: (event) => events.add(event),
     link: ({ stale, since, why }) => {
-      strip.classList.toggle("stale", stale);
-      setChildren(silent, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `What you see may no longer be so: ${why}. Trying again.`) : null);
+      bar.classList.toggle("stale", stale);
+      setChildren(connection, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `What you see may no longer be so: ${why}. Trying again.`) : null);
     },
   }, signal);
-  return [strip, silent, question, trouble, dials,
-    h("div", { class: "columns", style: "--least: 26rem" }, card("Rate and temperatures", lines), heard),
+  return [bar, connection, prompt, warningList, dials,
+    h("div", { class: "columns", style: "--column-min: 26rem" }, card("Rate and temperatures", historyFigure), outputCard),
     cardWithHeader("Plan", linkButton(`Campaign ${status.id}`, `/campaigns/${status.id}`, "tiny"), picture),
-    sound,
+    datasetCard,
     cardWithHeader("Last events", linkButton("All of them", `/campaigns/${status.id}?level=info#events`, "tiny"), events)];
 }
 
 function statusBar(status, plan, bench) {
-  const [state, text, beside, acts] = [h("span", {}), h("strong", { class: "strip-step" }), h("span", { class: "soft small" }), h("div", { class: "row tight" })];
+  const [state, text, beside, acts] = [h("span", {}), h("strong", { class: "status-bar-step" }), h("span", { class: "muted small" }), h("div", { class: "row tight" })];
   const bar = h("i", {});
-  const meter = h("div", { class: "meter tall", role: "progressbar", "aria-label": "Progress of the campaign", "aria-valuemin": "0", "aria-valuemax": "100" }, bar);
+  const meter = h("div", { class: "meter thick", role: "progressbar", "aria-label": "Progress of the campaign", "aria-valuemin": "0", "aria-valuemax": "100" }, bar);
   const stop = stopButton(status.id);
   let mode = null;
-  const element = h("section", { class: "card strip", "aria-label": "What the bench is doing" },
-    h("div", { class: "strip-line" }, h("div", { class: "row" }, state, text), h("div", { class: "row tight strip-acts" }, acts, stop)), meter, beside);
+  const element = h("section", { class: "card status-bar", "aria-label": "What the bench is doing" },
+    h("div", { class: "status-bar-line" }, h("div", { class: "row" }, state, text), h("div", { class: "row tight status-bar-actions" }, acts, stop)), meter, beside);
   element.show = (now) => {
     setChildren(state, stateChip(now));
     text.textContent = now.step_text || "About to begin";
@@ -97,7 +97,7 @@ function statusBar(status, plan, bench) {
   return element;
 }
 
-/** What is not as it should be; nothing where all is well. */
+/** Notices for links that fail, dropped units, a pause and the last fault; empty when there are none. */
 function warnings(now) {
   const listed = (found, text) => Object.entries(found).map(([name, why]) => notice("warn", h("strong", {}, `${name} `), `${text}: ${why}`));
   return [...listed(now.links, "does not answer as it should"), ...listed(now.dropped, "takes no further part"),

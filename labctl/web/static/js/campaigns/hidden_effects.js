@@ -1,4 +1,4 @@
-// On a simulated bench: an effect that the simulated unit has and its data sheet does not mention.
+// Form for a simulated bench: choose an effect to hide in the simulated unit.
 
 import { setChildren, h } from "../core/elements.js";
 import { number, sizeText, unitText, idText } from "../core/format.js";
@@ -7,7 +7,10 @@ import { updateQuery } from "../core/router.js";
 
 const DEFAULT_SIZE_FACTOR = 10;
 
-/** `asked` is the effect that the address names. `chosen(list)` gets what the API takes as `hide`. `.sizes(visibility)` tells from which size on the plan shows an effect. */
+/**
+ * `asked` is the effect of the address. `chosen(list)` is called with the value for `hide` of the API.
+ * `.sizes(visibility)` takes the smallest visible size of each effect.
+ */
 export function hiddenEffectForm(effects, asked, chosen) {
   let [seen, row] = [[], { effect: effects.some((each) => each.id === asked) ? asked : "", size: "" }];
   const beside = h("div", { class: "row", style: "align-items: start; flex: 1 1 20rem" });
@@ -22,7 +25,7 @@ export function hiddenEffectForm(effects, asked, chosen) {
       tell();
     } });
     const hint = can?.visible && can.smallest_size ? `This plan shows it from ${number(can.smallest_size, 2)} ${unit || `(${sizeText(can.smallest_size, "1")})`} on.` : can ? "This plan would not show it." : null;
-    return setChildren(beside, labelledField(unit ? `Size, ${unit}` : "Size", input, hint), h("p", { class: "soft small", style: "flex: 1 1 14rem" }, about?.sentence ?? ""));
+    return setChildren(beside, labelledField(unit ? `Size, ${unit}` : "Size", input, hint), h("p", { class: "muted small", style: "flex: 1 1 14rem" }, about?.sentence ?? ""));
   }
   const pick = selectField("Effect to hide", [["", "none"], ...effects.map((each) => [each.id, idText(each.id)])], row.effect, (value) => {
     row = { effect: value, size: usual(value) };
@@ -30,7 +33,7 @@ export function hiddenEffectForm(effects, asked, chosen) {
     show();
     tell();
   });
-  /** A size that the plan shows well. */
+  /** A size well above the smallest visible one. */
   function usual(effect) {
     const can = seen.find((each) => each.effect === effect);
     return can?.visible && can.smallest_size ? String(Number((DEFAULT_SIZE_FACTOR * can.smallest_size).toPrecision(2))) : "";

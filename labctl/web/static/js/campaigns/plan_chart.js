@@ -1,14 +1,14 @@
-// A plan as a picture: temperature over time with its data sets, their rates below, positions as bands.
+// Chart of a plan: temperature over time with its data sets, their rates below, positions as bands.
 
 import { colour, figure } from "../core/figure.js";
 import { duration, plainNumber } from "../core/format.js";
 
-/** What becomes of a data set: its colour, in the order of the legend. */
-const STATES = [["done", "good"], ["running", "accent"], ["to come", "line-strong"], ["failed", "bad"], ["interrupted", "bad"], ["skipped", "soft"]];
-/** Shorter plans are drawn in minutes, s. */
+/** States of a data set and their colours, in the order of the legend. */
+const STATES = [["done", "good"], ["running", "accent"], ["to come", "border-strong"], ["failed", "bad"], ["interrupted", "bad"], ["skipped", "text-muted"]];
+/** Plans longer than this are drawn in hours, shorter ones in minutes, s. */
 const HOURS_FROM_S = 3 * 3600;
 
-/** Steps in the order of time with begin and end in `unit_s`, whether they were run or are only planned. */
+/** Steps in order of time, with begin and end in units of `unit_s`: actual times where a step has run, else planned. */
 function planSteps(timeline, unit_s) {
   return timeline.number.map((number, k) => {
     const from = timeline.forecast_s?.[k] ?? timeline.start_s[k];
@@ -18,7 +18,7 @@ function planSteps(timeline, unit_s) {
   });
 }
 
-/** The set point: held, and on its way while the chamber moves. */
+/** The chamber set point over time: constant, or a ramp while the chamber moves. */
 function setPointCourse(steps) {
   const [x, y] = [[], []];
   let held = null;
@@ -48,10 +48,10 @@ function positionBands(steps) {
 }
 
 /**
- * The picture of a plan. `give()` returns {timeline, now_s, live}: the columns of the API, the present moment in seconds of
- * the campaign (null: it does not run), and whether states mean anything yet. `pick(dataset)` is called for a pressed data set.
+ * The chart of a plan. `give()` returns {timeline, now_s, live}: the columns of the API, the present moment in seconds of
+ * the campaign (null: it does not run), and whether to show states. `pick(dataset)` is called for a clicked data set.
  */
-export function planChart(name, give, { tall = "24rem", pick } = {}) {
+export function planChart(name, give, { height = "24rem", pick } = {}) {
   const caption = "Above: set point of the chamber, with the data sets on it. Below: their table rates. Bands: which axis of the unit points up.";
   const draw = () => {
     const { timeline, now_s = null, live = false } = give();
@@ -77,11 +77,11 @@ export function planChart(name, give, { tall = "24rem", pick } = {}) {
     const shapes = positionBands(steps).map((band) => ({ type: "rect", xref: "x", yref: "paper", x0: band.from, x1: band.until, y0: 0, y1: 1, line: { width: 0 }, fillcolor: colour(`axis-${band.position.replace("-", "")}`), opacity: 0.1, layer: "below" }));
     const words = positionBands(steps).filter((band) => band.until - band.from > end / (narrow ? 12 : 30)).map((band) => ({ text: `<b>${band.position}</b> up`, showarrow: false, xref: "x", yref: "paper", x: (band.from + band.until) / 2, y: 1, yanchor: "bottom", font: { size: 11.5, color: colour(`axis-${band.position.replace("-", "")}`) } }));
     if (Number.isFinite(now_s)) {
-      shapes.push({ type: "line", xref: "x", yref: "paper", x0: now_s / unit_s, x1: now_s / unit_s, y0: 0, y1: 1, line: { color: colour("ink"), width: 1.6, dash: "dot" } });
-      words.push({ text: "now", showarrow: false, xref: "x", yref: "paper", x: now_s / unit_s, y: 0.42, yanchor: "middle", xanchor: now_s / unit_s > end * 0.9 ? "right" : "left", font: { size: 11.5, color: colour("ink") } });
+      shapes.push({ type: "line", xref: "x", yref: "paper", x0: now_s / unit_s, x1: now_s / unit_s, y0: 0, y1: 1, line: { color: colour("text"), width: 1.6, dash: "dot" } });
+      words.push({ text: "now", showarrow: false, xref: "x", yref: "paper", x: now_s / unit_s, y: 0.42, yanchor: "middle", xanchor: now_s / unit_s > end * 0.9 ? "right" : "left", font: { size: 11.5, color: colour("text") } });
     }
     return {
-      data: [{ type: "scatter", mode: "lines", name: "set point", ...setPointCourse(steps), line: { color: colour("soft"), width: 1.5 }, hoverinfo: "skip", showlegend: false }, ...marks],
+      data: [{ type: "scatter", mode: "lines", name: "set point", ...setPointCourse(steps), line: { color: colour("text-muted"), width: 1.5 }, hoverinfo: "skip", showlegend: false }, ...marks],
       layout: {
         margin: { l: 56, r: 12, t: live ? 44 : 24, b: 42 }, shapes, annotations: words, legend: { orientation: "h", y: 1.07, yanchor: "bottom", x: 0 },
         xaxis: { title: { text: `time since the beginning, ${unit_s === 3600 ? "h" : "min"}` }, anchor: "y2", range: [-0.01 * end, Math.max(end, (now_s || 0) / unit_s) * 1.01] },
@@ -94,7 +94,7 @@ export function planChart(name, give, { tall = "24rem", pick } = {}) {
     const names = Object.keys(timeline);
     return [names, ...timeline.number.map((_, k) => names.map((each) => timeline[each][k]))];
   };
-  const element = figure(name, caption, draw, { tall, csv });
+  const element = figure(name, caption, draw, { height, csv });
   if (pick) element.ondrawn = (plot) => plot.on("plotly_click", (event) => event.points[0].customdata && pick(event.points[0].customdata));
   return element;
 }

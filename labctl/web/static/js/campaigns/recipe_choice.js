@@ -1,4 +1,4 @@
-// Which recipe: one that comes with the house, or one's own as TOML.
+// Recipe choice: a recipe shipped with labctl, or the user's own as TOML.
 
 import { setChildren, uniqueId, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
@@ -6,7 +6,7 @@ import { card, chip, labelledField } from "../core/components.js";
 
 const TYPING_PAUSE_MS = 600;
 
-/** `choice` is {name, text}: `name` "own" means `text`. `chosen(choice)` is called with every other choice. */
+/** `choice` is {name, text}: `name` "own" means `text`. `chosen(choice)` is called on each change. */
 export function recipeChoice(all, choice, chosen) {
   const group = uniqueId("recipe");
   const text = h("textarea", { rows: "16", spellcheck: "false", value: choice.text ?? "", oninput: () => {
@@ -28,7 +28,7 @@ export function recipeChoice(all, choice, chosen) {
   function option(name, title, beside, warning) {
     const input = h("input", { type: "radio", name: group, value: name, checked: name === choice.name, onchange: () => pick(name) });
     radios.set(name, input);
-    return h("label", { class: "option" }, input, h("span", { class: "stack", style: "gap: .1rem" }, h("strong", {}, title), h("span", { class: "soft small" }, beside), warning));
+    return h("label", { class: "option" }, input, h("span", { class: "stack", style: "gap: .1rem" }, h("strong", {}, title), h("span", { class: "muted small" }, beside), warning));
   }
   function pick(name) {
     if (name === "own" && !text.value.trim()) text.value = all[0]?.text ?? "";
@@ -44,7 +44,7 @@ export function recipeChoice(all, choice, chosen) {
   return card("Recipe",
     h("div", { class: "options", role: "radiogroup", "aria-label": "Recipe" },
       all.map((each) => option(each.name, each.name, h("span", {}, `${each.description}. `, each.datasets === null ? null : h("span", { class: "nowrap" }, `${count(each.datasets)} data sets, ${duration(each.expected_s)}`)),
-        each.refused ? chip("beyond the bench", "warn") : each.remark ? h("span", { class: "small warn-ink" }, each.remark) : null)),
+        each.refused ? chip("beyond the bench", "warn") : each.remark ? h("span", { class: "small warn-text" }, each.remark) : null)),
       option("own", "Your own", "A recipe as text.")),
     shipped, own);
 }

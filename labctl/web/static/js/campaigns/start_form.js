@@ -1,4 +1,4 @@
-// When it begins: now, at a time, again and again, or at once in simulation alone.
+// Start form: start now, at a time, on a cron line, or in simulation alone.
 
 import { post } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -9,7 +9,7 @@ import { navigate } from "../core/router.js";
 const LOCAL_TIME_ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone;
 const HOUR_S = 3600;
 
-/** `order()` gives {recipe, clip, hide} as it is chosen; `bench` is the service's own, null without. */
+/** `order()` returns the chosen {recipe, clip, hide}; `bench` is the bench of the service, or null. */
 export function startForm(bench, order) {
   const when = [...(bench ? [["now", "Now"], ["at", "At a time"], ["cron", "Again and again"]] : []), ["simulation", "In simulation, without a bench"]];
   const place = h("div", { class: "stack" });
@@ -41,10 +41,10 @@ export function startForm(bench, order) {
     await navigate(`/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}`);
   }
   const FORMS = {
-    now: () => [bench.unconfirmed ? notice("bad", "The bench was not confirmed safe: ", h("a", { href: "/bench" }, "look at it first"), ".") : bench.campaign ? notice("warn", `Campaign ${bench.campaign} runs on ${bench.name} now; it has to end first. A start at a time waits for it.`) : null, h("div", { class: "row" }, button(`Start on ${bench.name}`, now, { kind: "first big" }))],
-    at: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Begin at", at), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "first big" }))],
-    cron: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Cron line", cron, "minute hour day month weekday"), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "first big" }))],
-    simulation: () => [h("p", { class: "soft" }, "A recording of this plan is made at once in simulation and taken in; no bench moves, no campaign is kept."), h("div", { class: "row", style: "align-items: end" }, labelledField("Seed", seed, "Same seed, same recording."), button("Simulate the recording", simulated, { kind: "first big" }))],
+    now: () => [bench.unconfirmed ? notice("bad", "The bench was not confirmed safe: ", h("a", { href: "/bench" }, "look at it first"), ".") : bench.campaign ? notice("warn", `Campaign ${bench.campaign} runs on ${bench.name} now; it has to end first. A start at a time waits for it.`) : null, h("div", { class: "row" }, button(`Start on ${bench.name}`, now, { kind: "primary large" }))],
+    at: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Begin at", at), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" }))],
+    cron: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Cron line", cron, "minute hour day month weekday"), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" }))],
+    simulation: () => [h("p", { class: "muted" }, "A recording of this plan is made at once in simulation and taken in; no bench moves, no campaign is kept."), h("div", { class: "row", style: "align-items: end" }, labelledField("Seed", seed, "Same seed, same recording."), button("Simulate the recording", simulated, { kind: "primary large" }))],
   };
   const show = () => setChildren(place, FORMS[chosen]());
   show();

@@ -1,4 +1,4 @@
-// When something on the schedule begins: in its own time zone, and in the reader's where that differs.
+// Start time of a scheduled campaign: in its own time zone, and in the browser's where that differs.
 
 import { h } from "../core/elements.js";
 import { instant } from "../core/format.js";
@@ -9,5 +9,5 @@ export function startTime(row) {
   if (!row.due_at) return "–";
   const there = new Date(row.due_at).toLocaleString("en-GB", { ...TIME_FORMAT, timeZone: row.time_zone });
   const here = instant(row.due_at);
-  return h("span", {}, h("strong", { class: "nowrap" }, there), h("span", { class: "soft small beside" }, row.time_zone, there === here ? null : `; ${here} where you are`));
+  return h("span", {}, h("strong", { class: "nowrap" }, there), h("span", { class: "muted small secondary" }, row.time_zone, there === here ? null : `; ${here} where you are`));
 }

@@ -1,10 +1,10 @@
-// What a plan could find, and what it could not, before anything is measured.
+// Visibility report: which effects a plan could detect and which not, before anything is measured.
 
 import { h } from "../core/elements.js";
 import { sizeText, idText } from "../core/format.js";
 import { notice, table } from "../core/components.js";
 
-/** Less than this of an effect left beside the usual model: the model takes it in by itself. */
+/** Below this share left beside the usual model, the model absorbs the effect. */
 const ABSORBED_SHARE = 0.02;
 
 const effectLink = (row) => h("a", { href: `/effects/${row.effect}` }, idText(row.effect));
@@ -17,12 +17,12 @@ export function visibilityReport(rows) {
   const unseen = rows.filter((row) => !row.visible && !fitted.includes(row));
   return [
     h("p", {}, h("strong", {}, `It could find ${seen.length} of ${rows.length} effects`), unseen.length ? ` and could not find ${unseen.length}; ` : "; ", fitted.length ? `${fitted.length} are part of the usual model and are fitted.` : null),
-    h("ul", { class: "findable", "aria-label": "Effects this plan could find, from which size on" }, seen.map((row) => h("li", { title: `${Math.round(100 * row.share)} % of it is left beside the usual model` }, effectLink(row), h("span", { class: "nowrap" }, smallestSize(row))))),
-    h("p", { class: "soft small" }, "Beside each: the smallest size that is just detectable, in the effect's unit. ppm: millionths, of the rate or of the full effect."),
+    h("ul", { class: "detectable-effects", "aria-label": "Effects this plan could find, from which size on" }, seen.map((row) => h("li", { title: `${Math.round(100 * row.share)} % of it is left beside the usual model` }, effectLink(row), h("span", { class: "nowrap" }, smallestSize(row))))),
+    h("p", { class: "muted small" }, "Beside each: the smallest size that is just detectable, in the effect's unit. ppm: millionths, of the rate or of the full effect."),
     unseen.length ? table([
       { title: "Could not be found", cell: effectLink },
-      { title: "Why, and what would show it", prose: true, cell: (row) => (row.why === "channel" ? `needs ${row.needs.map(idText).join(", ")}, which is not logged` : [h("span", {}, "this schedule does not part it from the rest"), row.experiment ? h("span", { class: "soft small beside" }, `Try: ${row.experiment}`) : null]) },
+      { title: "Why, and what would show it", prose: true, cell: (row) => (row.why === "channel" ? `needs ${row.needs.map(idText).join(", ")}, which is not logged` : [h("span", {}, "this schedule does not part it from the rest"), row.experiment ? h("span", { class: "muted small secondary" }, `Try: ${row.experiment}`) : null]) },
     ], unseen, { label: "Effects this plan could not find" }) : notice("good", "Nothing of the catalogue stays hidden from it."),
-    fitted.length ? h("p", { class: "soft small" }, "In the usual model already: ", fitted.flatMap((row, k) => (k ? [", ", effectLink(row)] : [effectLink(row)])), ".") : null,
+    fitted.length ? h("p", { class: "muted small" }, "In the usual model already: ", fitted.flatMap((row, k) => (k ? [", ", effectLink(row)] : [effectLink(row)])), ".") : null,
   ];
 }

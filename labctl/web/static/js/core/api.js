@@ -1,8 +1,8 @@
-// One way to ask the service: keys, problem documents, event streams.
+// Client of the HTTP interface: keys, problem documents, event streams.
 
 const KEY = "labctl.key";
 
-/** What the service said no with (RFC 9457): `status`, `type`, `title`, `detail`. */
+/** A problem document of the service (RFC 9457): `status`, `type`, `title`, `detail`. */
 export class Problem extends Error {
   constructor(document) {
     super(document.detail || document.title || "the service gave no reason");
@@ -10,7 +10,7 @@ export class Problem extends Error {
   }
 }
 
-/** The service did not answer at all. */
+/** The service did not answer. */
 export class Unreachable extends Error {
   constructor() {
     super("The service does not answer. Nothing on this page is newer than what you see.");
@@ -38,7 +38,7 @@ async function request(path, options) {
   throw new Problem({ status: response.status, ...document });
 }
 
-/** Path and query: `at("/api/x", {recording: 3, formula: ["a", "b"]})`; null is left out. */
+/** Path and query: `withQuery("/api/x", {recording: 3, formula: ["a", "b"]})`; null is left out. */
 export function withQuery(path, query = {}) {
   const search = new URLSearchParams();
   for (const [name, value] of Object.entries(query)) {
@@ -68,7 +68,7 @@ export async function upload(path, files) {
   return (await request(path, { method: "POST", headers: headers(), body: form })).json();
 }
 
-/** Fetch a file with the key and hand it to the reader. */
+/** Fetch a file with the access key and save it. */
 export async function download(path, name) {
   const blob = await (await request(path, { headers: headers() })).blob();
   saveBlob(blob, name);
@@ -83,8 +83,8 @@ export function saveBlob(blob, name) {
 }
 
 /**
- * Yield {event, id, data} of a stream of server-sent events until it ends; a comment, by which the service says that it
- * lives, is {event: "alive"}. EventSource cannot send a key.
+ * Yield {event, id, data} of a stream of server-sent events until it ends. A comment (keep-alive) is {event: "alive"}.
+ * Not an EventSource, because that cannot send a key.
  */
 export async function* eventStream(path, { after, signal } = {}) {
   const response = await request(path, { headers: headers(after ? { "Last-Event-ID": String(after) } : {}), signal });

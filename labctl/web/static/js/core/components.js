@@ -1,29 +1,29 @@
-// Parts that several pages are put together from.
+// User interface components that several pages use.
 
 import { Problem, Unreachable } from "./api.js";
 import { setChildren, uniqueId, h } from "./elements.js";
 
-/** A card with a heading; `beside` stands at the heading's right. */
+/** A card with a heading. */
 export function card(title, ...children) {
   return h("section", { class: "card stack", "aria-label": title }, h("h2", {}, title), ...children);
 }
 
 export function cardWithHeader(title, beside, ...children) {
-  return h("section", { class: "card stack", "aria-label": title }, h("div", { class: "card-head" }, h("h2", {}, title), beside), ...children);
+  return h("section", { class: "card stack", "aria-label": title }, h("div", { class: "card-header" }, h("h2", {}, title), beside), ...children);
 }
 
-/** The head of a page: its h1, a line below, and what can be done at the right. */
+/** Header of a page: its h1, a line below, and actions at the right. */
 export function pageHeader(title, line, ...acts) {
-  return h("header", { class: "page-head" },
-    h("div", {}, h("h1", {}, title), line ? h("p", { class: "soft" }, line) : null),
+  return h("header", { class: "page-header" },
+    h("div", {}, h("h1", {}, title), line ? h("p", { class: "muted" }, line) : null),
     acts.length ? h("div", { class: "row" }, ...acts) : null);
 }
 
-/** Facts side by side: [name, value, unit, beside]. */
+/** A description list: [name, value, unit, secondary text]. */
 export function factList(rows) {
   return h("dl", { class: "facts" }, rows.filter(Boolean).map(([name, value, unit, beside]) =>
     h("div", { class: "fact" }, h("dt", {}, name),
-      h("dd", {}, value, unit ? [" ", h("span", { class: "unit" }, unit)] : null, beside ? h("span", { class: "beside" }, beside) : null))));
+      h("dd", {}, value, unit ? [" ", h("span", { class: "unit" }, unit)] : null, beside ? h("span", { class: "secondary" }, beside) : null))));
 }
 
 export const chip = (text, kind = "") => h("span", { class: `chip ${kind}` }, text);
@@ -31,12 +31,12 @@ export const chip = (text, kind = "") => h("span", { class: `chip ${kind}` }, te
 export const modelName = (name) => (name ?? "").split(/(?<=\+)/).flatMap((part, k) => (k ? [h("wbr"), part] : [part]));
 export const notice = (kind, ...children) => h("div", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : "status" }, ...children);
 export const emptyState = (...children) => h("div", { class: "empty stack" }, ...children);
-export const busyIndicator = (text) => h("p", { class: "busy soft", role: "status" }, text);
+export const busyIndicator = (text) => h("p", { class: "busy muted", role: "status" }, text);
 
 /** A table: columns are {title, number?, prose?, cell(row)}. On a phone its rows become cards, unless they are `dense`. */
 export function table(columns, rows, { label, selected, onrow, first, dense } = {}) {
-  return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": label },
-    h("table", { class: dense ? "data" : "data cards", style: first ? `--first: ${first}` : null },
+  return h("div", { class: "table-scroll", tabindex: "0", role: "region", "aria-label": label },
+    h("table", { class: dense ? "data" : "data cards", style: first ? `--first-column: ${first}` : null },
       h("thead", {}, h("tr", {}, columns.map((c) => h("th", { class: c.number ? "number" : null, scope: "col" }, c.title)))),
       h("tbody", {}, rows.map((row) =>
         h("tr", { "aria-selected": selected?.(row) ? "true" : null, onclick: onrow ? () => onrow(row) : null },
@@ -58,7 +58,7 @@ export function labelledField(label, input, hint) {
   return h("div", { class: "field" }, h("label", { for: id }, label), input, hint ? h("span", { class: "hint", id: `${id}-hint` }, hint) : null);
 }
 
-/** A row of buttons of which one is chosen: [value, text]. */
+/** A group of buttons of which one is pressed: options are [value, text]. */
 export function toggleGroup(label, options, value, onchange) {
   const buttons = options.map(([each, text]) =>
     h("button", { type: "button", "aria-pressed": String(each === value), onclick: () => {
@@ -68,7 +68,7 @@ export function toggleGroup(label, options, value, onchange) {
   return h("div", { class: "tabs", role: "group", "aria-label": label }, buttons);
 }
 
-/** A button that does something that takes a while: it says so, and cannot be pressed twice. */
+/** A button with an asynchronous action: disabled and marked busy until the action ends. */
 export function button(text, act, { kind = "", done } = {}) {
   const element = h("button", { type: "button", class: `button ${kind}`, onclick: async () => {
     element.disabled = true;
@@ -86,7 +86,7 @@ export function button(text, act, { kind = "", done } = {}) {
   return element;
 }
 
-/** What went wrong, in words, with a way to try again. */
+/** Error page: title, message, and a button to try again. */
 export function errorPage(error, again) {
   const what = error instanceof Problem ? error.title : error instanceof Unreachable ? "No answer" : "Something went wrong on this page";
   if (!(error instanceof Problem || error instanceof Unreachable)) console.error(error);
@@ -94,16 +94,16 @@ export function errorPage(error, again) {
     again ? h("div", { class: "row" }, h("button", { class: "button", type: "button", onclick: again }, "Try again")) : null);
 }
 
-/** Tell something in the corner; errors stay until they are closed. */
+/** Show a toast; an error stays until it is closed. */
 export function toast(kind, text) {
   const corner = document.querySelector(".toasts");
-  const told = notice(kind, h("span", {}, text), h("button", { class: "button quiet tiny", type: "button", "aria-label": "Close", onclick: () => told.remove() }, "✕"));
-  corner.append(told);
-  if (kind !== "bad") setTimeout(() => told.remove(), 6000);
+  const element = notice(kind, h("span", {}, text), h("button", { class: "button quiet tiny", type: "button", "aria-label": "Close", onclick: () => element.remove() }, "✕"));
+  corner.append(element);
+  if (kind !== "bad") setTimeout(() => element.remove(), 6000);
 }
 
-/** Ask a person for a few words: resolves to {name: value}, or null. `fields`: [{name, label, value, hint, type, required}]. */
-export function dialog(title, fields, { text, confirm = "Go on", kind = "first" } = {}) {
+/** Modal dialog with a form: resolves to {name: value}, or null when cancelled. `fields`: [{name, label, value, hint, type, required}]. */
+export function dialog(title, fields, { text, confirm = "Go on", kind = "primary" } = {}) {
   return new Promise((resolve) => {
     const inputs = fields.map((f) => h("input", { name: f.name, type: f.type ?? "text", value: f.value ?? "", required: f.required !== false, autocomplete: "off" }));
     const name = uniqueId("dialog");
@@ -111,7 +111,7 @@ export function dialog(title, fields, { text, confirm = "Go on", kind = "first" 
       event.preventDefault();
       box.close("yes");
     } },
-    h("h2", { id: name }, title), text ? h("p", { class: "soft" }, text) : null,
+    h("h2", { id: name }, title), text ? h("p", { class: "muted" }, text) : null,
     fields.map((f, k) => labelledField(f.label, inputs[k], f.hint)),
     h("div", { class: "row", style: "justify-content: flex-end" },
       h("button", { class: "button quiet", type: "button", onclick: () => box.close() }, "Cancel"),
@@ -126,7 +126,7 @@ export function dialog(title, fields, { text, confirm = "Go on", kind = "first" 
   });
 }
 
-/** Fill a place with what a promise gives; until then and on failure it says so. */
+/** Show a busy indicator in `place`, then the element that `make()` resolves to, or its error. */
 export async function loadInto(place, text, make) {
   setChildren(place, busyIndicator(text));
   try {

@@ -1,8 +1,8 @@
-// The few lines between a page and the document.
+// DOM elements: create, fill, identify, observe.
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** Make an element: `h("a", {href, class, onclick, "aria-label"}, ...children)`. What is null, undefined or false is left out. */
+/** Create an element: `h("a", {href, class, onclick, "aria-label"}, ...children)`. Null, undefined and false are left out. */
 export function h(tag, attributes = {}, ...children) {
   return applyAttributes(document.createElement(tag), attributes, children);
 }
@@ -23,17 +23,17 @@ function applyAttributes(element, attributes, children) {
   return element;
 }
 
-/** Put children in the place of whatever an element holds. */
+/** Replace the children of an element. */
 export function setChildren(element, ...children) {
   element.replaceChildren(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
   return element;
 }
 
 let numbers = 0;
-/** A name for a label and its field that nothing else on the page has. */
+/** An id that is unique on the page, for a label and its field. */
 export const uniqueId = (stem) => `${stem}-${++numbers}`;
 
-/** Do something once, when an element comes near the window. */
+/** Call `act` once, when the element comes near the viewport. */
 export function whenNearViewport(element, act) {
   new IntersectionObserver((entries, observer) => {
     if (!entries.some((entry) => entry.isIntersecting)) return;

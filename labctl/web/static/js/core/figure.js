@@ -1,4 +1,4 @@
-// Every picture: drawn by Plotly in the page's colours, saved as PNG, SVG or the numbers behind it as CSV.
+// Figures: a Plotly plot in the colours of the theme, with buttons that save it as PNG, SVG or CSV.
 
 import { saveBlob } from "./api.js";
 import { h, whenNearViewport } from "./elements.js";
@@ -6,11 +6,11 @@ import { h, whenNearViewport } from "./elements.js";
 let script = null;
 const drawnFigures = new Set();
 
-/** Load Plotly once, when the first picture asks for it. */
+/** Load Plotly once, on first use. */
 export function loadPlotly() {
   script ??= new Promise((resolve, reject) => {
     const failed = () => {
-      script = null; // asked for again by the next picture
+      script = null; // the next figure tries again
       reject(new Error("the drawing library could not be loaded"));
     };
     document.head.append(h("script", { src: "/static/plotly.js", onload: () => resolve(window.Plotly), onerror: failed }));
@@ -35,29 +35,29 @@ const TOOLS_3D = [["orbitRotation", "pan3d", "resetCameraDefault3d"]];
 const config = (data) => ({ displaylogo: false, responsive: true, displayModeBar: "hover", modeBarButtons: data.some((trace) => /surface|3d/.test(trace.type)) ? TOOLS_3D : TOOLS });
 
 function themedLayout(layout) {
-  const axis = { gridcolor: colour("line"), zerolinecolor: colour("line-strong"), linecolor: colour("line-strong"), automargin: true, exponentformat: "power", ticks: "outside", tickcolor: colour("line") };
+  const axis = { gridcolor: colour("border"), zerolinecolor: colour("border-strong"), linecolor: colour("border-strong"), automargin: true, exponentformat: "power", ticks: "outside", tickcolor: colour("border") };
   const own = Object.fromEntries(Object.entries(layout).filter(([name]) => /^[xy]axis\d*$/.test(name)).map(([name, value]) => [name, { ...axis, ...value }]));
   return {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-    font: { family: getComputedStyle(document.body).fontFamily, size: 12.5, color: colour("soft") },
+    font: { family: getComputedStyle(document.body).fontFamily, size: 12.5, color: colour("text-muted") },
     margin: { l: 58, r: 16, t: 12, b: 44 }, hovermode: "closest", dragmode: "zoom",
-    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("line-strong"), activecolor: colour("accent") },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("border-strong"), activecolor: colour("accent") },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
-    hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line-strong"), font: { color: colour("ink") } },
+    hoverlabel: { bgcolor: colour("surface"), bordercolor: colour("border-strong"), font: { color: colour("text") } },
     xaxis: axis, yaxis: axis, ...layout, ...own,
   };
 }
 
 /**
- * Make a picture. `draw()` gives {data, layout}; it is called again when the colours change.
+ * Create a figure. `draw()` gives {data, layout}; it is called again when the theme changes.
  * `csv()` gives [[heading, ...], [value, ...], ...]; without it the traces' own x, y, z are saved.
- * Returns an element with `.update()` (draw), `.redraw()` (draw again, if it was drawn), `.plot` (Plotly's element) and
- * `.ondrawn(plot)`, to be set by whoever listens to it.
+ * Return an element with `.update()` (draw), `.redraw()` (draw again, if it was drawn), `.plot` (Plotly's element) and
+ * `.ondrawn(plot)`, a callback for the first drawing.
  */
-export function figure(name, caption, draw, { tall = "20rem", csv } = {}) {
+export function figure(name, caption, draw, { height = "20rem", csv } = {}) {
   const plot = h("div", { class: "plot", role: "group", "aria-label": `${name}. ${caption ?? ""}` });
   const tool = (text, act, label) => h("button", { type: "button", class: "button quiet tiny", "aria-label": `Save ${name} as ${label}`, onclick: act }, text);
-  const element = h("figure", { class: "figure", style: `--tall: ${tall}` },
+  const element = h("figure", { class: "figure", style: `--figure-height: ${height}` },
     plot, caption ? h("figcaption", {}, caption) : null,
     h("div", { class: "toolbar" }, tool("PNG", () => picture("png"), "PNG"), tool("SVG", () => picture("svg"), "SVG"), tool("CSV", () => saveBlob(new Blob([text(rows())], { type: "text/csv" }), `${file(name)}.csv`), "CSV")));
 
@@ -86,7 +86,7 @@ export function figure(name, caption, draw, { tall = "20rem", csv } = {}) {
     }
   };
   element.redraw = () => plot.data && element.update();
-  whenNearViewport(element, element.update); // a page with ten pictures opens as fast as one with two
+  whenNearViewport(element, element.update); // draw on demand: a page with ten figures opens as fast as one with two
   return element;
 }
 

@@ -1,6 +1,6 @@
-// Numbers and times as a person reads them, each with its unit.
+// Format numbers, sizes, durations and times, each with its unit.
 
-/** A number to so many significant digits, never in the form 1e-3 where a table is read: 0.00120, 1 234, 4.5e-7. */
+/** A number with `digits` significant digits, not in the form 1e-3: 0.00120, 1 234, 4.5e-7. */
 export function number(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
@@ -17,7 +17,7 @@ function power(value, digits) {
 }
 const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? sign).join("");
 
-/** A setting as it was meant: -100, 12.5, 0.0042. */
+/** A number without trailing zeros, for settings: -100, 12.5, 0.0042. */
 export const plainNumber = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "–");
 export const withUnit = (value, unit, digits) => (Number.isFinite(value) ? `${number(value, digits)} ${unit}` : "–");
 export const count = (value) => (Number.isFinite(value) ? value.toLocaleString("en-GB") : "–");
@@ -39,15 +39,15 @@ export function duration(seconds) {
 }
 
 const DAY = { weekday: "short", day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };
-/** An instant in the reader's time zone. */
+/** An instant in the time zone of the browser. */
 export const instant = (text) => (text ? new Date(text).toLocaleString("en-GB", DAY) : "–");
 export const day = (text) => (text ? new Date(text).toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" }) : "–");
 export const clock = (text) => (text ? new Date(text).toLocaleTimeString("en-GB") : "–");
 
-/** An id as words: scale_factor_asymmetry -> scale factor asymmetry. */
+/** An id as text: scale_factor_asymmetry -> scale factor asymmetry. */
 export const idText = (id) => String(id).replaceAll("_", " ");
 
-/** A unit as a person reads it: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none. */
+/** A unit as text: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none. */
 export const unitText = (unit) => (unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => superscript(power)));
 
 /** A size with its unit; a plain number is a share of the rate, or of the full effect: 14 ppm, 2.7 %. */

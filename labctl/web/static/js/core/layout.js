@@ -1,4 +1,4 @@
-// What stands around every page: the rail, the key, the theme, and whether the service still answers.
+// Layout around every page: sidebar, access key, colour theme.
 
 import { accessKey, setAccessKey } from "./api.js";
 import { setChildren, h, svg } from "./elements.js";
@@ -19,7 +19,7 @@ const icon = (path) => svg("svg", { viewBox: "0 0 24 24", fill: "none", stroke: 
 export function buildLayout() {
   const links = NAVIGATION.map(([path, name, drawing]) => h("a", { href: path }, icon(drawing), name));
   const [themes, keys] = [[], []];
-  /** The buttons of the theme and the key: in the rail, and on a phone below the page. */
+  /** Buttons for theme and access key: in the sidebar, and below the page on a narrow screen. */
   const controls = () => {
     themes.push(h("button", { type: "button", class: "button quiet tiny", onclick: swap }));
     keys.push(h("button", { type: "button", class: "button quiet tiny", onclick: () => askKey() }));
@@ -62,13 +62,13 @@ export function buildLayout() {
   }));
 
   document.body.append(
-    h("a", { class: "skip", href: "#main" }, "To the page"),
-    h("div", { class: "rail" },
+    h("a", { class: "skip-link", href: "#main" }, "To the page"),
+    h("div", { class: "sidebar" },
       h("a", { class: "brand", href: "/" }, h("img", { src: "/static/mark.svg", alt: "" }), "labctl"),
       h("nav", { "aria-label": "Pages" }, links),
-      h("div", { class: "rail-foot" }, controls())),
+      h("div", { class: "sidebar-footer" }, controls())),
     h("main", { id: "main", tabindex: "-1" }),
-    h("footer", { class: "foot" }, controls()),
+    h("footer", { class: "page-footer" }, controls()),
     h("div", { class: "toasts", "aria-live": "polite" }));
   name();
 }

@@ -1,10 +1,10 @@
-// Every state has an address; the page is what the address says.
+// Client-side router: the address determines what the page shows.
 
 const routes = [];
 let pageAbort = new AbortController();
-let navigated = false; // the first page is where a reader begins, not where one was led
+let navigated = false; // focus moves to the page from the second page on
 
-/** Say which module shows addresses like `/units/:serial`. A module has `page(context)`, which returns an element. */
+/** Register the module of a pattern like `/units/:serial`. A module exports `page(context)`, which returns an element. */
 export const route = (pattern, load) => routes.push({ parts: pattern.split("/").filter(Boolean), load });
 
 function matchRoute(path) {
@@ -18,13 +18,13 @@ function matchRoute(path) {
   return null;
 }
 
-/** Go to an address as if its link had been pressed. */
+/** Navigate to an address as if its link had been clicked. */
 export function navigate(path) {
   history.pushState(null, "", path);
   return show();
 }
 
-/** Write a choice into the address without leaving the page; null takes it out. */
+/** Write values into the query string without navigation; null removes one. */
 export function updateQuery(choice) {
   const query = new URLSearchParams(location.search);
   for (const [name, value] of Object.entries(choice)) {
@@ -37,7 +37,7 @@ export function updateQuery(choice) {
 
 export const query = () => Object.fromEntries(new URLSearchParams(location.search));
 
-/** Show what the address says. */
+/** Show the page of the current address. */
 export async function show() {
   pageAbort.abort();
   pageAbort = new AbortController();
@@ -58,21 +58,21 @@ export async function show() {
     navigated = true;
   } catch (error) {
     if (signal.aborted || error.name === "AbortError") return;
-    const { trouble } = await import("./components.js");
-    main.replaceChildren(trouble(error, show));
+    const { errorPage } = await import("./components.js");
+    main.replaceChildren(errorPage(error, show));
   } finally {
     if (!signal.aborted) main.removeAttribute("aria-busy");
   }
 }
 
-/** Bring a part of the page into view, and go on from there with the keyboard where it can be held. */
+/** Scroll to an anchor, and move the keyboard focus there where the element can have it. */
 function scrollToAnchor(hash) {
   const part = document.getElementById(hash.slice(1));
   part?.scrollIntoView();
   part?.focus({ preventScroll: true });
 }
 
-/** Take over links within these pages. */
+/** Handle clicks on links between pages, and show the first page. */
 export function start() {
   document.addEventListener("click", (event) => {
     const link = event.target.closest?.("a[href]");

@@ -1,4 +1,4 @@
-// Runs before anything is drawn, so that a dark page never flashes white. Not a module for that reason.
+// Sets the theme before the first paint, so that a dark page never flashes white. Not a module for that reason.
 (() => {
   const wanted = localStorage.getItem("labctl.theme");
   const dark = wanted ? wanted === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;

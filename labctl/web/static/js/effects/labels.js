@@ -1,4 +1,4 @@
-// Words around the catalogue: what an origin means, what a view shows, how a size is told.
+// Labels of origins, views, channels and technologies in the catalogue.
 
 export const ORIGINS = {
   sensor: ["Sensor", "What the sensing element and its electronics do."],

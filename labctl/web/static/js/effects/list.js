@@ -1,4 +1,4 @@
-// The catalogue as a book: by origin, searched as one types.
+// The catalogue of effects, grouped by origin, with a text search.
 
 import { setChildren, h } from "../core/elements.js";
 import { idText } from "../core/format.js";
@@ -9,7 +9,7 @@ import { CHANNELS, ORIGINS } from "./labels.js";
 
 export function effectList(all, query) {
   let [asked, origin] = [query.q ?? "", query.origin ?? ""];
-  const [place, found] = [h("div", { class: "page" }), h("p", { class: "soft small", "aria-live": "polite" })];
+  const [place, found] = [h("div", { class: "page" }), h("p", { class: "muted small", "aria-live": "polite" })];
   const texts = new Map(all.map((each) => [each, [each.id, idText(each.id), each.term, each.sentence, each.experiment, ...each.needs].join(" ").toLowerCase()]));
   function show() {
     const wanted = asked.toLowerCase().split(/\s+/).filter(Boolean);
@@ -35,7 +35,7 @@ export function effectList(all, query) {
 }
 
 const originSection = ([title, about, effects]) => h("section", { class: "stack", "aria-label": title },
-  h("div", {}, h("h2", {}, title), h("p", { class: "soft" }, about)),
-  h("div", { class: "book" }, effects.map((effect) => h("a", { class: "card leaf", href: `/effects/${effect.id}` },
+  h("div", {}, h("h2", {}, title), h("p", { class: "muted" }, about)),
+  h("div", { class: "effect-grid" }, effects.map((effect) => h("a", { class: "card effect-card", href: `/effects/${effect.id}` },
     signatureThumbnail(effect.id),
-    h("span", { class: "leaf-words" }, h("strong", {}, effect.term), h("span", { class: "soft small" }, effect.sentence), h("span", { class: "row leaf-foot" }, h("code", { class: "soft small" }, effect.id), effect.needs.length ? chip(`needs ${effect.needs.map((name) => CHANNELS[name] ?? idText(name)).join(", ")}`) : null))))));
+    h("span", { class: "effect-card-text" }, h("strong", {}, effect.term), h("span", { class: "muted small" }, effect.sentence), h("span", { class: "row effect-card-footer" }, h("code", { class: "muted small" }, effect.id), effect.needs.length ? chip(`needs ${effect.needs.map((name) => CHANNELS[name] ?? idText(name)).join(", ")}`) : null))))));

@@ -1,4 +1,4 @@
-// The signature of an effect as a picture: small for the list, large to be read and saved.
+// Plot of an effect's signature: a thumbnail for the list, a figure for its page.
 
 import { svg } from "../core/elements.js";
 import { colour, figure, temperatureColour } from "../core/figure.js";
@@ -6,7 +6,7 @@ import { POSITIONS, signature } from "./signatures.js";
 
 const [WIDE, HIGH] = [116, 62];
 
-/** A small drawing beside the words; the words say all of it. */
+/** A small drawing beside the text; decorative, because the text says all of it. */
 export function signatureThumbnail(id) {
   const found = signature(id);
   const picture = svg("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, class: "signature", "aria-hidden": "true" },
@@ -21,7 +21,7 @@ export function signatureThumbnail(id) {
     }));
     return picture;
   }
-  if (found.course) picture.append(svg("polyline", { points: found.course.x.map((x, k) => at(x, 1.7 * found.course.y[k] - 0.85)).join(" "), class: "course" }));
+  if (found.course) picture.append(svg("polyline", { points: found.course.x.map((x, k) => at(x, 1.7 * found.course.y[k] - 0.85)).join(" "), class: "temperature-course" }));
   found.lines.forEach((line, k) => picture.append(svg("polyline", { points: line.x.map((x, i) => at(x, Math.min(Math.max(line.y[i], -1.05), 1.05))).join(" "), class: `curve of-${found.lines.length} nr-${k}` })));
   return picture;
 }
@@ -36,16 +36,16 @@ export function signatureFigure(effect) {
       ...(found.over === "position"
         ? [{ type: "bar", name: "error at rest", x: POSITIONS.map((each) => `${each} up`), y: found.lines[0].y, marker: { color: colour("accent") }, hoverinfo: "skip" }]
         : found.lines.map((line, k) => ({ type: "scatter", mode: "lines", name: line.name, x: line.x, y: line.y, line: { color: lineColour(k, found.lines.length), width: 2.5 }, hoverinfo: "skip" }))),
-      ...(found.course ? [{ type: "scatter", mode: "lines", name: "temperature", x: found.course.x, y: found.course.y.map((y) => 1.7 * y - 0.85), line: { color: colour("soft"), dash: "dot", width: 1.5 }, hoverinfo: "skip" }] : []),
+      ...(found.course ? [{ type: "scatter", mode: "lines", name: "temperature", x: found.course.x, y: found.course.y.map((y) => 1.7 * y - 0.85), line: { color: colour("text-muted"), dash: "dot", width: 1.5 }, hoverinfo: "skip" }] : []),
     ],
     layout: {
       showlegend: found.lines.length > 1 || Boolean(found.course), dragmode: false, margin: { l: 50, r: 12, t: 30, b: 46 },
       xaxis: { title: { text: found.title }, fixedrange: true, ...(found.over === "angle" ? { dtick: 90 } : { showticklabels: found.over === "position", ticks: "" }) },
       yaxis: { title: { text: "error" }, range: [-1.15, 1.15], fixedrange: true, showticklabels: false, ticks: "", zeroline: true },
-      shapes: found.marks.map(([x]) => ({ type: "line", x0: x, x1: x, yref: "paper", y0: 0, y1: 1, line: { color: colour("line-strong"), dash: "dot", width: 1 } })),
+      shapes: found.marks.map(([x]) => ({ type: "line", x0: x, x1: x, yref: "paper", y0: 0, y1: 1, line: { color: colour("border-strong"), dash: "dot", width: 1 } })),
       annotations: found.marks.map(([x, text]) => ({ x, y: 1, yref: "paper", text, showarrow: false, xanchor: "left", yanchor: "top", font: { size: 11 } })),
       labctlConfig: { displayModeBar: false },
     },
   });
-  return figure(`Signature of ${effect.id}`, "Schematic: the shape of the error alone. Sizes and scales are not those of any unit; the measured pictures are on Explore.", draw, { tall: "19rem" });
+  return figure(`Signature of ${effect.id}`, "Schematic: the shape of the error alone. Sizes and scales are not those of any unit; the measured pictures are on Explore.", draw, { height: "19rem" });
 }

@@ -1,15 +1,15 @@
-// What each effect draws, as a shape: error against the variable that shows it best. Schematic: no sizes, own words.
+// Signatures: the error of each effect against the variable that shows it best, as functions. Schematic, without sizes.
 
 const cosine = (degrees) => Math.cos((degrees * Math.PI) / 180);
 const excess = (x, knee) => Math.sign(x) * Math.max(0, Math.abs(x) - knee);
-/** Three plateaus with ramps between, 0 to 1 over a campaign: what the temperature does. */
+/** Temperature over a campaign: three plateaus with ramps between, 0 to 1. */
 const temperatureCourse = (t) => [[0.15, 0.3], [0.6, 0.75]].reduce((sum, [from, to]) => sum + 0.5 * Math.min(Math.max((t - from) / (to - from), 0), 1), 0);
 const temperatureSlope = (t) => ((t > 0.15 && t < 0.3) || (t > 0.6 && t < 0.75) ? 1 : 0);
-/** What is left of two ramps, fading after each. */
+/** Lag behind the temperature: grows on each of two ramps, decays after it. */
 const laggedTemperature = (t) => [[0.15, 0.3], [0.6, 0.75]].reduce((sum, [from, to]) => sum + (t < from ? 0 : t < to ? 1 - Math.exp(-(t - from) / 0.08) : (1 - Math.exp(-(to - from) / 0.08)) * Math.exp(-(t - to) / 0.08)), 0);
 const stepFunction = (at, levels) => (t) => levels[at.filter((edge) => t >= edge).length];
 
-/** Variables: what stands under the picture, from, to. */
+/** Variables: axis title, from, to. */
 export const VARIABLES = {
   rate: ["table rate", -1, 1], other: ["rate about another axis", -1, 1], temperature: ["temperature", -1, 1], time: ["time through the campaign", 0, 1],
   power: ["time since power-on", 0, 1], inside: ["time within a data set", 0, 1], angle: ["table angle, deg", 0, 360], previous: ["rate before this one", -1, 1], supply: ["supply voltage", -1, 1],
@@ -64,7 +64,7 @@ const ALL = {
 
 const POINTS = 181;
 
-/** The signature of an effect as numbers: {over, title, lines: [{name, x, y}], course, marks}; null where none is drawn. */
+/** The signature of an effect as numbers: {over, title, lines: [{name, x, y}], course, marks}; null where the effect has none. */
 export function signature(id) {
   const found = ALL[id];
   if (!found) return null;

@@ -1,4 +1,4 @@
-// Data sets as a table of columns: what criticism says of each, for one axis of the gyro.
+// Data sets as columns: what the criticism says of each data set, for one axis of the gyro.
 
 /** Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length. */
 export function datasetRows(criticism, axis) {
@@ -26,7 +26,7 @@ export function groupLevels(values, width, most = 60) {
   }
 }
 
-/** Data-set numbers as `1-20,35`, short enough for an address. */
+/** Data-set numbers as `1-20,35`, for the query string. */
 export function toRanges(numbers) {
   const sorted = [...numbers].sort((a, b) => a - b);
   const parts = [];
@@ -54,7 +54,7 @@ const NAMES = {
   table_rate_dps: "table rate", previous_rate_dps: "previous rate", temperature_c: "gyro temperature", chamber_c: "chamber temperature",
   t_s: "time", power_s: "time since power-on", supply_v: "supply", humidity_pct: "humidity",
 };
-/** A channel's values in the unit that its title names: hours for what lasts for days. */
+/** A channel's values in the unit that its title names: hours for times. */
 export const scaled = (name, values) => (UNITS[name] === "h" ? values.map((value) => value / 3600) : values);
 export const channelName = (name) => NAMES[name] ?? name.replaceAll("_", " ");
 export const channelTitle = (name) => (UNITS[name] ? `${channelName(name)}, ${UNITS[name]}` : channelName(name));

@@ -1,4 +1,4 @@
-// Compare: the measured and the modelled error over rate and temperature, at rest, and after full turns.
+// Measured and modelled error over rate, over temperature, at rest, and per full turn.
 
 import { get } from "../core/api.js";
 import { h } from "../core/elements.js";
@@ -9,7 +9,7 @@ import { query, updateQuery } from "../core/router.js";
 import { groupLevels } from "./dataset_rows.js";
 
 const VIEWS = [["lines", "Error over rate"], ["warm", "Error over temperature"], ["surface", "Surface"], ["rest", "At rest"], ["turn", "Per full turn"]];
-/** Slower than this is at rest, deg/s: the Earth turns by 0.004. */
+/** Below this rate the table is at rest, deg/s; the Earth turns at 0.004. */
 const AT_REST_DPS = 0.01;
 
 export function errorComparison(state, path, signal) {
@@ -30,7 +30,7 @@ export function errorComparison(state, path, signal) {
   }), place);
 }
 
-/** The rows of one axis, where it is the one that turns, if it ever is. */
+/** The rows of one axis: those in which it lies along the table axis, or all where there are none. */
 function axisRows(columns, axis) {
   const all = columns.axis.map((a, k) => (a === axis ? k : -1)).filter((k) => k >= 0);
   const along = all.filter((k) => columns.position[k].replace("-", "") === axis);
@@ -40,7 +40,7 @@ function axisRows(columns, axis) {
 
 const FIGURES = { lines: (rows, state) => levelFigure(rows, state, "own_rate_dps", "temperature_c", "rate", "deg/s", "deg C"), warm: (rows, state) => levelFigure(rows, state, "temperature_c", "own_rate_dps", "gyro temperature", "deg C", "deg/s"), surface: surfaceFigure, rest: restFigure, turn: turnFigure };
 
-/** A line of the model and dots of the measurement for each level of the other variable. */
+/** The model as a line and the measurement as dots, for each level of the other variable. */
 function levelFigure(rows, state, along, by, name, unit, other) {
   const [centres, which] = groupLevels(rows[by], by === "temperature_c" ? 1 : 1e-3, 24);
   const draw = () => ({
@@ -56,7 +56,7 @@ function levelFigure(rows, state, along, by, name, unit, other) {
     }),
     layout: { xaxis: { title: { text: `${name}, ${unit}` } }, yaxis: { title: { text: "error, deg/s" } }, legend: { orientation: "v", x: 1.01, y: 1, xanchor: "left", yanchor: "top", font: { size: 11 } }, showlegend: centres.length > 1 && window.innerWidth > 760 },
   });
-  return figure(`Error over ${name}`, `Dots are measured, lines the model of axis ${state.axis}; cold is blue, hot is red. Where dots leave their line, the model fails.`, draw, { tall: "24rem" });
+  return figure(`Error over ${name}`, `Dots are measured, lines the model of axis ${state.axis}; cold is blue, hot is red. Where dots leave their line, the model fails.`, draw, { height: "24rem" });
 }
 
 async function surfaceFigure(rows, state, path, signal) {
@@ -64,30 +64,30 @@ async function surfaceFigure(rows, state, path, signal) {
   const draw = () => ({
     data: [
       { type: "surface", name: "model", x: grid.rate_dps, y: grid.temperature_c, z: grid.error_dps, colorscale: "Viridis", opacity: 0.85, colorbar: { title: { text: "deg/s" }, thickness: 12 }, hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>modelled %{z:.4g} deg/s<extra></extra>" },
-      { type: "scatter3d", mode: "markers", name: "measured", x: rows.own_rate_dps, y: rows.temperature_c, z: rows.measured_error_dps, marker: { size: 2.5, color: colour("ink") }, hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>measured %{z:.4g} deg/s<extra></extra>" },
+      { type: "scatter3d", mode: "markers", name: "measured", x: rows.own_rate_dps, y: rows.temperature_c, z: rows.measured_error_dps, marker: { size: 2.5, color: colour("text") }, hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>measured %{z:.4g} deg/s<extra></extra>" },
     ],
-    layout: { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, scene: { xaxis: { title: { text: "rate, deg/s" }, gridcolor: colour("line") }, yaxis: { title: { text: "deg C" }, gridcolor: colour("line") }, zaxis: { title: { text: "error, deg/s" }, gridcolor: colour("line") } } },
+    layout: { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, scene: { xaxis: { title: { text: "rate, deg/s" }, gridcolor: colour("border") }, yaxis: { title: { text: "deg C" }, gridcolor: colour("border") }, zaxis: { title: { text: "error, deg/s" }, gridcolor: colour("border") } } },
   });
-  return figure("Error surface", `The model of axis ${state.axis} as a surface, the data sets as dots. Drag to turn it.`, draw, { tall: "28rem" });
+  return figure("Error surface", `The model of axis ${state.axis} as a surface, the data sets as dots. Drag to turn it.`, draw, { height: "28rem" });
 }
 
 function restFigure(rows, state) {
   const here = rows.own_rate_dps.map((rate, k) => (Math.abs(rate) < AT_REST_DPS ? k : -1)).filter((k) => k >= 0).sort((a, b) => rows.temperature_c[a] - rows.temperature_c[b]);
-  if (!here.length) return h("p", { class: "soft" }, "No data set of this recording is at rest.");
+  if (!here.length) return h("p", { class: "muted" }, "No data set of this recording is at rest.");
   const at = (name) => here.map((k) => rows[name][k]);
   const draw = () => ({
     data: [
       { type: "scatter", mode: "markers", name: "measured", x: at("temperature_c"), y: at("measured_error_dps"), error_y: { type: "data", array: at("floor_dps").map((f) => 2 * f), thickness: 1, width: 0 }, marker: { color: axisColour(state.axis), size: 7 }, hovertemplate: "%{x:.4g} deg C: %{y:.4g} deg/s<extra></extra>" },
-      { type: "scatter", mode: "lines", name: "model", x: at("temperature_c"), y: at("modelled_error_dps"), line: { color: colour("ink"), width: 1.5 }, hoverinfo: "skip" },
+      { type: "scatter", mode: "lines", name: "model", x: at("temperature_c"), y: at("modelled_error_dps"), line: { color: colour("text"), width: 1.5 }, hoverinfo: "skip" },
     ],
     layout: { xaxis: { title: { text: "gyro temperature, deg C" } }, yaxis: { title: { text: "output at rest, deg/s" } } },
   });
-  return figure("Output at rest", `Axis ${state.axis} at rest over temperature; bars are two noise floors.`, draw, { tall: "22rem" });
+  return figure("Output at rest", `Axis ${state.axis} at rest over temperature; bars are two noise floors.`, draw, { height: "22rem" });
 }
 
 function turnFigure(rows, state) {
   const here = rows.own_rate_dps.map((rate, k) => (Math.abs(rate) > 1 ? k : -1)).filter((k) => k >= 0);
-  if (!here.length) return h("p", { class: "soft" }, "No data set of this recording turns fast enough.");
+  if (!here.length) return h("p", { class: "muted" }, "No data set of this recording turns fast enough.");
   const perTurn = (name) => here.map((k) => (360 * rows[name][k]) / Math.abs(rows.own_rate_dps[k]));
   const x = here.map((k) => rows.own_rate_dps[k]);
   const shade = here.map((k) => rows.temperature_c[k]);
@@ -100,6 +100,6 @@ function turnFigure(rows, state) {
       xaxis2: { title: { text: "rate, deg/s" } }, yaxis2: { title: { text: "after the model" } },
     },
   });
-  return figure("Error after a full turn", "How far a heading is off after one turn about the axis: as the unit is, and with the model. Colours are temperatures.", draw, { tall: "22rem" });
+  return figure("Error after a full turn", "How far a heading is off after one turn about the axis: as the unit is, and with the model. Colours are temperatures.", draw, { height: "22rem" });
 }
 

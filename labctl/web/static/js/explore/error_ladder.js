@@ -1,4 +1,4 @@
-// Watch the error fall: the ladder of versions, and the map of the version before beside this one's.
+// The error of each version down to the noise floor, and the residual maps of this version and its parent.
 
 import { get } from "../core/api.js";
 import { h } from "../core/elements.js";
@@ -8,7 +8,7 @@ import { cardWithHeader, loadInto, modelName, table } from "../core/components.j
 import { residualMap, selectedRows, colourLimit } from "./residual_map.js";
 import { datasetRows } from "./dataset_rows.js";
 
-/** What the unit is off by itself is left out of the picture, at first, where it would squeeze the fall into a line. */
+/** The raw error is hidden at first where it is more than this factor above the fitted errors and would flatten their lines. */
 const RAW_ERROR_RATIO = 10;
 
 export function ladderFigure(ladder) {
@@ -18,7 +18,7 @@ export function ladderFigure(ladder) {
   const line = (key, name, line, symbol) => ({ type: "scatter", mode: "lines+markers", name, x, y: steps.map((step) => step[key]), line, marker: { size: 9, symbol }, text: steps.map((step) => `${step.model}: ${step.effects.map(idText).join(", ")}`), hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>" });
   const draw = () => ({
     data: [
-      { ...line("raw_rms_dps", "as the unit is", { color: colour("line-strong"), dash: "dot" }, "diamond-open"), visible: dwarfs ? "legendonly" : true },
+      { ...line("raw_rms_dps", "as the unit is", { color: colour("border-strong"), dash: "dot" }, "diamond-open"), visible: dwarfs ? "legendonly" : true },
       line("rms_dps", "after the fit", { color: colour("accent"), width: 2.5 }, "circle"),
       line("heldout_rms_dps", "at unseen temperatures", { color: colour("warn"), width: 2.5 }, "square"),
     ],
@@ -28,7 +28,7 @@ export function ladderFigure(ladder) {
       annotations: ladder.noise_floor_dps ? [{ xref: "paper", x: 0.01, y: Math.log10(ladder.noise_floor_dps), text: "noise floor", showarrow: false, xanchor: "left", yanchor: "bottom", font: { color: colour("good"), size: 12 } }] : [],
     },
   });
-  return figure("Error ladder", "Each version's RMS error on its own data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.", draw, { tall: "19rem" });
+  return figure("Error ladder", "Each version's RMS error on its own data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.", draw, { height: "19rem" });
 }
 
 export function errorLadder(state, signal) {
@@ -45,7 +45,7 @@ export function errorLadder(state, signal) {
   async function faded(parent) {
     const before = await get(`${base}/calibrations/${parent}/criticism`, { query: { recording: state.recording }, signal });
     const pair = () => [datasetRows(before, state.axis), selectedRows(state)];
-    const one = (k, name) => residualMap(name, null, () => ({ rows: pair()[k], limit: colourLimit(...pair()) }), { pickable: false, tall: "16rem" });
+    const one = (k, name) => residualMap(name, null, () => ({ rows: pair()[k], limit: colourLimit(...pair()) }), { pickable: false, height: "16rem" });
     const both = [one(0, `Version ${parent}`), one(1, `Version ${state.version}`)];
     state.onchange((what) => what === "axis" && both.forEach((each) => each.redraw()));
     return h("div", { class: "columns" }, both.map((each, k) => h("div", {}, h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`), each)));
@@ -57,7 +57,7 @@ export function errorLadder(state, signal) {
 function versionTable(ladder, state) {
   return table([
     { title: "Version", cell: (step) => (step.version === state.version ? h("strong", {}, `${step.version}`) : h("a", { href: `/explore?unit=${encodeURIComponent(state.serial)}&version=${step.version}` }, `${step.version}`)) },
-    { title: "Model", cell: (step) => h("span", {}, modelName(step.model), h("span", { class: "soft small" }, step.parent ? ` from version ${step.parent}` : "")) },
+    { title: "Model", cell: (step) => h("span", {}, modelName(step.model), h("span", { class: "muted small" }, step.parent ? ` from version ${step.parent}` : "")) },
     { title: "Effects", cell: (step) => step.effects.map(idText).join(", ") },
     { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
     { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },

@@ -1,4 +1,4 @@
-// Add: look at the changed model first, then make it the next version.
+// Extend the model: preview a changed model, then save it as the next version.
 
 import { post } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -10,7 +10,7 @@ import { selectedRows } from "./residual_map.js";
 
 const ERRORS = [["raw_rms_dps", "As the unit is"], ["rms_dps", "Left after the fit"], ["heldout_rms_dps", "At unseen temperatures"], ["noise_floor_dps", "Noise floor"]];
 
-/** Returns {element, put(effect)}: `put` enters an effect and previews it. */
+/** Return {element, put(effect)}: `put` adds an effect to the change and previews it. */
 export function extendModel(state, path, effects) {
   const change = { add: new Set(), remove: new Set(), formula: "" };
   const has = state.calibration.model.effects;
@@ -23,7 +23,7 @@ export function extendModel(state, path, effects) {
   const tag = (set, id, sign) => h("button", { type: "button", class: "chip accent", "aria-label": `leave ${idText(id)} as it is`, onclick: () => { set.delete(id); show(); } }, `${sign} ${idText(id)} ✕`);
   const body = () => ({ add: [...change.add], remove: [...change.remove], formula: change.formula ? [change.formula] : [], recording: state.recording });
   const isEmpty = () => !change.add.size && !change.remove.size && !change.formula;
-  const stale = () => setChildren(result, isEmpty() ? h("p", { class: "soft small" }, "Choose what to change, or press Add at a suspect.") : null);
+  const stale = () => setChildren(result, isEmpty() ? h("p", { class: "muted small" }, "Choose what to change, or press Add at a suspect.") : null);
   const show = () => {
     setChildren(chosen, [...change.add].map((id) => tag(change.add, id, "+")), [...change.remove].map((id) => tag(change.remove, id, "–")));
     stale();
@@ -45,8 +45,8 @@ export function extendModel(state, path, effects) {
       ], ERRORS, { label: "Errors before and after" }),
       residualFigure(state, found, floor),
       plausibility(state, found, change),
-      found.left_out.length ? notice("", `Fitted, but it stays here when the calibration leaves the house: ${found.left_out.map((line) => `${idText(line.effect)} (${line.origin ?? "bench"})`).join(", ")}.`) : null,
-      h("div", { class: "row" }, button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "first" }), h("span", { class: "soft small" }, "Versions are never changed; this one stays as it is.")),
+      found.left_out.length ? notice("", `Fitted, but not exported with the calibration: ${found.left_out.map((line) => `${idText(line.effect)} (${line.origin ?? "bench"})`).join(", ")}.`) : null,
+      h("div", { class: "row" }, button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }), h("span", { class: "muted small" }, "Versions are never changed; this one stays as it is.")),
     ];
   }
 
@@ -58,15 +58,15 @@ export function extendModel(state, path, effects) {
 
   show();
   const element = cardWithHeader("Add it", null,
-    h("div", { class: "columns", style: "--least: 14rem" }, pick, drop, labelledField("A formula of your own", formula, "name: expression over channels")),
-    chosen, h("div", { class: "row" }, button("Preview", preview, { kind: "first" })), result);
+    h("div", { class: "columns", style: "--column-min: 14rem" }, pick, drop, labelledField("A formula of your own", formula, "name: expression over channels")),
+    chosen, h("div", { class: "row" }, button("Preview", preview, { kind: "primary" })), result);
   return { element, put: async (effect) => { change.add.add(effect); show(); element.scrollIntoView({ behavior: "smooth", block: "start" }); await preview(); } };
 }
 
 function relativeChange(before, after) {
   if (!before || !after) return null;
   const share = after / before - 1;
-  return h("span", { class: share < -0.02 ? "good-ink" : share > 0.02 ? "bad-ink" : "soft" }, `${share < 0 ? "–" : "+"}${Math.abs(Math.round(100 * share))} %`);
+  return h("span", { class: share < -0.02 ? "good-text" : share > 0.02 ? "bad-text" : "muted" }, `${share < 0 ? "–" : "+"}${Math.abs(Math.round(100 * share))} %`);
 }
 
 /** The values of an axis in the order of the criticism's data sets. */
@@ -81,13 +81,13 @@ function residualFigure(state, found, floor) {
     const x = rows.channels.table_rate_dps;
     const after = inDatasetOrder(state, found.residuals, "residual_dps");
     const dots = (y, name, marker) => ({ type: "scatter", mode: "markers", name, x, y, marker, customdata: rows.dataset, hovertemplate: `data set %{customdata}<br>%{x:.5g} deg/s: %{y:.3g} deg/s<extra>${name}</extra>` });
-    const line = (y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: colour("line-strong"), dash: "dash", width: 1 } });
+    const line = (y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: colour("border-strong"), dash: "dash", width: 1 } });
     return {
-      data: [dots(rows.residual, "before", { size: 5, color: colour("line-strong"), symbol: "circle-open" }), dots(after, "after", { size: 6, color: axisColour(state.axis) })],
+      data: [dots(rows.residual, "before", { size: 5, color: colour("border-strong"), symbol: "circle-open" }), dots(after, "after", { size: 6, color: axisColour(state.axis) })],
       layout: { xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: "residual, deg/s" } }, shapes: Number.isFinite(floor) ? [line(2 * floor), line(-2 * floor)] : [] },
     };
   };
-  return figure("Residual before and after", "Dashed: two noise floors.", draw, { tall: "18rem" });
+  return figure("Residual before and after", "Dashed: two noise floors.", draw, { height: "18rem" });
 }
 
 function plausibility(state, found, change) {
@@ -96,5 +96,5 @@ function plausibility(state, found, change) {
   if (!own || !added.length) return null;
   const ranges = added.map((id) => [id, found.plausible[id]]).filter(([, range]) => range);
   return ranges.length ? h("ul", { class: "plain" }, ranges.map(([id, range]) =>
-    h("li", {}, `${idText(id)}: `, range.inside ? h("span", { class: "good-ink" }, "of a usual size") : h("span", { class: "bad-ink" }, "larger than is usual"), h("span", { class: "soft" }, ` (${number(range.from, 2)} to ${number(range.to, 2)})`)))) : null;
+    h("li", {}, `${idText(id)}: `, range.inside ? h("span", { class: "good-text" }, "of a usual size") : h("span", { class: "bad-text" }, "larger than is usual"), h("span", { class: "muted" }, ` (${number(range.from, 2)} to ${number(range.to, 2)})`)))) : null;
 }

@@ -1,4 +1,4 @@
-// See where it fails: the map, the residual against each channel, and the data sets of what is picked, all linked.
+// Residual diagnostics: the residual map, the residual against channels, and the selected data sets, all linked.
 
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
@@ -39,17 +39,17 @@ export function residualDiagnostics(state) {
       picture.redraw();
     }
   });
-  return cardWithHeader("See where it fails", h("span", { class: "soft small" }, "a pick in one picture shows in all"),
-    picture, h("div", { class: "columns", style: "--least: 19rem" }, against), list);
+  return cardWithHeader("See where it fails", h("span", { class: "muted small" }, "a pick in one picture shows in all"),
+    picture, h("div", { class: "columns", style: "--column-min: 19rem" }, against), list);
 }
 
-/** Listen for picks of a picture from when it is first drawn. */
+/** Connect the selection of a figure to the state once it is drawn. */
 function bindSelection(element, setsOf, state) {
   element.ondrawn = (plot) => {
-    // drawing again ends a selection once more, with nothing in it
-    plot.on("plotly_selected", (event) => event?.points?.length && state.choose(setsOf(event)));
-    plot.on("plotly_click", (event) => state.choose(setsOf(event)));
-    plot.on("plotly_deselect", () => state.choose([]));
+    // a redraw ends the selection once more with no points in it
+    plot.on("plotly_selected", (event) => event?.points?.length && state.select(setsOf(event)));
+    plot.on("plotly_click", (event) => state.select(setsOf(event)));
+    plot.on("plotly_deselect", () => state.select([]));
   };
 }
 
@@ -64,11 +64,11 @@ function residualScatter(state, channel) {
       text: rows.dataset.map((set, k) => `data set ${set}: ${number(rows.score[k], 2)} floors`), hovertemplate: "%{text}<br>%{x:.5g}: %{y:.3g} deg/s<extra></extra>",
     }];
     if (state.overlay) {
-      data.push({ type: "scatter", mode: "markers", name: "explained", x, y: state.overlay.values, customdata: rows.dataset, marker: { size: 5, symbol: "diamond", color: colour("ink") }, hovertemplate: "%{y:.3g} deg/s<extra></extra>" });
+      data.push({ type: "scatter", mode: "markers", name: "explained", x, y: state.overlay.values, customdata: rows.dataset, marker: { size: 5, symbol: "diamond", color: colour("text") }, hovertemplate: "%{y:.3g} deg/s<extra></extra>" });
     }
     return { data, layout: { dragmode: "select", xaxis: { title: { text: channelTitle(channel()) } }, yaxis: { title: { text: "residual, deg/s" } }, showlegend: Boolean(state.overlay), margin: { l: 62, r: 8, t: state.overlay ? 34 : 8, b: 44 } } };
   };
-  const element = figure("Residual against a channel", null, draw, { tall: "16rem" });
+  const element = figure("Residual against a channel", null, draw, { height: "16rem" });
   bindSelection(element, (event) => (event.points ?? []).map((point) => point.customdata), state);
   state.onchange(() => element.redraw());
   return element;
@@ -76,13 +76,13 @@ function residualScatter(state, channel) {
 
 function pickedDatasets(state) {
   const rows = selectedRows(state);
-  if (!state.pick.size) return h("p", { class: "soft small" }, "Nothing is picked.");
+  if (!state.pick.size) return h("p", { class: "muted small" }, "Nothing is picked.");
   const chosen = rows.dataset.map((_, k) => k).filter((k) => state.pick.has(rows.dataset[k])).sort((a, b) => Math.abs(rows.score[b]) - Math.abs(rows.score[a]));
   const rms = Math.sqrt(chosen.reduce((sum, k) => sum + rows.residual[k] ** 2, 0) / Math.max(chosen.length, 1));
   return [
-    h("div", { class: "row spread" },
+    h("div", { class: "row space-between" },
       h("p", {}, h("strong", {}, `${chosen.length} data sets picked`), `: RMS ${number(rms)} deg/s${chosen.length > MAX_LISTED ? `; the ${MAX_LISTED} furthest off are listed` : ""}.`),
-      h("button", { class: "button tiny", type: "button", onclick: () => state.choose([]) }, "Let go")),
+      h("button", { class: "button tiny", type: "button", onclick: () => state.select([]) }, "Let go")),
     table([
       { title: "Data set", cell: (k) => h("a", { href: `/recordings/${state.recording}?dataset=${rows.dataset[k]}` }, `${rows.dataset[k]}`) },
       { title: "Table rate, deg/s", number: true, cell: (k) => number(rows.channels.table_rate_dps[k], 4) },

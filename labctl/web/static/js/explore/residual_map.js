@@ -1,4 +1,4 @@
-// Residual over floor in rate x temperature: where the model fails, at a glance. Cells can be picked.
+// Residual over noise floor as a map over rate and temperature. Cells can be selected.
 
 import { colour, DIVERGING, figure } from "../core/figure.js";
 import { number, plainNumber } from "../core/format.js";
@@ -6,10 +6,10 @@ import { groupLevels, datasetRows } from "./dataset_rows.js";
 
 const LIMITS = [3, 10];
 const DIMMED_BELOW = 2;
-/** On a phone panels stand below each other, each as high as this, px. */
+/** Height of a panel on a narrow screen, where panels are stacked, px. */
 const PANEL_PX = 210;
 
-/** The largest residual over floor of several criticisms, within what a scale should end at. */
+/** End of the colour scale: the largest residual over floor of several criticisms, clipped to LIMITS. */
 export function colourLimit(...all) {
   const largest = Math.max(...all.map((rows) => rows.score.reduce((most, score) => Math.max(most, Math.abs(score)), 0)));
   return Math.min(Math.max(largest, LIMITS[0]), LIMITS[1]);
@@ -30,7 +30,7 @@ function mapCells(rows, position) {
   return { rates: rates.map((v) => plainNumber(v)), warm: warm.map((v) => plainNumber(v, 3)), cells: [...found.values()] };
 }
 
-/** The traces and axes of one position; `id` is "" or the panel's number from 2 on, as Plotly counts axes. */
+/** The traces and axes of one position; `id` is "" or the number of the panel from 2 on, as in Plotly's axis names. */
 function positionPanel(rows, position, id, limit, pick) {
   const { rates, warm, cells: all } = mapCells(rows, position);
   const grid = () => warm.map(() => rates.map(() => null));
@@ -43,7 +43,7 @@ function positionPanel(rows, position, id, limit, pick) {
     if (Math.abs(mean) * Math.sqrt(cell.sets.length) < DIMMED_BELOW) dim[cell.row][cell.column] = 1;
   }
   const axes = { xaxis: `x${id}`, yaxis: `y${id}` };
-  const shade = colour("card");
+  const shade = colour("surface");
   const heat = { type: "heatmap", ...axes, x: rates, y: warm, xgap: 1, ygap: 1 };
   const mark = (which, marker, name) => ({
     type: "scatter", mode: "markers", name, ...axes, showlegend: false, marker,
@@ -55,7 +55,7 @@ function positionPanel(rows, position, id, limit, pick) {
       { ...heat, z, customdata: sets, text: texts, hovertemplate: "%{text}<extra></extra>", zmin: -limit, zmax: limit, colorscale: DIVERGING, showscale: id === "", colorbar: { title: { text: "floors" }, thickness: 12, outlinewidth: 0 }, name: `${position} up` },
       { ...heat, z: dim, colorscale: [[0, shade], [1, shade]], opacity: 0.6, showscale: false, hoverinfo: "skip", name: "within noise" },
       mark(all, { size: 18, opacity: 0.01, symbol: "square" }, "cells"),
-      mark(picked, { size: 13, symbol: "square-open", color: colour("ink"), line: { width: 2.5 } }, "picked"),
+      mark(picked, { size: 13, symbol: "square-open", color: colour("text"), line: { width: 2.5 } }, "picked"),
     ],
     x: { type: "category", categoryorder: "array", categoryarray: rates, showgrid: false, title: { text: "table rate, deg/s" } },
     y: { type: "category", categoryorder: "array", categoryarray: warm, showgrid: false, title: id === "" ? { text: "deg C" } : undefined },
@@ -63,7 +63,7 @@ function positionPanel(rows, position, id, limit, pick) {
 }
 
 /** The map of an axis, a panel for each position. `give()` returns {rows, limit, pick}. */
-export function residualMap(name, caption, give, { pickable = true, tall = "22rem" } = {}) {
+export function residualMap(name, caption, give, { pickable = true, height = "22rem" } = {}) {
   const draw = () => {
     const { rows, limit, pick = new Set() } = give();
     const positions = [...new Set(rows.position)];
@@ -75,14 +75,14 @@ export function residualMap(name, caption, give, { pickable = true, tall = "22re
     const data = positions.flatMap((position, k) => {
       const id = k ? String(k + 1) : "";
       const { data: traces, x, y } = positionPanel(rows, position, id, limit, pick);
-      layout[`xaxis${id}`] = below && k < positions.length - 1 ? { ...x, title: undefined } : x; // one title says it for all
+      layout[`xaxis${id}`] = below && k < positions.length - 1 ? { ...x, title: undefined } : x; // one title for all panels
       layout[`yaxis${id}`] = y;
       return traces;
     });
     if (several) layout.annotations = positions.map((position, k) => ({ text: `${position} up`, showarrow: false, xref: `x${k ? k + 1 : ""} domain`, yref: `y${k ? k + 1 : ""} domain`, x: 0, y: 1.02, xanchor: "left", yanchor: "bottom", font: { size: 12 } }));
     return { data, layout };
   };
-  return figure(name, caption, draw, { tall });
+  return figure(name, caption, draw, { height });
 }
 
 /** The data sets under a Plotly click or selection on a map. */

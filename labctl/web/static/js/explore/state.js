@@ -1,4 +1,4 @@
-// What is looked at, picked and drawn over; whoever shows it is told when it changes.
+// State of the explore page: axis, selected data sets, overlay. Listeners are called on each change.
 
 import { updateQuery } from "../core/router.js";
 import { toRanges, fromRanges } from "./dataset_rows.js";
@@ -7,7 +7,7 @@ export class ExploreState {
   constructor(given) {
     Object.assign(this, given); // serial, version, recording, axis, criticism, unit, versions
     this.pick = fromRanges(given.pick);
-    this.overlay = null; // {name, values: one for each data set}, drawn over the residual
+    this.overlay = null; // {name, values: one for each data set}, plotted over the residual
     this.listeners = [];
   }
 
@@ -15,26 +15,26 @@ export class ExploreState {
     this.listeners.push(listener);
   }
 
-  /** Pick data sets by number; an empty pick lets go of all. */
-  choose(numbers) {
+  /** Select data sets by number; an empty list clears the selection. */
+  select(numbers) {
     this.pick = new Set(numbers);
     updateQuery({ pick: this.pick.size ? toRanges(this.pick) : null });
-    this.tell("pick");
+    this.notify("pick");
   }
 
-  draw(overlay) {
+  setOverlay(overlay) {
     this.overlay = overlay;
-    this.tell("overlay");
+    this.notify("overlay");
   }
 
-  look(axis) {
+  selectAxis(axis) {
     this.axis = axis;
     this.overlay = null;
     updateQuery({ axis });
-    this.tell("axis");
+    this.notify("axis");
   }
 
-  tell(what) {
+  notify(what) {
     for (const listener of this.listeners) listener(what);
   }
 }

@@ -1,4 +1,4 @@
-// Learn: the verdict in words, and what may be missing, with its evidence.
+// The verdict in words, and the suspected effects with their evidence.
 
 import { setChildren, h } from "../core/elements.js";
 import { withUncertainty, number, percent, idText } from "../core/format.js";
@@ -12,7 +12,7 @@ const VERDICTS = {
   unexplained: ["Unexplained", "warn"],
   insufficient_data: ["Too little data", "bad"],
 };
-/** More evidence than this, in nats, looks the same: it is beyond doubt. */
+/** Evidence at which the meter is full, nats. */
 const CERTAIN_NATS = 40;
 
 export function verdictCard(state) {
@@ -22,8 +22,8 @@ export function verdictCard(state) {
   const { error, noise } = criticism;
   const ratio = error.rms_dps / error.noise_floor_dps;
   return h("section", { class: `card stack verdict ${kind}`, "aria-label": "Verdict" },
-    h("div", { class: "row" }, chip(title, kind), h("span", { class: "soft small" }, `version ${state.version} held against recording ${state.recording}`)),
-    h("p", { class: "said" }, first), others.map((line) => h("p", { class: "soft" }, line)),
+    h("div", { class: "row" }, chip(title, kind), h("span", { class: "muted small" }, `version ${state.version} held against recording ${state.recording}`)),
+    h("p", { class: "verdict-statement" }, first), others.map((line) => h("p", { class: "muted" }, line)),
     factList([
       ["Left after the fit, RMS", number(error.rms_dps), "deg/s", Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null],
       ["At unseen temperatures", number(error.heldout_rms_dps), "deg/s"],
@@ -38,11 +38,11 @@ const chanceText = (p) => (p === null || p === undefined ? null : p < 1e-6 ? "ch
 export function suspectList(state, { onadd, explain }) {
   const { criticism } = state;
   const named = new Set(criticism.named);
-  const drawnNow = h("p", { class: "soft small", "aria-live": "polite" }, "Draw a suspect over the residual to see what it would explain.");
+  const drawnNow = h("p", { class: "muted small", "aria-live": "polite" }, "Draw a suspect over the residual to see what it would explain.");
   const draw = (suspect) => button(state.overlay?.effect === suspect.effect ? "Hide" : "Draw", async () => {
-    if (state.overlay?.effect === suspect.effect) return state.draw(null);
+    if (state.overlay?.effect === suspect.effect) return state.setOverlay(null);
     const values = await explain(suspect.effect);
-    state.draw({ effect: suspect.effect, name: idText(suspect.effect), values });
+    state.setOverlay({ effect: suspect.effect, name: idText(suspect.effect), values });
     return setChildren(drawnNow, `Diamonds in the pictures above: what ${idText(suspect.effect)} would explain of the residual.`);
   }, { kind: "tiny" });
   const speaking = criticism.suspects.filter((s) => s.log_bayes_factor > 0);
@@ -50,11 +50,11 @@ export function suspectList(state, { onadd, explain }) {
   const fillList = () => setChildren(list, speaking.map((s) => h("li", { class: "suspect" },
     h("div", { class: "stack", style: "gap: .3rem" },
       h("div", { class: "row tight" }, h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, idText(s.effect)), named.has(s.effect) ? chip("named", "warn") : null),
-      h("div", { class: "soft small" }, s.explanation),
-      h("div", { class: "row tight" }, button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "first" : ""}` }), draw(s))),
+      h("div", { class: "muted small" }, s.explanation),
+      h("div", { class: "row tight" }, button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "primary" : ""}` }), draw(s))),
     evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
-    evidenceItem("Takes off", h("span", { class: "number" }, percent(s.share_removed)), h("span", { class: "soft small" }, "of the excess")),
-    evidenceItem("Error with it, deg/s", h("span", { class: "number" }, number(s.rms_after_dps)), h("span", { class: "soft small" }, `${number(s.heldout_rms_after_dps)} at unseen temperatures`)),
+    evidenceItem("Takes off", h("span", { class: "number" }, percent(s.share_removed)), h("span", { class: "muted small" }, "of the excess")),
+    evidenceItem("Error with it, deg/s", h("span", { class: "number" }, number(s.rms_after_dps)), h("span", { class: "muted small" }, `${number(s.heldout_rms_after_dps)} at unseen temperatures`)),
     evidenceItem(`Coefficient, k = 2${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`, coefficientText(s, state.axis)))));
   fillList();
   state.onchange((what) => {
@@ -62,11 +62,11 @@ export function suspectList(state, { onadd, explain }) {
     if (what === "overlay" && !state.overlay) setChildren(drawnNow, "Draw a suspect over the residual to see what it would explain.");
   });
   return cardWithHeader("Learn what is missing", null,
-    speaking.length ? [drawnNow, list] : h("p", { class: "soft" }, "No effect of the catalogue speaks for itself here: each would explain less than its coefficients cost."),
+    speaking.length ? [drawnNow, list] : h("p", { class: "muted" }, "No effect of the catalogue speaks for itself here: each would explain less than its coefficients cost."),
     aliasNotice(criticism), experimentList(criticism), untestableEffects(criticism));
 }
 
-const evidenceItem = (title, ...children) => h("div", { class: "told-of" }, h("span", { class: "soft small" }, title), ...children);
+const evidenceItem = (title, ...children) => h("div", { class: "suspect-value" }, h("span", { class: "muted small" }, title), ...children);
 
 function evidenceMeter(nats) {
   const share = Math.max(0, Math.min(nats / CERTAIN_NATS, 1));
@@ -77,10 +77,10 @@ function evidenceMeter(nats) {
 function coefficientText(suspect, axis) {
   const own = suspect.coefficients[axis] ?? Object.values(suspect.coefficients)[0] ?? {};
   return Object.entries(own).slice(0, 2).map(([name, { value, u, unit }]) =>
-    h("div", { class: "small" }, h("span", { class: "soft" }, idText(name)), " ", unbroken(withUncertainty(value, 2 * u, unit))));
+    h("div", { class: "small" }, h("span", { class: "muted" }, idText(name)), " ", unbroken(withUncertainty(value, 2 * u, unit))));
 }
 
-/** A value that is not parted from its uncertainty and its power; only its unit may go to the next line. */
+/** A value with no line break before its uncertainty and its power of ten; only the unit may wrap. */
 const unbroken = (text) => text.replaceAll(/ ([±×]) /g, "\u00a0$1\u00a0");
 
 function aliasNotice(criticism) {
@@ -93,7 +93,7 @@ function experimentList(criticism) {
   if (!criticism.experiments.length) return null;
   return h("div", { class: "stack" }, h("h3", {}, "The experiment that would tell"), criticism.experiments.slice(0, 3).map((each) =>
     h("div", { class: "notice" }, h("p", {}, each.do, each.hours ? ` (${number(each.hours, 2)} h)` : ""),
-      h("p", { class: "soft small" }, `Separates ${each.separates.map(idText).join(", ")} with a probability of ${percent(each.power)}.`),
+      h("p", { class: "muted small" }, `Separates ${each.separates.map(idText).join(", ")} with a probability of ${percent(each.power)}.`),
       each.toml ? h("a", { class: "button tiny", href: `/campaigns/new?toml=${encodeURIComponent(each.toml)}` }, "Plan it") : null)));
 }
 
@@ -101,5 +101,5 @@ function untestableEffects(criticism) {
   if (!criticism.not_testable.length) return null;
   const why = (line) => (line.why === "channel" ? `not recorded: ${line.needs.map(idText).join(", ")}` : "this schedule hides it");
   return h("details", {}, h("summary", {}, `What this recording cannot say anything about (${criticism.not_testable.length})`),
-    h("ul", { class: "two" }, criticism.not_testable.map((line) => h("li", {}, h("a", { href: `/effects/${line.effect}` }, idText(line.effect)), h("span", { class: "soft small" }, ` ${why(line)}`)))));
+    h("ul", { class: "two-columns" }, criticism.not_testable.map((line) => h("li", {}, h("a", { href: `/effects/${line.effect}` }, idText(line.effect)), h("span", { class: "muted small" }, ` ${why(line)}`)))));
 }

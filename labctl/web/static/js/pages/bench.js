@@ -1,4 +1,4 @@
-// What the bench is doing now, and the acts upon it.
+// The bench page: the running campaign, or what ran last and what comes next.
 
 import { get } from "../core/api.js";
 import { h } from "../core/elements.js";
@@ -33,21 +33,21 @@ export async function page({ signal }) {
   return element;
 }
 
-/** While nothing runs, look whether something has begun; the schedule or another person may start it. */
+/** While no campaign runs, poll for one that the schedule or another person has started. */
 function watchForStart(signal) {
   const looking = setInterval(async () => {
     try {
       const [bench] = await get("/api/benches", { signal });
       if (bench?.campaign) show();
     } catch {
-      // asked again soon; the page says nothing of its own that could be out of date
+      // polled again soon; the page shows nothing that could be out of date
     }
   }, POLL_MS);
   signal.addEventListener("abort", () => clearInterval(looking));
 }
 
 function unconfirmedNotice(bench) {
-  return notice("bad", h("p", { class: "told" }, `Bench ${bench.name} was not confirmed safe`),
+  return notice("bad", h("p", { class: "lead" }, `Bench ${bench.name} was not confirmed safe`),
     h("p", {}, `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${instant(bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`),
     h("div", { class: "row" }, clearButton(bench.name, show)));
 }

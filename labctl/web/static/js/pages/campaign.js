@@ -1,4 +1,4 @@
-// One campaign: its plan with what became of it, its events, and why it ended.
+// The page of one campaign: its plan and progress, its events, and why it ended.
 
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -22,7 +22,7 @@ export async function page({ params, query, signal }) {
   const here = benches[0]?.name === now.bench;
   const level = LEVELS.some(([each]) => each === query.level) ? query.level : "info";
   const events = eventList(MAX_EVENTS, level);
-  const [about, said, silent] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
+  const [about, reason, connection] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
   const picture = planChart(`Campaign ${now.id} plan`, () => ({ timeline: plan.timeline, now_s: isRunning(now) ? now.t_s : null, live: true }), { pick: (dataset) => Object.values(now.recordings)[0] && navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
   let asked = Date.now();
 
@@ -30,7 +30,7 @@ export async function page({ params, query, signal }) {
     const ended = FINAL_STATES.has(next.state) && !FINAL_STATES.has(now.state);
     now = next;
     setChildren(about, summary(now, plan));
-    setChildren(said, reasonNotices(now));
+    setChildren(reason, reasonNotices(now));
     if (ended) showAgain();
     else if (Date.now() - asked > PLAN_REFRESH_MS) again();
   }
@@ -43,14 +43,14 @@ export async function page({ params, query, signal }) {
   followCampaign(now.id, {
     progress: show,
     event: (event) => events.add(event),
-    link: ({ stale, since, why }) => setChildren(silent, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `${why}. Trying again.`) : null),
+    link: ({ stale, since, why }) => setChildren(connection, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `${why}. Trying again.`) : null),
   }, signal);
 
   const acts = isRunning(now) ? [linkButton("To the bench", "/bench"), here ? stopButton(now.id) : null] : [here && canResume(now) ? resumeButton(now.id, { whole: true }) : null, linkButton("Plan the same again", `/campaigns/new?${plan.text ? `toml=${encodeURIComponent(plan.text)}` : `recipe=${encodeURIComponent(now.recipe)}`}`)];
   return h("div", { class: "page" },
     pageHeader(`Campaign ${now.id}`, h("span", {}, h("strong", {}, now.recipe), ` on bench ${now.bench}`), ...acts.filter(Boolean)),
-    silent, said, about,
-    cardWithHeader("Plan", h("span", { class: "soft small" }, "A press on a data set opens its readings."), picture),
+    connection, reason, about,
+    cardWithHeader("Plan", h("span", { class: "muted small" }, "A press on a data set opens its readings."), picture),
     recordingsCard(now),
     Object.assign(cardWithHeader("Events", toggleGroup("Events to show", LEVELS, level, (value) => {
       updateQuery({ level: value === "info" ? null : value });
@@ -71,17 +71,17 @@ function summary(now, plan) {
   ]));
 }
 
-/** Why it stands where it stands, in the service's words. */
+/** The reason of the present state, as the service gives it. */
 function reasonNotices(now) {
   const kind = { done: "good", failed: "bad", aborted: "bad" }[now.state] ?? "warn";
-  return [isRunning(now) && now.state === "running" ? null : notice(kind, h("p", { class: "told" }, now.reason || `It is ${now.state}.`), now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null),
+  return [isRunning(now) && now.state === "running" ? null : notice(kind, h("p", { class: "lead" }, now.reason || `It is ${now.state}.`), now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null),
     ...Object.entries(now.dropped).map(([unit, why]) => notice("warn", h("strong", {}, unit), ` took no further part: ${why}`))].filter(Boolean);
 }
 
 function recordingsCard(now) {
   const rows = Object.entries(now.recordings);
-  if (!rows.length) return card("Units and recordings", h("p", { class: "soft" }, "Nothing was recorded."));
-  return card("Units and recordings", h("ul", { class: "plain" }, rows.map(([serial, recording]) => h("li", { class: "row spread" },
+  if (!rows.length) return card("Units and recordings", h("p", { class: "muted" }, "Nothing was recorded."));
+  return card("Units and recordings", h("ul", { class: "plain" }, rows.map(([serial, recording]) => h("li", { class: "row space-between" },
     h("span", { class: "row" }, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), now.dropped[serial] ? chip("dropped", "warn") : null),
-    h("span", { class: "row" }, linkButton(`Recording ${recording}`, `/recordings/${recording}`, "tiny"), linkButton("Fit and explore", `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`, "tiny first"))))));
+    h("span", { class: "row" }, linkButton(`Recording ${recording}`, `/recordings/${recording}`, "tiny"), linkButton("Fit and explore", `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`, "tiny primary"))))));
 }

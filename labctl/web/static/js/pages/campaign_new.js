@@ -1,4 +1,4 @@
-// Plan a campaign: which recipe, what it would do, what it could find, and when it begins.
+// The page that plans a campaign: recipe, plan, visibility of effects, start.
 
 import { get, post } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -15,7 +15,7 @@ export async function page({ query, signal }) {
   const [all, benches, catalogue] = await Promise.all(["/api/recipes", "/api/benches", "/api/effects"].map((path) => get(path, { signal })));
   const bench = benches[0] ?? null;
   const named = all.find((each) => each.name === query.recipe) ?? shortestRecipe(all);
-  // a recipe of one's own is in the address too: it is short, and so the plan has a link
+  // the user's own recipe is in the address too, so that the plan has a link
   const choice = query.toml ? { name: "own", text: query.toml } : { name: named.name, text: null };
   let [clip, hide, asked] = [query.clip === "1", [], new AbortController()];
   const [planned, found] = [h("div", { "aria-live": "polite" }), h("div", { class: "stack" })];
@@ -34,7 +34,7 @@ export async function page({ query, signal }) {
     } catch (error) {
       if (error.name === "AbortError") return;
       setChildren(planned, refusalCard(error));
-      setChildren(found, h("p", { class: "soft" }, "There is no plan to look at."));
+      setChildren(found, h("p", { class: "muted" }, "There is no plan to look at."));
       return;
     }
     try {
@@ -53,7 +53,7 @@ export async function page({ query, signal }) {
   plan();
   return h("div", { class: "page" },
     pageHeader("Plan a campaign", bench ? h("span", { class: "row" }, "On bench ", h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null) : "For the simulated bench that fits the recipe best.",
-      h("a", { class: "button first", href: "#begin" }, "Begin …")),
+      h("a", { class: "button primary", href: "#begin" }, "Begin …")),
     query.recipe && named.name !== query.recipe && !query.toml ? notice("warn", `No recipe ${query.recipe} comes with labctl; ${named.name} is shown. Its text can be pasted under "Your own".`) : null,
     h("div", { class: "planning" },
       h("div", { class: "stack" }, recipeChoice(all, choice, (next) => {
@@ -63,11 +63,11 @@ export async function page({ query, signal }) {
       }), h("div", { class: "card" }, clipping)),
       h("div", { class: "page" }, planned,
         card("What it could find", found),
-        hider ? card("Hide an effect", h("p", { class: "soft" }, "The simulated unit then has it, and nothing tells: a case to practise on."), hider) : null,
+        hider ? card("Hide an effect", h("p", { class: "muted" }, "The simulated unit then has it, and nothing tells: a case to practise on."), hider) : null,
         startForm(bench, () => ({ recipe: source(), clip, hide })))));
 }
 
-/** The shortest campaign that the bench can do: a first try. */
+/** The shortest campaign that the bench can run. */
 function shortestRecipe(all) {
   const able = all.filter((each) => !each.refused && !each.remark);
   return able.sort((a, b) => a.expected_s - b.expected_s)[0] ?? all[0];
@@ -86,4 +86,4 @@ function planCard(answer, bench) {
     answer.clipped.length ? notice("warn", h("strong", {}, `${answer.clipped.length} points are left out`), h("details", {}, h("summary", {}, "Which, and why"), h("ul", {}, answer.clipped.map((each) => h("li", { class: "small" }, each))))) : null);
 }
 
-const refusalCard = (error) => card("It cannot be done so", notice("bad", h("p", { class: "told" }, error.message)));
+const refusalCard = (error) => card("It cannot be done so", notice("bad", h("p", { class: "lead" }, error.message)));

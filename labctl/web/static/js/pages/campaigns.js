@@ -1,4 +1,4 @@
-// All campaigns, and what the schedule will begin.
+// The page of all campaigns and of the schedule.
 
 import { get, remove } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -16,7 +16,7 @@ export async function page({ signal }) {
   async function show() {
     const [campaigns, schedule] = await ask();
     setChildren(place, schedule.length ? scheduleCard(schedule, show) : null,
-      cardWithHeader(campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`, null, campaigns.length ? campaignTable(campaigns) : emptyState(h("p", {}, "No campaign has been run yet."), h("p", {}, linkButton("Plan the first", "/campaigns/new", "first")))));
+      cardWithHeader(campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`, null, campaigns.length ? campaignTable(campaigns) : emptyState(h("p", {}, "No campaign has been run yet."), h("p", {}, linkButton("Plan the first", "/campaigns/new", "primary")))));
     return campaigns.some(isRunning);
   }
   let moving = await show();
@@ -25,36 +25,36 @@ export async function page({ signal }) {
     try {
       moving = await show();
     } catch {
-      // asked again soon
+      // polled again soon
     }
   }, POLL_MS);
   signal.addEventListener("abort", () => clearInterval(looking));
-  return h("div", { class: "page" }, pageHeader("Campaigns", "One run of a recipe on a bench.", linkButton("Plan a campaign", "/campaigns/new", "first")), place);
+  return h("div", { class: "page" }, pageHeader("Campaigns", "One run of a recipe on a bench.", linkButton("Plan a campaign", "/campaigns/new", "primary")), place);
 }
 
 const durationText = (row) => (row.started_at && row.ended_at ? `took ${duration((Date.parse(row.ended_at) - Date.parse(row.started_at)) / 1000)}` : null);
 
 function campaignTable(rows) {
   return table([
-    { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "soft small beside" }, `${row.recipe} on ${row.bench}`)] },
-    { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.state !== "running" && row.reason ? h("span", { class: "soft small beside two-lines", title: row.reason }, row.reason) : null] },
+    { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "muted small secondary" }, `${row.recipe} on ${row.bench}`)] },
+    { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.state !== "running" && row.reason ? h("span", { class: "muted small secondary two-lines", title: row.reason }, row.reason) : null] },
     { title: "Progress", cell: (row) => h("div", { class: "progress-cell" }, h("div", { class: "meter", role: "img", "aria-label": percent(row.progress) }, h("i", { style: `width: ${100 * row.progress}%` })), h("span", { class: "small" }, percent(row.progress))) },
-    { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, instant(row.started_at)), h("span", { class: "soft small beside nowrap" }, isRunning(row) ? `ends ${instant(row.expected_end)}` : durationText(row))] },
-    { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("div", {}, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), h("span", { class: "small beside" }, h("a", { href: `/recordings/${recording}` }, `Recording ${recording}`)))) },
+    { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, instant(row.started_at)), h("span", { class: "muted small secondary nowrap" }, isRunning(row) ? `ends ${instant(row.expected_end)}` : durationText(row))] },
+    { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("div", {}, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), h("span", { class: "small secondary" }, h("a", { href: `/recordings/${recording}` }, `Recording ${recording}`)))) },
   ], rows, { label: "Every campaign", first: "8rem" });
 }
 
 const OUTCOMES = { started: "good", refused: "bad", missed: "warn", claimed: "accent" };
 
 function scheduleCard(rows, again) {
-  const came = (event) => h("span", { class: "small beside" }, chip(event.outcome, OUTCOMES[event.outcome] ?? ""), ` ${instant(event.at)} `, event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message);
+  const came = (event) => h("span", { class: "small secondary" }, chip(event.outcome, OUTCOMES[event.outcome] ?? ""), ` ${instant(event.at)} `, event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message);
   return card("Schedule", table([
     { title: "Begins", cell: startTime },
-    { title: "Recipe", cell: (row) => [row.recipe, row.clip ? h("span", { class: "soft small beside" }, "without what the bench cannot do") : null] },
+    { title: "Recipe", cell: (row) => [row.recipe, row.clip ? h("span", { class: "muted small secondary" }, "without what the bench cannot do") : null] },
     { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
     { title: "Priority", number: true, cell: (row) => row.priority },
     { title: "May be late by", number: true, cell: (row) => (row.late_limit_s === null ? "any time" : duration(row.late_limit_s)) },
-    { title: "Before", cell: (row) => (row.history.length ? row.history.slice(-2).map(came) : h("span", { class: "soft" }, "–")) },
+    { title: "Before", cell: (row) => (row.history.length ? row.history.slice(-2).map(came) : h("span", { class: "muted" }, "–")) },
     { title: h("span", { class: "visually-hidden" }, "Cancel"), cell: (row) => button("Cancel", async () => {
       await remove(`/api/schedule/${row.id}`);
       await again();

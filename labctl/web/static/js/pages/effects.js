@@ -1,4 +1,4 @@
-// The catalogue of effects: all of them, or one on a page of its own.
+// The catalogue of effects, or the page of one effect.
 
 import { get, Problem } from "../core/api.js";
 import { effectList } from "../effects/list.js";

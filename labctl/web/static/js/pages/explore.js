@@ -1,4 +1,4 @@
-// The heart: hold a version against a recording, see where it fails, learn what is missing, add it, watch the error fall.
+// The explore page: compare a version with a recording, diagnose residuals, find the missing effect, extend the model.
 
 import { get, post } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -16,13 +16,13 @@ import { errorLadder } from "../explore/error_ladder.js";
 
 const MODELS = [["bias_scale", "bias and scale factor"], ["ojeda2000", "Ojeda 2000: polynomial in rate and temperature"], ["yang2018", "Yang 2018: matrices over temperature"], ["single_temperature", "one temperature"]];
 
-/** The parts of the page in their order: id in an address, name. */
+/** Sections of the page in order: anchor, name. */
 const SECTIONS = [["compare", "Compare"], ["fails", "Fails"], ["learn", "Learn"], ["add", "Add"], ["watch", "Watch"]];
 
 export async function page({ query: asked, signal }) {
   const [units, recordings] = await Promise.all(["/api/units", "/api/recordings"].map((path) => get(path, { signal })));
   if (!units.length) {
-    return h("div", { class: "page" }, pageHeader("Explore"), emptyState(h("p", {}, "There is nothing to explore yet."), h("p", {}, h("a", { class: "button first", href: "/start" }, "Begin"))));
+    return h("div", { class: "page" }, pageHeader("Explore"), emptyState(h("p", {}, "There is nothing to explore yet."), h("p", {}, h("a", { class: "button primary", href: "/start" }, "Begin"))));
   }
   const unit = units.find((each) => each.serial === asked.unit) ?? units.find((each) => each.calibrations.length) ?? units[0];
   const own = recordings.filter((each) => each.serial === unit.serial);
@@ -36,14 +36,14 @@ export async function page({ query: asked, signal }) {
   return element;
 }
 
-/** Stays in view: the axis that every picture shows, and the way to each part of a long page. */
+/** Sticky bar: the axis that all figures show, and links to the sections. */
 function pageNavigation(state, axes) {
-  return h("div", { class: "guide" },
-    axes.length > 1 ? toggleGroup("Axis of the gyro", axes.map((axis) => [axis, `axis ${axis}`]), state.axis, (axis) => state.look(axis)) : null,
+  return h("div", { class: "page-nav" },
+    axes.length > 1 ? toggleGroup("Axis of the gyro", axes.map((axis) => [axis, `axis ${axis}`]), state.axis, (axis) => state.selectAxis(axis)) : null,
     h("nav", { class: "row tight", "aria-label": "On this page" }, SECTIONS.map(([id, name]) => h("a", { class: "button quiet tiny", href: `#${id}` }, name))));
 }
 
-/** The newest recording that is no mere beginning: a campaign that runs now has a few data sets only. */
+/** The newest recording with at least half as many data sets as the largest: a running campaign has few so far. */
 function defaultRecording(own) {
   const most = Math.max(...own.map((each) => each.datasets));
   return Math.max(...own.filter((each) => 2 * each.datasets >= most).map((each) => each.id));
@@ -65,15 +65,15 @@ function selectors(units, unit, own, versions, version, recording) {
 /** A unit that has no calibration yet: fit one. */
 function firstFitCard(unit, recording) {
   let model = MODELS[0][0];
-  return card("Fit a first model", h("p", { class: "soft" }, `Recording ${recording} of ${unit.serial} has not been fitted. Start simple: what the model leaves will say what is missing.`),
+  return card("Fit a first model", h("p", { class: "muted" }, `Recording ${recording} of ${unit.serial} has not been fitted. Start simple: what the model leaves will say what is missing.`),
     h("div", { class: "row" }, selectField("Model", MODELS, model, (value) => { model = value; })),
     h("div", { class: "row" }, button("Fit", async () => {
       const made = await post(`/api/units/${encodeURIComponent(unit.serial)}/calibrations`, { recording, model });
       await navigate(`/explore?unit=${encodeURIComponent(unit.serial)}&version=${made.version}&recording=${recording}`);
-    }, { kind: "first" })));
+    }, { kind: "primary" })));
 }
 
-/** A version held against a recording; shown as soon as it is worked out. */
+/** A version compared with a recording; shown when the criticism is computed. */
 function versionView({ unit, version, versions, recording, asked, signal }) {
   const place = h("div", { class: "page" }, h("div", { class: "card" }, busyIndicator("Holding the model against every reading; the first time takes some seconds.")));
   const path = `/api/units/${encodeURIComponent(unit.serial)}/calibrations/${version}`;

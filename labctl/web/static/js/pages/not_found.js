@@ -1,3 +1,5 @@
+// The page of an address that no route matches.
+
 import { h } from "../core/elements.js";
 import { pageHeader } from "../core/components.js";
 

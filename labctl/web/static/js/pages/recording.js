@@ -1,4 +1,4 @@
-// One recording: who and when, its trace, its data sets down to the readings, its noise, and the file to take away.
+// The page of one recording: conditions, trace, data sets, readings, noise, and the file to download.
 
 import { download, get } from "../core/api.js";
 import { h } from "../core/elements.js";
@@ -29,7 +29,7 @@ export async function page({ params, query, signal }) {
   const parts = { raw: datasetReadings(state, signal), table: datasetTable(state, query) };
   if (timed) {
     parts.trace = trace(state, signal);
-    state.look = (k) => {
+    state.showInTrace = (k) => {
       const about_ = 0.5 * (sets.t_until_s[k] - sets.t_from_s[k]);
       parts.trace.show({ from: sets.t_from_s[k] - about_, until: sets.t_until_s[k] + about_ });
       parts.trace.scrollIntoView({ block: "start", behavior: "smooth" });
@@ -53,7 +53,7 @@ function recordingHeader(about, path) {
   const from = about.campaign ? h("a", { href: `/campaigns/${about.campaign}` }, `campaign ${about.campaign}`) : "an import";
   const made = [about.info.model, about.info.technology?.toUpperCase()].filter(Boolean);
   return pageHeader(`Recording ${about.id}`, h("span", {}, "Of ", h("a", { href: `/units/${unit}` }, about.serial), made.length ? ` (${made.join(", ")})` : "", ", from ", from, `, ${day(about.created_at)}. Holds ${KIND_TEXTS[about.kind] ?? about.kind}.`),
-    h("a", { class: "button first", href: `/explore?unit=${unit}&recording=${about.id}` }, "Explore"),
+    h("a", { class: "button primary", href: `/explore?unit=${unit}&recording=${about.id}` }, "Explore"),
     ...(about.kind === "coefficients" ? [] : [file("parquet", "Save as Parquet"), file("csv", "Save as CSV")]));
 }
 
@@ -73,6 +73,6 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
     warm ? ["Gyro temperature", `${number(warm[0])} to ${number(warm[1])}`, "deg C"] : null,
     info.latitude_deg === null ? null : ["Latitude", plainNumber(info.latitude_deg), "deg", "the Earth's rate is taken off"],
   ]));
-  if (info.notes) card_.append(h("p", { class: "soft" }, info.notes));
+  if (info.notes) card_.append(h("p", { class: "muted" }, info.notes));
   return card_;
 }

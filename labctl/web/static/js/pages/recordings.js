@@ -1,4 +1,4 @@
-// All recordings, and the place to bring one in.
+// The page of all recordings, with the import form.
 
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -37,12 +37,12 @@ const KINDS = { samples: "every reading", points: "means", coefficients: "a publ
 
 function recordingTable(rows) {
   return table([
-    { title: "Recording", cell: (row) => [h("a", { href: `/recordings/${row.id}` }, `Recording ${row.id}`), row.notes ? h("span", { class: "soft small beside two-lines", title: row.notes }, row.notes) : null] },
+    { title: "Recording", cell: (row) => [h("a", { href: `/recordings/${row.id}` }, `Recording ${row.id}`), row.notes ? h("span", { class: "muted small secondary two-lines", title: row.notes }, row.notes) : null] },
     { title: "Unit", cell: (row) => h("a", { href: `/units/${encodeURIComponent(row.serial)}`, class: "nowrap" }, row.serial) },
     { title: "Holds", cell: (row) => chip(KINDS[row.kind] ?? row.kind) },
     { title: "Data sets", number: true, cell: (row) => count(row.datasets) },
     { title: "Readings", number: true, cell: (row) => (row.kind === "samples" ? count(row.readings) : "–") },
-    { title: "From", cell: (row) => (row.campaign ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`) : h("span", { class: "soft" }, "import")) },
+    { title: "From", cell: (row) => (row.campaign ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`) : h("span", { class: "muted" }, "import")) },
     { title: "Since", cell: (row) => h("span", { class: "nowrap" }, day(row.created_at)) },
     { title: h("span", { class: "visually-hidden" }, "Explore"), cell: (row) => h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(row.serial)}&recording=${row.id}` }, "Explore") },
   ], rows, { label: "Recordings", first: "13rem" });

@@ -1,4 +1,4 @@
-// The first page: what there is, or, in an empty house, the three ways to begin.
+// The start page: an overview, or, with an empty database, the ways to begin.
 
 import { get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
@@ -14,7 +14,7 @@ export async function page({ signal }) {
     h("div", { class: "columns" },
       card("See it find a hidden effect",
         h("p", {}, "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out what is missing."),
-        button("Simulate a recording", openSimulated, { kind: "first" })),
+        button("Simulate a recording", openSimulated, { kind: "primary" })),
       card("Look at a real gyro",
         h("p", {}, "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. Why is the fit fifteen times worse than the noise?"),
         button("Open the real gyro", openExample)),
@@ -26,7 +26,7 @@ export async function page({ signal }) {
         h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign")) : null));
 }
 
-/** Made, fitted, and opened where it fails. */
+/** Simulate a recording, fit it, and open it on the explore page. */
 async function openSimulated() {
   const made = await post("/api/recordings/simulated", { recipe: "ojeda2000-121", hide: ["scale_factor_asymmetry=0.0002"], seed: 1 });
   await openExplore(made.serial, made.recording, "ojeda2000");
@@ -46,12 +46,12 @@ function overview(units, campaigns, benches) {
   const running = campaigns.find(isRunning);
   return h("div", { class: "page" },
     pageHeader("labctl", "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall."),
-    h("div", { class: "columns", style: "--least: 17rem" },
+    h("div", { class: "columns", style: "--column-min: 17rem" },
       card("Bench", benches.length
         ? h("p", {}, running ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.` : `${benches[0].name} is free.`)
         : h("p", {}, "This service drives no bench."),
-      h("div", { class: "row" }, h("a", { class: "button first", href: "/bench" }, "To the bench"), h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"))),
-      card("Units", h("ul", { class: "plain" }, units.slice(0, 6).map((unit) => h("li", { class: "row spread" },
+      h("div", { class: "row" }, h("a", { class: "button primary", href: "/bench" }, "To the bench"), h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"))),
+      card("Units", h("ul", { class: "plain" }, units.slice(0, 6).map((unit) => h("li", { class: "row space-between" },
         h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
         h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"))))),
       card("Data", h("div", { class: "row" }, h("a", { class: "button", href: "/recordings" }, "Import a recording"), button("Simulate a hidden effect", openSimulated), button("Open the real gyro", openExample)))));

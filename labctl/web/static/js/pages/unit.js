@@ -1,4 +1,4 @@
-// One unit: who it is, its calibrations and which is in force, how the error fell, and its coefficients.
+// The page of one unit: its calibrations, certifications, error ladder and coefficients.
 
 import { download, get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
@@ -16,12 +16,12 @@ export async function page({ params, signal }) {
   const force = history.find((act) => act.version === unit.certified_version && act.act === "certify");
   const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
   return h("div", { class: "page" },
-    pageHeader(unit.serial, [unit.model, unit.technology?.toUpperCase()].filter(Boolean).join(" · "), h("a", { class: "button first", href: explore }, "Explore")),
+    pageHeader(unit.serial, [unit.model, unit.technology?.toUpperCase()].filter(Boolean).join(" · "), h("a", { class: "button primary", href: explore }, "Explore")),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force, base)),
-    rows.length ? [versions(unit, rows, base, explore), ladder(base, signal), coefficientCard(base, rows, signal)] : emptyState(h("p", {}, "No calibration yet."), h("p", {}, h("a", { class: "button first", href: explore }, "Fit a model"))),
+    rows.length ? [versions(unit, rows, base, explore), ladder(base, signal), coefficientCard(base, rows, signal)] : emptyState(h("p", {}, "No calibration yet."), h("p", {}, h("a", { class: "button primary", href: explore }, "Fit a model"))),
     h("div", { class: "columns" },
       card("Recordings", h("ul", { class: "plain" }, unit.recordings.map((id) => h("li", {}, h("a", { href: `/recordings/${id}` }, `Recording ${id}`))))),
-      card("Certifications", history.length ? certificationTable(history) : h("p", { class: "soft" }, "Nothing has been certified yet."))));
+      card("Certifications", history.length ? certificationTable(history) : h("p", { class: "muted" }, "Nothing has been certified yet."))));
 }
 
 function inForce(unit, rows, force, base) {
@@ -46,8 +46,8 @@ function versions(unit, rows, base, explore) {
     : button("Certify", () => askCertification(base, row.version, "certify"), { kind: "tiny" });
   return cardWithHeader("Calibrations", null, table([
     { title: "Version", cell: (row) => h("span", { class: "row tight" }, h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`), row.certified ? chip("in force", "good") : null) },
-    { title: "Model", cell: (row) => h("span", {}, modelName(row.model), row.parent ? h("span", { class: "soft small" }, ` from ${row.parent}`) : null) },
-    { title: "Made", cell: (row) => h("div", { class: "nowrap" }, instant(row.created_at), h("div", { class: "soft small" }, h("code", { title: `hash ${row.hash}` }, row.hash.slice(0, 10)))) },
+    { title: "Model", cell: (row) => h("span", {}, modelName(row.model), row.parent ? h("span", { class: "muted small" }, ` from ${row.parent}`) : null) },
+    { title: "Made", cell: (row) => h("div", { class: "nowrap" }, instant(row.created_at), h("div", { class: "muted small" }, h("code", { title: `hash ${row.hash}` }, row.hash.slice(0, 10)))) },
     { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
     { title: "Unseen, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
     { title: "", cell: (row) => h("div", { class: "row tight", style: "gap: .2rem" }, act(row), FORMATS.map(([format, title, suffix]) => button(title, () => download(`${base}/calibration?version=${row.version}&format=${format}`, `${unit.serial}-v${row.version}.${suffix}`), { kind: "tiny quiet" }))) },
@@ -57,13 +57,13 @@ function versions(unit, rows, base, explore) {
 async function askCertification(base, version, what) {
   const fields = [{ name: "by", label: "Who" }, { name: "reason", label: "Why" }];
   if (what === "certify") fields.push({ name: "due_days", label: "Due again in days", type: "number", value: "365", required: false });
-  const said = await dialog(what === "certify" ? `Put version ${version} in force` : `Take version ${version} out of force`, fields, {
+  const answers = await dialog(what === "certify" ? `Put version ${version} in force` : `Take version ${version} out of force`, fields, {
     text: what === "certify" ? "Whoever asks for this unit's calibration gets this version from now on. It is written to the audit trail." : "The unit then has no calibration in force. It is written to the audit trail.",
-    confirm: what === "certify" ? "Certify" : "Revoke", kind: what === "certify" ? "first" : "stop",
+    confirm: what === "certify" ? "Certify" : "Revoke", kind: what === "certify" ? "primary" : "danger",
   });
-  if (!said) return;
-  const body = { by: said.by, reason: said.reason };
-  if (said.due_days) body.due_days = Number(said.due_days);
+  if (!answers) return;
+  const body = { by: answers.by, reason: answers.reason };
+  if (answers.due_days) body.due_days = Number(answers.due_days);
   await post(`${base}/calibrations/${version}/${what}`, body);
   await show();
 }
@@ -74,7 +74,7 @@ function ladder(base, signal) {
   return cardWithHeader("How the error fell", null, place);
 }
 
-/** Coefficients of one version, or of two beside each other. */
+/** Coefficients of one version, or of two side by side. */
 function coefficientCard(base, rows, signal) {
   const newest = rows[0].version;
   let [one, other] = [Number(query().version) || newest, Number(query().beside) || null];

@@ -1,4 +1,4 @@
-// Every unit, by serial number.
+// The page of all units, by serial number.
 
 import { get } from "../core/api.js";
 import { h } from "../core/elements.js";
@@ -17,5 +17,5 @@ export async function page({ signal }) {
       { title: "Versions", number: true, cell: (unit) => unit.calibrations.length },
       { title: "In force", cell: (unit) => (unit.certified_version ? chip(`version ${unit.certified_version}`, "good") : chip("none", "warn")) },
       { title: "", cell: (unit) => h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore") },
-    ], units, { label: "Units" })) : emptyState(h("p", {}, "No unit has been measured or imported yet."), h("p", {}, h("a", { class: "button first", href: "/start" }, "Begin"))));
+    ], units, { label: "Units" })) : emptyState(h("p", {}, "No unit has been measured or imported yet."), h("p", {}, h("a", { class: "button primary", href: "/start" }, "Begin"))));
 }

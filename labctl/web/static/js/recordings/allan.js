@@ -1,4 +1,4 @@
-// Noise at rest: the Allan deviation of each axis, and N, B, K with what they mean and why one may be missing.
+// Noise at rest: Allan deviation of each axis, and N, B and K with the reason where one has no value.
 
 import { get, Problem } from "../core/api.js";
 import { setChildren, h, whenNearViewport } from "../core/elements.js";
@@ -8,13 +8,13 @@ import { cardWithHeader, loadInto, notice, table, toggleGroup } from "../core/co
 
 const NOISE_FIGURES = [["N", "angle random walk"], ["B", "bias instability"], ["K", "rate random walk"]];
 
-/** Of the longest stretch at rest, or of the picked data set. */
+/** Card for the longest stretch at rest, or for the selected data set. */
 export function allan(state, signal) {
   const place = h("div", { class: "stack" });
   const which = h("div", {});
   let [own, seen] = [false, false];
   const show = () => {
-    if (!seen) return; // the readings at rest are not read for a page that nobody scrolls down
+    if (!seen) return; // the readings at rest are loaded only when the card is near the viewport
     setChildren(which, state.dataset ? toggleGroup("Of what", [["rest", "longest stretch at rest"], ["set", `data set ${state.dataset}`]], own ? "set" : "rest", (value) => {
       own = value === "set";
       show();
@@ -50,16 +50,16 @@ function allanFigure(found) {
     layout: { xaxis: { type: "log", title: { text: "averaging time, s" } }, yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } }, margin: { l: 70, r: 12, t: 8, b: 46 } },
   });
   const csv = () => [["axis", "tau_s", "deviation_dps", "low_dps", "high_dps", "model_dps"], ...axes.flatMap(([axis, noise]) => noise.tau_s.map((tau, k) => [axis, tau, noise.deviation_dps[k], noise.low_dps[k], noise.high_dps[k], noise.model_dps[k]]))];
-  return [h("p", { class: "soft" }, where),
-    figure(`Recording ${found.recording} Allan deviation`, "Band: 95 % interval. Dotted: the fit that N, B and K come from.", draw, { tall: "21rem", csv }),
+  return [h("p", { class: "muted" }, where),
+    figure(`Recording ${found.recording} Allan deviation`, "Band: 95 % interval. Dotted: the fit that N, B and K come from.", draw, { height: "21rem", csv }),
     table([
-      { title: "Figure", cell: ([id, name]) => [h("strong", {}, id), h("span", { class: "soft nowrap" }, `, ${name}`)] },
+      { title: "Figure", cell: ([id, name]) => [h("strong", {}, id), h("span", { class: "muted nowrap" }, `, ${name}`)] },
       ...axes.map(([axis, noise]) => ({ title: `Axis ${axis}`, cell: ([id]) => noiseFigure(noise[id]) })),
     ], NOISE_FIGURES, { label: "Figures of IEEE Std 952", first: "11rem" })];
 }
 
-/** A figure with its uncertainty, or how large it may be at most, and why it has no value. */
+/** A noise figure with its uncertainty, or its upper bound and the reason why it has no value. */
 function noiseFigure(noise) {
-  if (noise?.value !== null && noise?.value !== undefined) return [h("strong", { class: "nowrap" }, `${number(noise.value)} ${noise.unit}`), h("span", { class: "soft small beside" }, `u = ${number(noise.u, 2)} ${noise.unit}`)];
-  return [h("span", { class: "soft nowrap" }, noise?.at_most ? `below ${number(noise.at_most, 2)} ${noise.unit}` : "not seen"), noise?.why ? h("span", { class: "soft small beside" }, noise.why) : null];
+  if (noise?.value !== null && noise?.value !== undefined) return [h("strong", { class: "nowrap" }, `${number(noise.value)} ${noise.unit}`), h("span", { class: "muted small secondary" }, `u = ${number(noise.u, 2)} ${noise.unit}`)];
+  return [h("span", { class: "muted nowrap" }, noise?.at_most ? `below ${number(noise.at_most, 2)} ${noise.unit}` : "not seen"), noise?.why ? h("span", { class: "muted small secondary" }, noise.why) : null];
 }

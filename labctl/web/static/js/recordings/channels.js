@@ -1,4 +1,4 @@
-// Channels by the name of their column, which ends in its unit.
+// Name and unit of a channel from the name of its column.
 
 const UNIT_SUFFIXES = [["_dps", "deg/s"], ["_deg", "deg"], ["_c", "deg C"], ["_pct", "%"], ["_ut", "uT"], ["_g", "g"], ["_v", "V"], ["_s", "s"]];
 const NAMES = {
@@ -8,7 +8,7 @@ const NAMES = {
 
 const unitSuffix = (name) => UNIT_SUFFIXES.find(([end]) => name.endsWith(end));
 
-/** The unit of a column; of an output without one it is what the recording says, deg/s where it says nothing. */
+/** The unit of a column. A gyro output has the unit that the recording declares, deg/s by default. */
 export function channelUnit(name, output = {}) {
   if (name.startsWith("gyro_")) return output[name.slice(5)]?.unit ?? "deg/s";
   return unitSuffix(name)?.[1] ?? "";

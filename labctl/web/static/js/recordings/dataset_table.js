@@ -1,4 +1,4 @@
-// The data sets of a recording: a table to leaf through, from which one is picked.
+// The data sets of a recording as a table with pages and a selection.
 
 import { setChildren, h } from "../core/elements.js";
 import { count, duration, mean, number, plainNumber } from "../core/format.js";
@@ -9,7 +9,7 @@ import { channelName, channelUnit } from "./channels.js";
 const PAGE_SIZE = 25;
 const CHIP_KINDS = { complete: "good", running: "accent", open: "accent" };
 
-/** `state` has {sets, dataset, pick(number), output}; `page` is the leaf that the address names, from 1. */
+/** `state` has {sets, dataset, pick(number), output}; `asked` are the position and the page (from 1) of the address. */
 export function datasetTable(state, asked) {
   const { sets } = state;
   const place = h("div", {});
@@ -28,7 +28,7 @@ export function datasetTable(state, asked) {
       updateQuery({ page: at === 1 ? null : at });
       show();
     } }, text);
-    setChildren(leaf, pages > 1 ? [turn("« First", "First page", at === 1 ? 0 : 1), turn("‹ Back", "Page before", at - 1), h("span", { class: "soft small", "aria-live": "polite" }, `${at} of ${pages}`), turn("On ›", "Next page", at + 1), turn("Last »", "Last page", at === pages ? 0 : pages)] : null);
+    setChildren(leaf, pages > 1 ? [turn("« First", "First page", at === 1 ? 0 : 1), turn("‹ Back", "Page before", at - 1), h("span", { class: "muted small", "aria-live": "polite" }, `${at} of ${pages}`), turn("On ›", "Next page", at + 1), turn("Last »", "Last page", at === pages ? 0 : pages)] : null);
   }
   show();
   const positions = [...new Set(sets.position)];
@@ -61,7 +61,7 @@ function pageTable(state, rows) {
     { title: "Table rate, deg/s", number: true, cell: (k) => plainNumber(sets.table_rate_dps[k], 6) },
     warm ? { title: "Set point, deg C", number: true, cell: (k) => plainNumber(sets.chamber_setpoint_c[k] ?? NaN) } : null,
     { title: "Gyro, deg C", number: true, cell: (k) => of("temperature_c", k, 4) },
-    ...gyros.map((name) => ({ title: `${channelName(name).replace("gyro output", "Output")}, ${channelUnit(name, output)}`, number: true, cell: (k) => [mean(sets.channels[name].mean[k], sets.channels[name].std[k]), sets.channels[name].std[k] === null ? null : h("span", { class: "soft small beside" }, ` ± ${number(sets.channels[name].std[k], 2)}`)] })),
+    ...gyros.map((name) => ({ title: `${channelName(name).replace("gyro output", "Output")}, ${channelUnit(name, output)}`, number: true, cell: (k) => [mean(sets.channels[name].mean[k], sets.channels[name].std[k]), sets.channels[name].std[k] === null ? null : h("span", { class: "muted small secondary" }, ` ± ${number(sets.channels[name].std[k], 2)}`)] })),
     { title: "Readings", number: true, cell: (k) => count(sets.n[k]) },
     timed ? { title: "Begins after", number: true, cell: (k) => duration(sets.t_from_s[k] ?? NaN) } : null,
   ].filter(Boolean), rows, { dense: true, label: "Data sets", selected: (k) => sets.number[k] === state.dataset, onrow: (k) => state.pick(sets.number[k]) });

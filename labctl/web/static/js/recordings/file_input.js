@@ -1,18 +1,18 @@
-// Files that a person lets go over the page or picks: single ones, or a folder of them.
+// Files from a drop or a file input: single files or a folder.
 
-/** What a recording's files are called; in a folder the rest is left lying. */
+/** File names of a recording; other files of a folder are ignored. */
 const RECORDING_FILE = /^(recording\.toml|(samples|points|coefficients|environment)\.(csv|parquet))$/;
 
-/** The files of a drop, with `left`: the names in its folders that belong to no recording. */
+/** The files of a drop, and `left`: the names in its folders that belong to no recording. */
 export async function droppedFiles(transfer) {
-  // the entries are gone after the first await
+  // entries are valid only until the first await
   const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
   if (!entries.some((entry) => entry.isDirectory)) return { files: [...transfer.files], left: [] };
   const all = (await Promise.all(entries.map((entry) => (entry.isDirectory ? inFolder(entry) : asFile(entry).then((file) => [file]))))).flat();
   return recordingFiles(all);
 }
 
-/** What of a folder is part of a recording. */
+/** The files of a folder that belong to a recording, and the names of the others. */
 export function recordingFiles(files) {
   const own = files.filter((file) => RECORDING_FILE.test(file.name));
   return { files: own, left: files.filter((file) => !own.includes(file)).map((file) => file.name) };
@@ -23,7 +23,7 @@ const asFile = (entry) => new Promise((resolve, reject) => entry.file(resolve, r
 async function inFolder(folder) {
   const reader = folder.createReader();
   const files = [];
-  for (;;) { // a reader gives at most a hundred at a time
+  for (;;) { // readEntries returns at most 100 entries per call
     const entries = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
     if (!entries.length) return files;
     files.push(...(await Promise.all(entries.filter((entry) => entry.isFile).map(asFile))));

@@ -1,4 +1,4 @@
-// Taking a recording in: dropped or picked, and what the service says to it.
+// Form to import a recording: drop or choose files, then show the answer of the service.
 
 import { upload } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -11,9 +11,9 @@ const totalSize = (files) => {
   return bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
 };
 
-/** The card to drop a recording on; `taken(imported)` is called when one is in the database. */
+/** The import card; `taken(imported)` is called when a recording is in the database. */
 export function importForm(taken) {
-  const told = h("div", { "aria-live": "polite" });
+  const result = h("div", { "aria-live": "polite" });
   const pick = (folder) => {
     const input = h("input", { type: "file", multiple: true, webkitdirectory: folder, accept: folder ? null : ".toml,.csv,.parquet", "aria-label": folder ? "Folder of a recording" : "Files of a recording", class: "visually-hidden", tabindex: "-1", onchange: () => {
       const files = [...input.files];
@@ -22,9 +22,9 @@ export function importForm(taken) {
     } });
     return [h("button", { type: "button", class: "button", onclick: () => input.click() }, folder ? "Choose a folder" : "Choose files"), input];
   };
-  const zone = h("div", { class: "drop stack", ondragover: over, ondragenter: over, ondragleave: (event) => zone.contains(event.relatedTarget) || zone.classList.remove("over"), ondrop: async (event) => {
+  const zone = h("div", { class: "drop stack", ondragover: over, ondragenter: over, ondragleave: (event) => zone.contains(event.relatedTarget) || zone.classList.remove("dragover"), ondrop: async (event) => {
     event.preventDefault();
-    zone.classList.remove("over");
+    zone.classList.remove("dragover");
     take(await droppedFiles(event.dataTransfer));
   } },
   h("p", { class: "drop-title" }, "Drop a recording here"),
@@ -33,34 +33,34 @@ export function importForm(taken) {
 
   function over(event) {
     event.preventDefault();
-    zone.classList.add("over");
+    zone.classList.add("dragover");
   }
 
   async function take({ files, left }) {
-    if (!files.length) return setChildren(told, refusedNotice(new Error("None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.")));
-    setChildren(told, busyIndicator(`Reading ${files.map((file) => file.name).join(", ")} (${totalSize(files)})`));
+    if (!files.length) return setChildren(result, refusedNotice(new Error("None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.")));
+    setChildren(result, busyIndicator(`Reading ${files.map((file) => file.name).join(", ")} (${totalSize(files)})`));
     try {
       const made = await upload("/api/recordings", files);
-      setChildren(told, acceptedNotice(made, left));
+      setChildren(result, acceptedNotice(made, left));
       taken(made);
     } catch (error) {
-      setChildren(told, refusedNotice(error));
+      setChildren(result, refusedNotice(error));
     }
-    return told;
+    return result;
   }
 
-  return h("section", { class: "card stack", "aria-label": "Import" }, h("h2", {}, "Import"), zone, told);
+  return h("section", { class: "card stack", "aria-label": "Import" }, h("h2", {}, "Import"), zone, result);
 }
 
 function acceptedNotice(made, left) {
-  return notice("good", h("p", { class: "told" }, `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`),
+  return notice("good", h("p", { class: "lead" }, `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`),
     left.length ? h("p", { class: "small" }, `Left out of the folder: ${left.join(", ")}.`) : null,
     h("div", { class: "row" },
-      h("a", { class: "button first", href: `/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}` }, "Fit and explore"),
+      h("a", { class: "button primary", href: `/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}` }, "Fit and explore"),
       h("a", { class: "button", href: `/recordings/${made.recording}` }, "Look at it")));
 }
 
-/** What is wrong, large: it names file, column and row, and that is what has to be looked up. */
+/** The error in large type: it names the file, column and row to correct. */
 function refusedNotice(error) {
-  return notice("bad", h("p", { class: "told" }, error.message), h("p", { class: "small" }, "Nothing of it was kept."));
+  return notice("bad", h("p", { class: "lead" }, error.message), h("p", { class: "small" }, "Nothing of it was kept."));
 }

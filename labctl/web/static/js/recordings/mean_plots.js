@@ -1,4 +1,4 @@
-// The means of a recording without times: output over table rate, and the temperature in the order of measurement.
+// Plots of a recording without times: mean output over table rate, and temperature in the order of measurement.
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure, temperatureColour } from "../core/figure.js";
@@ -6,7 +6,7 @@ import { plainNumber } from "../core/format.js";
 import { card } from "../core/components.js";
 import { channelUnit } from "./channels.js";
 
-/** `state` has {id, sets, output, dataset, pick(number)}. A press on a point picks its data set. */
+/** `state` has {id, sets, output, dataset, pick(number)}. A click on a point selects its data set. */
 export function meanPlots(state) {
   const { sets, output } = state;
   const gyros = Object.keys(sets.channels).filter((name) => name.startsWith("gyro_"));
@@ -15,7 +15,7 @@ export function meanPlots(state) {
   const scale = [0, 0.25, 0.5, 0.75, 1].map((share) => [share, temperatureColour(share)]);
   const tips = sets.number.map((number, k) => `data set ${number}: ${plainNumber(sets.table_rate_dps[k], 6)} deg/s${warm ? ` at ${plainNumber(warm[k])} deg C` : ""}, ${sets.position[k]} up`);
   const spot = (k) => (sets.number[k] === state.dataset ? 13 : 5);
-  const rim = () => ({ width: sets.number.map((number) => (number === state.dataset ? 2.5 : 0)), color: colour("ink") });
+  const rim = () => ({ width: sets.number.map((number) => (number === state.dataset ? 2.5 : 0)), color: colour("text") });
   const drawRate = () => ({
     data: gyros.map((name, g) => ({
       type: "scatter", mode: "markers", name: `axis ${name.slice(5)}`, x: sets.table_rate_dps, y: sets.channels[name].mean, customdata: sets.number, text: tips, hovertemplate: `%{y:.6~g} ${channelUnit(name, output)}<br>%{text}<extra></extra>`,
@@ -27,7 +27,7 @@ export function meanPlots(state) {
     data: [{ type: "scatter", mode: "lines+markers", name: "gyro temperature", x: sets.number, y: warm, customdata: sets.number, text: tips, hovertemplate: "%{text}<extra></extra>", line: { color: colour("accent"), width: 1 }, marker: { size: sets.number.map((_, k) => spot(k) - 2), line: rim(), color: colour("accent") } }],
     layout: { showlegend: false, margin: { l: 58, r: 12, t: 8, b: 46 }, xaxis: { title: { text: "data set" } }, yaxis: { title: { text: "gyro temperature, deg C" } } },
   });
-  const pictures = [figure(`Recording ${state.id} output over rate`, "One point for each data set; its colour is the gyro's temperature.", drawRate, { tall: "19rem" }), warm ? figure(`Recording ${state.id} temperature`, "In the order of the data sets. Press a point to pick its data set.", drawWarm, { tall: "19rem" }) : null].filter(Boolean);
+  const pictures = [figure(`Recording ${state.id} output over rate`, "One point for each data set; its colour is the gyro's temperature.", drawRate, { height: "19rem" }), warm ? figure(`Recording ${state.id} temperature`, "In the order of the data sets. Press a point to pick its data set.", drawWarm, { height: "19rem" }) : null].filter(Boolean);
   for (const picture of pictures) picture.ondrawn = (plot) => plot.on("plotly_click", (event) => state.pick(event.points[0].customdata));
   return Object.assign(card("Means", h("div", { class: "columns" }, pictures)), { redraw: () => pictures.forEach((picture) => picture.redraw()) });
 }

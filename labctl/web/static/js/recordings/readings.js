@@ -1,4 +1,4 @@
-// Down to the raw readings of one data set.
+// The raw readings of one data set.
 
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -11,7 +11,7 @@ const MAX_READINGS = 20_000;
 const TABLE_ROWS = 40;
 const NO_CHANNEL = new Set(["dataset", "t_s", "position", "run", "mounting", "valid"]);
 
-/** The card of the picked data set; empty until one is picked. */
+/** The card of the selected data set; empty until one is selected. */
 export function datasetReadings(state, signal) {
   const element = h("div", {});
   async function show() {
@@ -19,8 +19,8 @@ export function datasetReadings(state, signal) {
     if (k < 0) return setChildren(element);
     const place = h("div", { class: "stack" });
     const close = h("button", { type: "button", class: "button tiny", onclick: () => state.pick(null) }, "Close");
-    const look = state.sets.t_from_s[k] !== null && state.look ? h("button", { type: "button", class: "button tiny", onclick: () => state.look(k) }, "In the trace") : null;
-    setChildren(element, cardWithHeader(`Data set ${state.dataset}`, h("div", { class: "row" }, look, close), summary(state, k), place));
+    const showButton = state.sets.t_from_s[k] !== null && state.showInTrace ? h("button", { type: "button", class: "button tiny", onclick: () => state.showInTrace(k) }, "In the trace") : null;
+    setChildren(element, cardWithHeader(`Data set ${state.dataset}`, h("div", { class: "row" }, showButton, close), summary(state, k), place));
     if (state.kind === "samples") await loadInto(place, "Reading", async () => readingsFigure(state, await get(`/api/recordings/${state.id}/samples`, { query: { dataset: state.dataset, limit: MAX_READINGS }, signal })));
     return element;
   }
@@ -52,14 +52,14 @@ function readingsFigure(state, found) {
   const draw = () => ({
     data: [
       { type: "scatter", mode: n < 400 ? "lines+markers" : "lines", name: channelName(channel), x: t, y: columns[channel], line: { color: colour("accent"), width: 0.8 }, marker: { size: 4 }, hovertemplate: `%{y:.6~g} ${channelUnit(channel, state.output)}<br>after %{x:.4~f} s<extra></extra>` },
-      { type: "scatter", mode: "lines", name: "mean", x: [t[0], t[n - 1]], y: [mean(), mean()], line: { color: colour("ink"), width: 1.5, dash: "dash" }, hovertemplate: `mean %{y:.6~g} ${channelUnit(channel, state.output)}<extra></extra>` },
+      { type: "scatter", mode: "lines", name: "mean", x: [t[0], t[n - 1]], y: [mean(), mean()], line: { color: colour("text"), width: 1.5, dash: "dash" }, hovertemplate: `mean %{y:.6~g} ${channelUnit(channel, state.output)}<extra></extra>` },
       { type: "scatter", mode: "markers", name: "marked as bad", x: bad().map((k) => t[k]), y: bad().map((k) => columns[channel][k]), marker: { color: colour("bad"), size: 7, symbol: "x" } },
     ].filter((trace) => trace.x.length),
     layout: { showlegend: false, xaxis: { title: { text: columns.t_s ? "time since its first reading, s" : "reading" } }, yaxis: { title: { text: channelTitle(channel, channelUnit(channel, state.output)) } }, margin: { l: 70, r: 12, t: 8, b: 46 } },
   });
   const shown = Object.keys(columns).filter((name) => name !== "dataset");
   const csv = () => [shown, ...Array.from({ length: n }, (_, k) => shown.map((name) => columns[name][k]))];
-  const picture = figure(`Recording ${state.id} data set ${state.dataset}`, found.readings > n ? `The first ${count(n)} of ${count(found.readings)} readings. Dashed: their mean.` : `All ${count(n)} readings. Dashed: their mean.`, draw, { tall: "18rem", csv });
+  const picture = figure(`Recording ${state.id} data set ${state.dataset}`, found.readings > n ? `The first ${count(n)} of ${count(found.readings)} readings. Dashed: their mean.` : `All ${count(n)} readings. Dashed: their mean.`, draw, { height: "18rem", csv });
   return [
     h("div", { class: "row" }, selectField("Channel of its readings", names.map((name) => [name, channelName(name)]), channel, (value) => {
       channel = value;

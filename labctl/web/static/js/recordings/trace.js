@@ -1,4 +1,4 @@
-// One channel over time, however many readings there are: the service sends as many columns as the picture has.
+// One channel over time. The service sends at most as many columns as the plot can show.
 
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
@@ -12,14 +12,14 @@ const COLUMNS = 1200;
 const SETTLE_MS = 200;
 const UNITS = [[7200, "h", 3600], [600, "min", 60], [0, "s", 1]];
 
-/** The trace of a recording. `state` has {id, channel, from, until, dataset, sets}; it is changed and written to the address. */
+/** The trace of a recording. `state` has {id, channel, from, until, dataset, sets}; a change is written to the address. */
 export function trace(state, signal) {
   let found = null;
   let asked = new AbortController();
   let waiting = null;
-  const told = h("p", { class: "soft small", "aria-live": "polite" });
+  const readingCount = h("p", { class: "muted small", "aria-live": "polite" });
   const place = h("div", { style: "min-height: 24rem" }, busyIndicator("Reading"));
-  const picture = figure(`Recording ${state.id} trace`, "Band: from the least to the greatest reading of a column; line: their mean. Drag across to look closer, press a data set to open its readings.", draw, { tall: "21rem", csv: () => [["t_s", `min_${state.channel}`, `max_${state.channel}`, `mean_${state.channel}`, "n"], ...found.t_s.map((t, k) => [t, found.min[k], found.max[k], found.mean[k], found.n[k]])] });
+  const picture = figure(`Recording ${state.id} trace`, "Band: from the least to the greatest reading of a column; line: their mean. Drag across to look closer, press a data set to open its readings.", draw, { height: "21rem", csv: () => [["t_s", `min_${state.channel}`, `max_${state.channel}`, `mean_${state.channel}`, "n"], ...found.t_s.map((t, k) => [t, found.min[k], found.max[k], found.mean[k], found.n[k]])] });
   const channels = h("div", {});
 
   function draw() {
@@ -58,7 +58,7 @@ export function trace(state, signal) {
     if (!picture.isConnected) setChildren(place, picture);
     setChildren(channels, selectField("Channel", found.channels.map((name) => [name, channelName(name)]), state.channel, (value) => show({ channel: value })));
     const shown = found.n.reduce((sum, n) => sum + n, 0);
-    setChildren(told, `${count(shown)} readings${found.raw ? "" : ", from envelopes of each data set"}; ${duration((state.until ?? found.until_s) - (state.from ?? found.from_s))} shown.`);
+    setChildren(readingCount, `${count(shown)} readings${found.raw ? "" : ", from envelopes of each data set"}; ${duration((state.until ?? found.until_s) - (state.from ?? found.from_s))} shown.`);
     picture.redraw();
   }
 
@@ -70,7 +70,7 @@ export function trace(state, signal) {
   }
 
   const window_ = () => [state.from ?? found.from_s, state.until ?? found.until_s];
-  /** Move by shares of the window, or make it larger or smaller; never beyond the recording. */
+  /** Pan or zoom by shares of the window. */
   const move = (left, right) => {
     if (!found) return;
     const [low, high] = window_();
@@ -94,13 +94,13 @@ export function trace(state, signal) {
   const tool = (text, label, act) => h("button", { type: "button", class: "button tiny", "aria-label": label, title: label, onclick: act }, text);
   const tools = h("div", { class: "row tight", role: "group", "aria-label": "Window" }, tool("◀", "Earlier", () => move(-0.5, -0.5)), tool("▶", "Later", () => move(0.5, 0.5)), tool("+", "Look closer", () => move(0.25, -0.25)), tool("−", "Look wider", () => move(-0.5, 0.5)), tool("All", "The whole recording", () => show({ from: null, until: null })));
   load();
-  const element = cardWithHeader("Trace", h("div", { class: "row", style: "align-items: end" }, channels, tools), place, told);
+  const element = cardWithHeader("Trace", h("div", { class: "row", style: "align-items: end" }, channels, tools), place, readingCount);
   return Object.assign(element, { show, redraw: () => picture.redraw() });
 }
 
 const rounded = (value) => (Number.isFinite(value) ? Number(value.toFixed(3)) : null);
 
-/** Where bins hang together: [first, last] of each piece; a gap is longer than three columns. */
+/** Continuous pieces of the bins: [first, last] of each; a gap is longer than three columns. */
 function continuousPieces(t, column) {
   const steps = t.slice(1).map((value, k) => value - t[k]).sort((a, b) => a - b);
   const gap = 3 * Math.max(column, steps[Math.floor(steps.length / 2)] ?? 0);
@@ -123,7 +123,7 @@ function meanLine(t, values, texts, pieces) {
   return { x, y, text };
 }
 
-/** Around each piece once: along the greatest, back along the least. */
+/** Outline of each piece: forward along the maximum, back along the minimum. */
 function envelopeOutline(t, found, pieces) {
   const [x, y] = [[], []];
   for (const [from, to] of pieces) {

@@ -1,4 +1,4 @@
-// A version's coefficients: over temperature where it has a table, else as a list; two versions beside each other.
+// Coefficients of a version: over temperature where it has a table, else a list; one version or two side by side.
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
@@ -26,16 +26,16 @@ export function coefficients(first, second) {
 
 const tableOf = (axis) => axis.coefficients?.temperature_c ? axis.coefficients : axis;
 
-/** By what values are multiplied, and the unit they are then in: plain numbers are shares, ppm below 1 %. */
+/** Factor and unit to display values in: plain numbers as shares in %, in ppm below 1 %. */
 function scaleOf(values, unit) {
   if (unit !== "1") return [1, unitText(unit)];
   return Math.max(...values.map(Math.abs)) < 0.01 ? [1e6, "ppm"] : [100, "%"];
 }
 
-/** A picture for each coefficient: its value over temperature with expanded uncertainty, an axis of the gyro a colour. */
+/** One plot per coefficient: its value over temperature with expanded uncertainty, one colour per axis. */
 function overTemperature(first, second) {
   const names = new Set(Object.values(first.axes).flatMap((axis) => Object.keys(tableOf(axis)).filter((name) => tableOf(axis)[name]?.value)));
-  return h("div", { class: "columns", style: "--least: 24rem" }, [...names].map((name) => {
+  return h("div", { class: "columns", style: "--column-min: 24rem" }, [...names].map((name) => {
     const unit = Object.values(first.axes).map((axis) => tableOf(axis)[name]?.unit).find(Boolean);
     const rows = [first, second].filter(Boolean).flatMap((version) => Object.entries(version.axes).filter(([, axis]) => tableOf(axis)[name]?.value).flatMap(([axis, values]) => {
       const { temperature_c, [name]: { value, u } } = tableOf(values);
@@ -46,8 +46,8 @@ function overTemperature(first, second) {
       const { temperature_c: x, [name]: { value, u } } = tableOf(values);
       return { type: "scatter", mode: "lines+markers", name: `axis ${axis}${second ? `, v${version.version}` : ""}`, x, y: value.map((each) => (each === null ? null : factor * each)), error_y: faint || !u ? undefined : { type: "data", array: u.map((each) => K * factor * each), thickness: 1, width: 2 }, line: { color: axisColour(axis), dash: faint ? "dot" : "solid", width: faint ? 1.2 : 2 }, marker: { size: faint ? 4 : 6 }, opacity: faint ? 0.7 : 1 };
     });
-    const draw = () => ({ data: [...lines(first, false), ...lines(second, true)], layout: { xaxis: { title: { text: "temperature, deg C" } }, yaxis: { title: { text: shown ? `${idText(name)}, ${shown}` : idText(name), font: { color: colour("soft") } } } } });
-    return h("div", {}, h("h3", {}, idText(name)), figure(`Coefficient ${idText(name)}`, "Bars: expanded uncertainty, k = 2.", draw, { tall: "17rem", csv: () => [["version", "axis", "temperature_c", name, "u", "unit"], ...rows] }));
+    const draw = () => ({ data: [...lines(first, false), ...lines(second, true)], layout: { xaxis: { title: { text: "temperature, deg C" } }, yaxis: { title: { text: shown ? `${idText(name)}, ${shown}` : idText(name), font: { color: colour("text-muted") } } } } });
+    return h("div", {}, h("h3", {}, idText(name)), figure(`Coefficient ${idText(name)}`, "Bars: expanded uncertainty, k = 2.", draw, { height: "17rem", csv: () => [["version", "axis", "temperature_c", name, "u", "unit"], ...rows] }));
   }));
 }
 
