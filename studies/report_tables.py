@@ -280,7 +280,7 @@ def costs(answers: Sequence[Answer]) -> str:
 
 
 def report(answers: Sequence[Answer], versions: dict[str, str]) -> str:
-    """Return everything, for docs/criticism.md."""
+    """Return everything, for docs/explanation/criticism.md."""
     cells = Cells(answers)
     counted = ", ".join(f"{len(cells.of(kind))} {kind}" for kind in dict.fromkeys(a["kind"] for a in answers))
     parts = [f"Campaigns: {counted}. Shares in per cent with 95 % intervals (Wilson)."]
