@@ -14,6 +14,13 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 #: A serial number stands in file names, addresses and C comments.
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
+#: Addresses of simulated instruments begin with this scheme.
+SIMULATED_SCHEME = "sim://"
+
+
+def is_simulated_address(address: str) -> bool:
+    """Return whether a port or host of a bench file is a simulated instrument."""
+    return address.startswith(SIMULATED_SCHEME)
 
 
 class Strict(BaseModel):
@@ -123,12 +130,12 @@ class BenchFile(Strict):
     @property
     def is_simulated(self) -> bool:
         """Whether every instrument is reached by sim://."""
-        return all(link.startswith("sim://") for link in self._links())
+        return all(is_simulated_address(link) for link in self._links())
 
     @property
     def has_simulated(self) -> bool:
         """Whether any instrument is reached by sim://."""
-        return any(link.startswith("sim://") for link in self._links())
+        return any(is_simulated_address(link) for link in self._links())
 
     def _links(self) -> list[str]:
         links = [self.table.port, self.chamber.port, self.chamber.host, *(g.port or g.host for g in self.gyros)]

@@ -37,6 +37,10 @@ class Readings:
     def __len__(self) -> int:
         return len(self.t_s)
 
+    def newest(self) -> Readings:
+        """Return the last reading alone, n = 1, without the counts of lost and damaged ones."""
+        return Readings(self.t_s[-1:], {name: values[-1:] for name, values in self.raw.items()}, self.valid[-1:])
+
 
 @dataclass(frozen=True)
 class GyroLimits:
