@@ -37,14 +37,16 @@ def test_register_numbers(table: ModuleType, numbers: dict[str, int]) -> None:
             watlow_f4_registers,
             {
                 "INPUT_STRIDE": 12, "INPUT_SETUP_STRIDE": 2, "EVENT_STRIDE": 10, "MODEL_F4": 5270,
-                "FUNCTION_WAIT_FOR": 10,                "MODE_STATIC": 0, "MODE_PROFILE_RUNNING": 2, "MODE_PROFILE_HELD": 3, "TERMINATE_PROFILE": 1,
+                "FUNCTION_WAIT_FOR": 10, "MODE_STATIC": 0, "MODE_PROFILE_RUNNING": 2,
+                "MODE_PROFILE_HELD": 3, "TERMINATE_PROFILE": 1,
             },
         ),
         (
             watlow_f4t_registers,
             {
                 "STATUS_OK": 138, "UNITS_CELSIUS": 15, "ALARM_STRIDE": 100, "ALARM_QUIET": {88, 61, 12},
-                "MODE_AUTO": 10,                "PROFILE_ACTIVE": {149, 146}, "PROFILE_TERMINATE": 148, "PROFILE_NOT_STARTED": 1782,
+                "MODE_AUTO": 10, "PROFILE_ACTIVE": {149, 146},
+                "PROFILE_TERMINATE": 148, "PROFILE_NOT_STARTED": 1782,
             },
         ),
         (adam6017, {"MODULE_6017": 0x6017, "CHANNELS": 8, "FULL_CODE": 65535, "RAIL_LOW": 0, "RAIL_HIGH": 65500}),
