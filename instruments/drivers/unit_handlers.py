@@ -8,7 +8,7 @@ from instruments.errors import LinkError, RequestRejected
 from instruments.protocols.simulator_control import OK, mount_line, power_line
 
 #: Device name in messages.
-DEVICE = "hand"
+DEVICE = "unit handler"
 
 
 class ManualUnitHandler:

@@ -1,4 +1,4 @@
-"""Serial port of a device that sends without being asked; a broken wire becomes a LinkError that names the device."""
+"""Serial port of a device that sends unsolicited; a broken wire becomes a LinkError that names the device."""
 
 from __future__ import annotations
 
