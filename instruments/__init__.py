@@ -1,4 +1,4 @@
-"""What a wire says: drivers for rate tables, thermal chambers and gyros, and the one Clock they all live by.
+"""Drivers and simulators of rate tables, thermal chambers and gyros, and the clock that they share.
 
-This floor knows no database, no campaign and no fit.
+This package knows no database, no campaign and no fit.
 """

@@ -1,6 +1,6 @@
-"""A bench file: which table, chamber and gyros stand together, how to reach them, and their limits.
+"""A bench file: the table, chamber and gyros of one bench, their addresses and their limits.
 
-With real hardware only `port` and `host` change; `sim://...` leads to the simulated instruments of `[simulation]`.
+Real and simulated instruments differ in `port` and `host` only; `sim://...` leads to the simulators of `[simulation]`.
 """
 
 from __future__ import annotations
@@ -12,18 +12,25 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-#: A serial number stands in file names, addresses and C comments.
+#: A serial number becomes part of file names, addresses and C comments.
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
+#: Addresses of simulated instruments begin with this scheme.
+SIMULATED_SCHEME = "sim://"
+
+
+def is_simulated_address(address: str) -> bool:
+    """Return whether a port or host of a bench file is a simulated instrument."""
+    return address.startswith(SIMULATED_SCHEME)
 
 
 class Strict(BaseModel):
-    """A settings table in which an unknown key is an error with a name."""
+    """A settings table; an unknown key is an error that names it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class TableSettings(Strict):
-    """How to reach the rate table, and what it can do."""
+    """Address, mechanics and limits of the rate table."""
 
     driver: Literal["arrick-c4"] = "arrick-c4"
     port: str
@@ -32,7 +39,7 @@ class TableSettings(Strict):
     direction: Literal[1, -1] = 1  #: 1: `f` turns the table counter-clockwise seen from above
     max_rate_dps: float = Field(gt=0)
     acceleration_dps2: float = Field(gt=0)
-    step_clock_hz: float = Field(default=2_000_000.0, gt=0)  #: the step rate is this over a whole divisor
+    step_clock_hz: float = Field(default=2_000_000.0, gt=0)  #: the step rate is this frequency over a whole divisor
     clock_u_ppm: float = Field(default=50.0, ge=0)  #: standard uncertainty of the step clock
     #: The C4's speed command is not public. Without the manual's template the driver refuses a constant rate.
     speed_template: str | None = None
@@ -41,7 +48,7 @@ class TableSettings(Strict):
 
 
 class ChamberSettings(Strict):
-    """How to reach the chamber's controller, and its limits."""
+    """Address, options and limits of the chamber controller."""
 
     driver: Literal["watlow-f4", "watlow-f4t"]
     port: str | None = None  #: serial (watlow-f4)
@@ -54,7 +61,7 @@ class ChamberSettings(Strict):
     safe_c: float = 25.0
     ramp_c_per_min: float = Field(default=1.67, gt=0)
     word_order: Literal["little", "big"] = "little"  #: of 32-bit floats (watlow-f4t): low word first by default
-    write_function: Literal[6, 16] = 6  #: tried first (watlow-f4); the other is the fall-back
+    write_function: Literal[6, 16] = 6  #: tried first (watlow-f4); the other one follows an "illegal function"
     alarm_inputs: tuple[Literal[1, 2, 3, 4], ...] = ()  #: digital inputs that carry alarms, if wired (watlow-f4)
     enable_event: int | None = Field(default=None, ge=1, le=8)  #: event output that switches the chamber, if wired
 
@@ -68,7 +75,7 @@ class ChamberSettings(Strict):
 
 
 class GyroSettings(Strict):
-    """One unit on the bench: how to read it, who it is and what it may be exposed to."""
+    """One unit on the bench: address, identity and limits of exposure."""
 
     name: str
     driver: Literal["kvh-dsp3000", "kvh-rd2100", "stim300", "gyrostar"]
@@ -88,17 +95,19 @@ class GyroSettings(Strict):
 
 
 class SimulationSettings(Strict):
-    """What the simulated instruments behind `sim://` are like. Ignored by a bench of real instruments."""
+    """Properties of the simulated instruments behind `sim://`; a bench of real instruments ignores them."""
 
     seed: int = 1
-    noise_seed: int = 0  #: another one measures the same units on another day
+    noise_seed: int = 0  #: another value measures the same units on another day
     latitude_deg: float | None = None  #: of the simulated world; default: the bench's
     units: dict[str, dict[str, Any]] = Field(default_factory=dict)  #: gyro name -> profile and deviations from it
     table: dict[str, Any] = Field(default_factory=dict)
     chamber: dict[str, Any] = Field(default_factory=dict)
     hidden: dict[str, float | str] = Field(default_factory=dict)  #: effect id -> size, hidden in every unit
-    control: str | None = None  #: address of a simulator in another process, for the hand that turns its units
-    speed: float = Field(default=1.0, gt=0)  #: how fast that other process runs; `labctl simulator` writes both
+    control: str | None = None  #: HOST:PORT of a simulator in another process, for its unit handler
+    speed: float = Field(
+        default=1.0, gt=0
+    )  #: clock seconds per wall second of that process; `labctl simulator` writes both
 
 
 class BenchFile(Strict):
@@ -113,7 +122,7 @@ class BenchFile(Strict):
 
     @model_validator(mode="after")
     def _every_unit_is_one(self) -> BenchFile:
-        """Two units under one name or number would be taken for one, and their readings for its."""
+        """Reject two units with one name, serial number or port: their readings would be mixed."""
         for what in ("name", "serial", "port"):
             given = [value for unit in self.gyros if (value := getattr(unit, what)) is not None]
             if twice := next((value for value in given if given.count(value) > 1), None):
@@ -123,12 +132,12 @@ class BenchFile(Strict):
     @property
     def is_simulated(self) -> bool:
         """Whether every instrument is reached by sim://."""
-        return all(link.startswith("sim://") for link in self._links())
+        return all(is_simulated_address(link) for link in self._links())
 
     @property
     def has_simulated(self) -> bool:
         """Whether any instrument is reached by sim://."""
-        return any(link.startswith("sim://") for link in self._links())
+        return any(is_simulated_address(link) for link in self._links())
 
     def _links(self) -> list[str]:
         links = [self.table.port, self.chamber.port, self.chamber.host, *(g.port or g.host for g in self.gyros)]
@@ -136,7 +145,7 @@ class BenchFile(Strict):
 
 
 def shipped_benches() -> dict[str, Path]:
-    """Return the bench files that come with labctl, by name."""
+    """Return name -> path of the bench files that are part of labctl."""
     folder = Path(str(resources.files("instruments"))) / "benches"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 

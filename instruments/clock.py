@@ -1,8 +1,8 @@
-"""The one clock. Nothing else in the house reads the time or sleeps.
+"""The clock of a bench: no other module of the runtime reads the time or sleeps.
 
 Durations are seconds of the clock's own monotonic time, which starts at 0; records carry aware UTC. In virtual time a
-sleep is a jump, so a 45-hour campaign takes as long as its arithmetic; in scaled time (demos, simulators in another
-process) one second of the wall is `speed` seconds of the clock.
+sleep advances the clock at once, so a 45-hour campaign takes the time of its arithmetic; in scaled time (demos,
+simulators in another process) one wall second is `speed` clock seconds.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Time as everything in the house sees it."""
+    """Monotonic time, UTC and sleep of one bench."""
 
     def now_s(self) -> float:
         """Get the monotonic time in seconds since the clock was made."""
@@ -24,23 +24,23 @@ class Clock(Protocol):
         ...
 
     def sleep(self, duration_s: float) -> None:
-        """Let `duration_s` seconds of this clock pass; nothing happens for zero or less."""
+        """Wait until `duration_s` seconds of this clock have passed; returns at once for zero or less."""
         ...
 
     def wall_s(self, duration_s: float) -> float:
-        """Get how many wall seconds a time-out of `duration_s` clock seconds may take (for client libraries)."""
+        """Get the wall seconds that a time-out of `duration_s` clock seconds may take, for client libraries."""
         ...
 
 
 def sleep_until(clock: Clock, t_s: float) -> None:
-    """Let the clock reach `t_s`; returns at once when it is already later."""
+    """Wait until the clock reads `t_s`; returns at once when it is already later."""
     clock.sleep(t_s - clock.now_s())
 
 
 class ScaledClock:
-    """The wall's time, run `speed` times as fast. Speed 1 is the real bench."""
+    """Wall time, `speed` times as fast; 1 for real instruments. Raises ValueError for a speed that is not positive."""
 
-    #: A client library cannot usefully wait less than this, however fast the clock runs.
+    #: Least useful time-out of a client library, wall seconds, whatever the speed.
     MIN_WALL_TIMEOUT_S = 0.05
 
     def __init__(self, speed: float = 1.0, *, now_s: float = 0.0) -> None:
@@ -65,23 +65,24 @@ class ScaledClock:
 
 
 class SystemClock(ScaledClock):
-    """The wall's own time."""
+    """Wall time at speed 1."""
 
     def __init__(self) -> None:
         super().__init__(1.0)
 
 
 class WallClock(SystemClock):
-    """The wall's own time, and `utc` follows when the wall's clock is set: for appointments, not for measuring."""
+    """Wall time whose `utc` follows changes of the system clock: for scheduled starts, not for measurements."""
 
     def utc(self) -> datetime:
         return datetime.now(UTC)
 
 
 class VirtualClock:
-    """Time that passes only when somebody sleeps, and then at once."""
+    """Time that advances only by `sleep`, at once. Raises ValueError for a start without a time zone."""
 
-    #: An in-process simulator answers before the call returns, or never: a slow machine must not look like a slow wire.
+    #: Wall seconds of every time-out. A simulator in this process replies before the call returns, or never: a slow
+    #: machine must not look like a slow wire.
     WALL_TIMEOUT_S = 10.0
 
     def __init__(self, start: datetime = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)) -> None:

@@ -1,19 +1,19 @@
-"""The instrument part of the error tree. Every message names device, quantity, value, unit, limit and what to do.
+"""Errors of instruments. Every message names device, quantity, value, unit, limit and what to do.
 
 InstrumentError
-├── LinkError            the wire is silent, broken or gone
-│   ├── NoReply          nothing came back in time
-│   └── Garbled          something came back that is not the protocol's
-├── Refused              the instrument answered, and said no
+├── LinkError            the link is silent or broken
+│   ├── NoReply          no reply within the time-out
+│   └── MalformedReply   a reply that does not fit the protocol
+├── RequestRejected      the instrument rejected the request
 ├── LimitError           the request lies outside a limit; nothing was sent
-└── WrongInstrument      what answers is not what the bench file says
+└── WrongInstrument      the instrument is not the one in the bench file
 """
 
 from __future__ import annotations
 
 
 class InstrumentError(Exception):
-    """A failure of one device. `device` is its name in the bench file; the text says what to do."""
+    """A failure of one device; `device` is its name in the bench file."""
 
     def __init__(self, device: str, message: str) -> None:
         super().__init__(f"{device}: {message}")
@@ -21,19 +21,19 @@ class InstrumentError(Exception):
 
 
 class LinkError(InstrumentError):
-    """The wire is silent, broken or gone."""
+    """The link is silent or broken."""
 
 
 class NoReply(LinkError):
-    """Nothing came back in time."""
+    """No reply came within the time-out."""
 
 
 class MalformedReply(LinkError):
-    """Something came back that is not the protocol's."""
+    """A reply came that does not fit the protocol or the request."""
 
 
 class RequestRejected(InstrumentError):
-    """The instrument answered, and said no."""
+    """The instrument rejected the request."""
 
 
 class LimitError(InstrumentError):
@@ -41,4 +41,4 @@ class LimitError(InstrumentError):
 
 
 class WrongInstrument(InstrumentError):
-    """What answers is not what the bench file says."""
+    """The instrument that replies is not the one in the bench file."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
 from instruments.clock import VirtualClock
-from instruments.transport.factory import open_simulation
+from instruments.simulation import open_simulation
 from labctl.recording import Recording
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.simulation.sizing import hidden_recording

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from instruments.bench_config import SimulationSettings
 from instruments.clock import VirtualClock
-from instruments.transport.factory import open_simulation
+from instruments.simulation import open_simulation
 from labctl.fitting import fit
 from labctl.fitting.estimation.fit import FitResult
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe

@@ -16,8 +16,8 @@ import sqlalchemy as sa
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
-from instruments.simulators.device import SimulatedDevice
-from instruments.transport.factory import Simulation, open_simulation
+from instruments.simulation import Simulation, open_simulation
+from instruments.simulators.links.device import SimulatedDevice
 from labctl.store.connection.database import Database
 from labctl.store.repositories.recordings import blocks_of
 from labctl.store.schema import tables

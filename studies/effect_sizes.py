@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from instruments.transport.factory import hidden_defaults
+from instruments.simulation import hidden_defaults
 from labctl.services.simulation.sizing import CLOSE, Sizing
 from studies.campaigns import PROTOCOLS, protocol
 

@@ -16,8 +16,8 @@ from instruments.bench import open_bench
 from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
 from instruments.interfaces.gyro import Readings
+from instruments.simulation import Simulation, open_simulation
 from instruments.simulators.links.faults import FaultKind
-from instruments.transport.factory import Simulation, open_simulation
 from labctl.services.campaigns import execution
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store, StoreJournal

@@ -1,4 +1,4 @@
-"""What the two Watlow controllers share: a set point that is limited, rounded, written on change and read back."""
+"""Base of the Watlow chamber drivers: a set point is limited, rounded, written on change only and read back."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ TINY_C = 1e-6
 class Watlow(ABC):
     """A chamber on a Watlow controller.
 
-    Limits are asked of the controller once, and the narrower of both counts. A profile that runs on the controller is
-    somebody's work: the driver does not end it to make its own set point count. Only the way to the safe state ends
-    one, and only on a chamber that this driver has controlled before.
+    The controller's limits are read once; the narrower of controller and bench file apply. A profile on the controller
+    belongs to a person: the driver does not end it in favour of its own set point. Only `make_safe` ends a profile, and
+    only on a chamber that this driver has controlled before.
     """
 
     name = "chamber"
@@ -30,11 +30,11 @@ class Watlow(ABC):
         self.safe_c = settings.safe_c
         self._registers, self._clock = registers, clock
         self._limits: ChamberLimits | None = None
-        self._in_charge = False
+        self._has_controlled = False
 
     @property
     def limits(self) -> ChamberLimits:
-        """Get the narrower of the controller's limits and the bench file's; asks the controller at first use."""
+        """Get the narrower limits of controller and bench file; the first use reads the controller and may raise."""
         if self._limits is None:
             low, high = self._controller_limits()
             settings = self.settings
@@ -45,7 +45,7 @@ class Watlow(ABC):
 
     @abstractmethod
     def identify(self) -> str:
-        """Get what the controller says it is; raises WrongInstrument when it is another or speaks Fahrenheit."""
+        """Get model or part number; raises WrongInstrument for another controller or units other than Celsius."""
 
     @abstractmethod
     def _controller_limits(self) -> tuple[float, float]:
@@ -65,15 +65,15 @@ class Watlow(ABC):
 
     @abstractmethod
     def _read_air(self) -> float:
-        """Return the air temperature, deg C; raises Garbled when the controller marks it invalid."""
+        """Return the air temperature, deg C; raises MalformedReply when the controller marks it invalid."""
 
     @abstractmethod
     def _alarms(self) -> tuple[str, ...]:
-        """Return what the controller complains of."""
+        """Return the active alarms, one text each."""
 
     @abstractmethod
     def _profile_runs(self) -> bool:
-        """Return whether a profile runs or is held, so that a static set point has no effect."""
+        """Return whether a profile runs or is held: a static set point then has no effect."""
 
     @abstractmethod
     def _end_profile(self) -> None:
@@ -81,29 +81,33 @@ class Watlow(ABC):
 
     @abstractmethod
     def _switch_on(self) -> None:
-        """Make the controller control; raises Refused where only a person may do that."""
+        """Switch control on; raises RequestRejected where only a person may do that."""
 
     def set_temperature_c(self, temperature_c: float) -> float:
-        """Control the set point, deg C: limited, rounded, written on change only (EEPROM wear), read back.
+        """Control the set point: limited, rounded, written on change only (EEPROM wear); returns the value read back.
 
-        Raises LimitError (nothing was sent), Refused while a profile runs or when another value is read back.
+        Raises LimitError (nothing was written), RequestRejected while a profile runs or when another value is read
+        back, and what a register access raises.
         """
         rounded = self._checked(temperature_c)
         self._refuse_while_a_profile_runs()
         self._switch_on()
-        self._in_charge = True
-        return self._set(rounded)
+        self._has_controlled = True
+        return self._write_and_verify(rounded)
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe set point, deg C; returns what was read back. Switches nothing on."""
+        """Control the chamber to its safe set point; returns the value read back, deg C. Switches nothing on.
+
+        Raises as `set_temperature_c` does.
+        """
         rounded = self._checked(self.safe_c)
-        if self._in_charge and self._profile_runs():
+        if self._has_controlled and self._profile_runs():
             self._end_profile()
         self._refuse_while_a_profile_runs()
-        return self._set(rounded)
+        return self._write_and_verify(rounded)
 
     def read(self) -> ChamberState:
-        """Get air temperature, set point (deg C) and alarms."""
+        """Get air temperature, set point (deg C) and alarms; raises what a register read raises."""
         return ChamberState(self._clock.now_s(), self._read_air(), self._read_setpoint(), self._alarms())
 
     def close(self) -> None:
@@ -113,7 +117,7 @@ class Watlow(ABC):
     def _checked(self, temperature_c: float) -> float:
         limits = self.limits
         low, high = limits.min_c - TINY_C, limits.max_c + TINY_C
-        # the last rounding takes away what multiplying left behind: 85.1, not 85.10000000000001
+        # the last rounding removes the remainder of the multiplication: 85.1, not 85.10000000000001
         step = limits.resolution_c
         rounded = round(round(temperature_c / step) * step, 6) + 0.0 if low <= temperature_c <= high else temperature_c
         if not low <= rounded <= high:
@@ -132,7 +136,7 @@ class Watlow(ABC):
                 "end it at the front panel",
             )
 
-    def _set(self, rounded_c: float) -> float:
+    def _write_and_verify(self, rounded_c: float) -> float:
         if abs(self._read_setpoint() - rounded_c) > TINY_C:
             self._write_setpoint(rounded_c)
         found = self._read_setpoint()

@@ -1,8 +1,4 @@
-"""Watlow Series F4 over Modbus RTU: signed 16-bit registers with implied decimals.
-
-No register list of this controller is public as a whole. Numbers come from projects that run real chambers
-(ChamberConnectLibrary of Espec North America; F4 gateways); what only one of them shows is a setting of the bench file.
-"""
+"""Chamber controller Watlow Series F4 over Modbus RTU: signed 16-bit registers with implied decimals."""
 
 from __future__ import annotations
 
@@ -10,37 +6,11 @@ from instruments.bench_config import ChamberSettings
 from instruments.clock import Clock
 from instruments.drivers.watlow import REPLY_S, Watlow
 from instruments.errors import RequestRejected
+from instruments.protocols import watlow_f4_registers as f4
 from instruments.protocols.modbus_registers import Register
 from instruments.transport.factory import Ports
-from instruments.transport.modbus import Client, Registers
-
-CCL = "ChamberConnectLibrary, watlowf4.py"
-FIELD = "seen on real chambers by several gateways"
-#: The controller needs this between two requests (ChamberConnectLibrary, modbus.py).
-PAUSE_S = 0.03
-#: From here down this family returns codes for absent or broken sensors (Watlow communications guide).
-LOWEST_COUNT = -31999
-
-MODEL = Register(0, "model", source="pymodbus driver of an F4 chamber")
-AIR = Register(100, "air temperature", "int16", "counts", low=LOWEST_COUNT, source=FIELD)
-MODE = Register(200, "mode", low=0, high=3, source=CCL)
-INPUT_STATE = Register(201, "state of digital input", source=CCL)
-SETPOINT = Register(300, "set point", "int16", "counts", low=LOWEST_COUNT, access="rw", source=FIELD)
-SETPOINT_LOW = Register(602, "set point low limit", "int16", "counts", access="rw", source=CCL)
-SETPOINT_HIGH = Register(603, "set point high limit", "int16", "counts", access="rw", source=CCL)
-DECIMALS = Register(606, "decimals of input 1", low=0, high=3, source=CCL)
-UNITS = Register(608, "units of input 1", low=0, high=3, source=CCL)
-SCALE = Register(901, "temperature scale", source=CCL)
-INPUT_FUNCTION = Register(1060, "function of digital input", source=CCL)
-INPUT_ACTIVE = Register(1061, "active state of digital input", source=CCL)
-TERMINATE = Register(1217, "end of the profile", low=1, high=1, access="w", source=CCL)
-EVENT = Register(2000, "event output", low=0, high=1, access="rw", source=CCL)
-INPUT_STRIDE, INPUT_SETUP_STRIDE, EVENT_STRIDE = 12, 2, 10
-
-MODEL_F4 = 5270
-TEMPERATURE, FAHRENHEIT = 0, 0
-PROFILE_RUNS, PROFILE_HELD = 2, 3
-WAITS_FOR = 10
+from instruments.transport.modbus import Registers
+from instruments.transport.modbus_link import Client
 
 
 class WatlowF4(Watlow):
@@ -53,50 +23,54 @@ class WatlowF4(Watlow):
             )
 
         registers = Registers(
-            self.name, settings.address, clock, link, pause_s=PAUSE_S, write_function=settings.write_function
+            self.name, settings.address, clock, link, pause_s=f4.PAUSE_S, write_function=settings.write_function
         )
         super().__init__(settings, registers, clock)
         self._counts_per_c: float | None = None
 
     def identify(self) -> str:
-        """Get model and units; raises WrongInstrument for another model, for Fahrenheit, for an input that is none."""
+        """Get model and resolution.
+
+        Raises WrongInstrument for another model, for Fahrenheit, for input 1 without temperature units, and for an
+        alarm input that a profile waits for; also what a register read raises.
+        """
         get = self._registers.get_int
-        if (model := get(MODEL)) != MODEL_F4:
-            raise self._wrong(f"the model register holds {model}, an F4's holds {MODEL_F4}")
-        if (units := get(UNITS)) != TEMPERATURE:
+        if (model := get(f4.MODEL)) != f4.MODEL_F4:
+            raise self._wrong(f"the model register holds {model}, an F4's holds {f4.MODEL_F4}")
+        if (units := get(f4.UNITS)) != f4.UNITS_TEMPERATURE:
             raise self._wrong(f"input 1 measures no temperature (its units are {units}, a temperature's are 0)")
-        if get(SCALE) == FAHRENHEIT:
+        if get(f4.SCALE) == f4.SCALE_FAHRENHEIT:
             raise self._wrong("the controller works in Fahrenheit, set it to Celsius at its front panel")
         for number in self.settings.alarm_inputs:
-            if get(INPUT_FUNCTION.nth(number, INPUT_SETUP_STRIDE)) == WAITS_FOR:
+            if get(f4.INPUT_FUNCTION.nth(number, f4.INPUT_SETUP_STRIDE)) == f4.FUNCTION_WAIT_FOR:
                 raise self._wrong(f"digital input {number} is a profile's wait-for input, not an alarm (alarm_inputs)")
         return f"Watlow F4, steps of {self._resolution_c():g} deg C"
 
-    def _scale(self) -> float:
-        """Return how many counts one kelvin is: ten to the number of implied decimals."""
+    def _read_scale(self) -> float:
+        """Return the counts per kelvin: ten to the number of implied decimals. Asks the controller once."""
         if self._counts_per_c is None:
-            self._counts_per_c = 10.0 ** self._registers.get_int(DECIMALS)
+            self._counts_per_c = 10.0 ** self._registers.get_int(f4.DECIMALS)
         return self._counts_per_c
 
     def _resolution_c(self) -> float:
-        return 1.0 / self._scale()
+        return 1.0 / self._read_scale()
 
     def _celsius(self, register: Register) -> float:
-        return self._registers.get(register) / self._scale()
+        return self._registers.get(register) / self._read_scale()
 
     def _controller_limits(self) -> tuple[float, float]:
-        return self._celsius(SETPOINT_LOW), self._celsius(SETPOINT_HIGH)
+        return self._celsius(f4.SETPOINT_LOW), self._celsius(f4.SETPOINT_HIGH)
 
     def _profile_runs(self) -> bool:
-        return self._registers.get_int(MODE) in {PROFILE_RUNS, PROFILE_HELD}
+        return self._registers.get_int(f4.MODE) in {f4.MODE_PROFILE_RUNNING, f4.MODE_PROFILE_HELD}
 
     def _end_profile(self) -> None:
-        self._registers.put(TERMINATE, 1)
+        self._registers.put(f4.TERMINATE, f4.TERMINATE_PROFILE)
 
     def _switch_on(self) -> None:
         if self.settings.enable_event is None:
             return
-        event = EVENT.nth(self.settings.enable_event, EVENT_STRIDE)
+        event = f4.EVENT.nth(self.settings.enable_event, f4.EVENT_STRIDE)
         if self._registers.get_int(event) != 1:
             self._registers.put(event, 1)
             if self._registers.get_int(event) != 1:
@@ -105,18 +79,18 @@ class WatlowF4(Watlow):
                 )
 
     def _write_setpoint(self, temperature_c: float) -> None:
-        self._registers.put(SETPOINT, round(temperature_c * self._scale()))
+        self._registers.put(f4.SETPOINT, round(temperature_c * self._read_scale()))
 
     def _read_setpoint(self) -> float:
-        return self._celsius(SETPOINT)
+        return self._celsius(f4.SETPOINT)
 
     def _read_air(self) -> float:
-        return self._celsius(AIR)
+        return self._celsius(f4.AIR)
 
     def _alarms(self) -> tuple[str, ...]:
-        """Return the digital inputs that signal; alarm registers of the F4 are not known to anybody who publishes."""
-        return tuple(f"digital input {number}" for number in self.settings.alarm_inputs if self._signals(number))
+        """Return the active alarm inputs; no public source lists alarm registers of the F4."""
+        return tuple(f"digital input {number}" for number in self.settings.alarm_inputs if self._is_active(number))
 
-    def _signals(self, number: int) -> bool:
-        state = self._registers.get_int(INPUT_STATE.nth(number, INPUT_STRIDE))
-        return state == self._registers.get_int(INPUT_ACTIVE.nth(number, INPUT_SETUP_STRIDE))
+    def _is_active(self, number: int) -> bool:
+        state = self._registers.get_int(f4.INPUT_STATE.nth(number, f4.INPUT_STRIDE))
+        return state == self._registers.get_int(f4.INPUT_ACTIVE.nth(number, f4.INPUT_SETUP_STRIDE))

@@ -1,1 +1,1 @@
-"""What each kind of instrument can do: table, chamber, gyro, unit handler. Units in every name."""
+"""Interfaces of the instruments: table, chamber, gyro, unit handler. Names carry their units."""

@@ -1,4 +1,4 @@
-"""What every thermal chamber can do. Temperatures in deg C."""
+"""Interface of thermal chambers. Temperatures in deg C."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class ChamberLimits:
     min_c: float
     max_c: float
     resolution_c: float  #: a set point is rounded to a multiple of this
-    ramp_c_per_min: float  #: how fast the air can follow, for planning
+    ramp_c_per_min: float  #: fastest ramp of the air, for planning
 
 
 @dataclass(frozen=True)
@@ -30,19 +30,19 @@ class Chamber(Protocol):
     """A thermal chamber. Every failure is an InstrumentError."""
 
     name: str
-    safe_c: float  #: the set point that every exit path leaves behind
+    safe_c: float  #: set point of the safe state
 
     @property
     def limits(self) -> ChamberLimits:
-        """Get what may be asked of the chamber."""
+        """Get the limits of set points; the first use may ask the controller and raise."""
         ...
 
     def identify(self) -> str:
-        """Get what the controller says it is; raises WrongInstrument when it is something else or not in deg C."""
+        """Get model or part number; raises WrongInstrument for another controller or units other than deg C."""
         ...
 
     def set_temperature_c(self, temperature_c: float) -> float:
-        """Control the set point: rounded, limited, written only on change, read back. Returns what was read back."""
+        """Control the set point: limited, rounded, written on change only. Returns the value read back."""
         ...
 
     def read(self) -> ChamberState:
@@ -50,7 +50,7 @@ class Chamber(Protocol):
         ...
 
     def make_safe(self) -> float:
-        """Control the chamber to its safe set point; returns what was read back."""
+        """Control the chamber to its safe set point; returns the value read back."""
         ...
 
     def close(self) -> None:

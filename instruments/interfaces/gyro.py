@@ -1,4 +1,4 @@
-"""What every gyro can do: stream readings exactly as the device sent them, with its own validity flags."""
+"""Interface of gyros: readings exactly as the device sent them, with its own validity flags."""
 
 from __future__ import annotations
 
@@ -26,21 +26,25 @@ class Channel:
 
 @dataclass(frozen=True)
 class Readings:
-    """A stretch of readings, n rows. `raw` holds whole numbers only: what the device sent, never scaled floats."""
+    """Consecutive readings, n rows. `raw` holds the integers that the device sent, never scaled floats."""
 
     t_s: NDArray[np.float64]  #: (n,) clock time of each reading
     raw: Mapping[str, NDArray[np.int64]]  #: channel name -> (n,)
     valid: NDArray[np.bool_]  #: (n,) False where the instrument marked the reading as bad
-    lost: int = 0  #: readings that the device's counter or the clock shows to be missing
-    damaged: int = 0  #: frames or lines that arrived but were not the protocol's (CRC, framing)
+    lost: int = 0  #: readings missing by the counter of the device or by the clock
+    damaged: int = 0  #: frames or lines that arrived malformed (CRC, framing)
 
     def __len__(self) -> int:
         return len(self.t_s)
 
+    def newest(self) -> Readings:
+        """Return the last reading alone, n = 1, without the counts of lost and damaged ones."""
+        return Readings(self.t_s[-1:], {name: values[-1:] for name, values in self.raw.items()}, self.valid[-1:])
+
 
 @dataclass(frozen=True)
 class GyroLimits:
-    """What the unit under calibration may be exposed to, from its bench file or data sheet."""
+    """Limits of exposure of the unit under calibration, from its bench file or data sheet."""
 
     max_rate_dps: float
     min_c: float
@@ -49,7 +53,7 @@ class GyroLimits:
 
 @dataclass(frozen=True)
 class GyroIdentity:
-    """What is known of the unit: from the device where it tells, else from the bench file."""
+    """Identity of the unit: from the device where the protocol has it, else from the bench file."""
 
     serial: str
     model: str
@@ -68,15 +72,15 @@ class Gyro(Protocol):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Get what a reading holds."""
+        """Get the channels of a reading."""
         ...
 
     def identify(self) -> GyroIdentity:
-        """Get who the unit is; raises WrongInstrument when the device tells another serial number."""
+        """Get the unit's identity; raises WrongInstrument when the device reports another one."""
         ...
 
     def start(self) -> None:
-        """Control the stream: open it and drop what is stale or partial."""
+        """Control the stream: open it and drop stale or partial data."""
         ...
 
     def read(self, duration_s: float) -> Readings:

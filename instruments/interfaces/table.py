@@ -1,4 +1,4 @@
-"""What every rate table can do. Angles in degrees, rates in deg/s, positive counter-clockwise seen from above."""
+"""Interface of rate tables. Angles in degrees, rates in deg/s, positive counter-clockwise seen from above."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class TableLimits:
-    """What the table can do, from its bench file and its driver."""
+    """Limits of the table, from its bench file and its driver."""
 
     max_rate_dps: float
     max_acceleration_dps2: float
@@ -20,12 +20,12 @@ class TableLimits:
 
 @dataclass(frozen=True)
 class Spin:
-    """One run at constant rate, as it was started: when it is steady and where the table is meanwhile.
+    """One run at constant rate: its steady part, and the table angle during it.
 
-    `rate_dps` is the reference: what the step timing really gives. It is never the rate asked for.
+    `rate_dps` is the reference: the rate that the step timing gives. It is never the requested rate.
     """
 
-    asked_dps: float
+    asked_dps: float  #: requested rate
     rate_dps: float
     steady_from_s: float  #: clock time
     steady_until_s: float
@@ -47,8 +47,8 @@ class Spin:
         period_s = self.step_deg / abs(self.rate_dps)
         edge = np.ceil((from_s - self.steady_from_s) / period_s - 1e-9)
         start_s = self.steady_from_s + edge * period_s
-        room = np.floor((self.steady_until_s - start_s) / period_s + 1e-9)
-        steps = min(np.ceil(duration_s / period_s - 1e-9), room)
+        available = np.floor((self.steady_until_s - start_s) / period_s + 1e-9)
+        steps = min(np.ceil(duration_s / period_s - 1e-9), available)
         return float(start_s), float(start_s + steps * period_s)
 
 
@@ -59,11 +59,11 @@ class RateTable(Protocol):
     limits: TableLimits
 
     def identify(self) -> str:
-        """Get what the controller says it is; raises WrongInstrument when it is something else."""
+        """Get the identity that the controller reports; raises WrongInstrument for another controller."""
         ...
 
     def achievable_dps(self, rate_dps: float) -> float:
-        """Get the rate the table would really run when asked for `rate_dps`; raises LimitError beyond its limits."""
+        """Get the achievable rate nearest to `rate_dps`, deg/s; raises LimitError beyond the table's limits."""
         ...
 
     def home(self) -> None:
@@ -73,16 +73,16 @@ class RateTable(Protocol):
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
         """Control the table to a constant rate that stays steady for at least `steady_s`; returns when it is steady.
 
-        The table comes to rest by itself when the run is over. Rate 0 is a run at rest.
+        The table comes to rest by itself at the end of the run. Rate 0 is a run at rest.
         """
         ...
 
     def settle(self, spin: Spin) -> None:
-        """Control the end of a run: return once the table confirms that it stands still again."""
+        """Control the end of a run: return when the table confirms that it is at rest."""
         ...
 
     def stop(self) -> None:
-        """Control the table to rest, whatever it is doing. Safe to call at any time, also twice."""
+        """Control the table to rest. Safe to call at any time, also twice."""
         ...
 
     def is_moving(self) -> bool:
@@ -94,5 +94,5 @@ class RateTable(Protocol):
         ...
 
     def close(self) -> None:
-        """Control the link: close it. The table is not stopped by this."""
+        """Control the link: close it. This does not stop the table."""
         ...

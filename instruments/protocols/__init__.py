@@ -1,1 +1,1 @@
-"""What is on the wire, as data and pure functions. Opens nothing."""
+"""Wire formats of the instruments as data and pure functions; this package opens no port and keeps no state."""

@@ -1,4 +1,4 @@
-"""Modbus registers as data: number, meaning, type, unit, range, access, source; and what their words mean."""
+"""Modbus registers as data: number, meaning, type, unit, range, access and source; encoding of their words."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ WordOrder = Literal["little", "big"]  #: of 32-bit floats: low word first, or hi
 
 @dataclass(frozen=True)
 class Register:
-    """One quantity of an instrument, as its manual lists it. Numbers go on the wire as written (zero-based)."""
+    """One quantity of an instrument, as its manual lists it. The number is sent as written (zero-based)."""
 
     number: int
     meaning: str
     kind: Literal["int16", "uint16", "float32"] = "uint16"
     unit: str = ""
-    low: float = -float("inf")  #: what can be read from it or written to it, in `unit` or counts
+    low: float = -float("inf")  #: lowest and highest value that the register can hold, in `unit` or counts
     high: float = float("inf")
     access: Literal["r", "rw", "w"] = "r"
-    source: str = ""  #: where the number is from
+    source: str = ""  #: manual or project that the number is from
     read_function: Literal[3, 4] = 3
 
     @property
     def words(self) -> int:
-        """How many 16-bit registers it takes."""
+        """Number of 16-bit words of the value."""
         return 2 if self.kind == "float32" else 1
 
     def nth(self, n: int, stride: int, *, first: int = 1) -> Register:
@@ -33,15 +33,15 @@ class Register:
         return replace(self, number=self.number + stride * (n - first), meaning=f"{self.meaning} {n}")
 
     def read_by(self, function: Literal[3, 4]) -> Register:
-        """Return the register as read by another function."""
+        """Return the same register, read by another function code."""
         return replace(self, read_function=function)
 
     def holds(self, value: float) -> bool:
-        """Whether the register can hold a value; nothing holds NaN."""
+        """Return whether a value lies within the range of the register; NaN never does."""
         return self.low <= value <= self.high
 
     def decode(self, words: list[int], order: WordOrder) -> float:
-        """Return the value of its unsigned words."""
+        """Return the value of unsigned words, in `unit` or counts."""
         if self.kind == "float32":
             high, low = words if order == "big" else reversed(words)
             (value,) = struct.unpack(">f", struct.pack(">HH", high, low))
@@ -49,7 +49,7 @@ class Register:
         return words[0] - 0x10000 if self.kind == "int16" and words[0] >= 0x8000 else words[0]
 
     def encode(self, value: float, order: WordOrder) -> list[int]:
-        """Return the unsigned words of a value; an integer as two's complement."""
+        """Return the unsigned words of a value; an integer is encoded as two's complement."""
         if self.kind == "float32":
             high, low = struct.unpack(">HH", struct.pack(">f", value))
             return [high, low] if order == "big" else [low, high]

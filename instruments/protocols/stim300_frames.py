@@ -1,21 +1,41 @@
-"""STIM300 datagrams: layouts, CRC and a scanner that finds every whole frame, vectorised.
+"""STIM300 datagrams (data sheet TS1524): scales, layouts, CRC and a vectorised scanner for intact frames.
 
 The CRC (polynomial 04C11DB7, start FFFFFFFF, most significant bit first, no final exclusive or) is linear over GF(2):
-that of a frame is the exclusive or of one table entry for each pair of its bytes. Frames stand at a fixed stride nearly
-always, so the stride is checked first, and only gaps are searched byte by byte.
+the CRC of a frame is the exclusive or of one table entry for each pair of its bytes. Frames nearly always follow each
+other at a fixed stride, so the scanner checks the stride first and searches only the gaps byte by byte.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.bench_config import Strict
+
 Bytes = NDArray[np.uint8]
 POLYNOMIAL = 0x04C11DB7
 CHUNK = 2048  #: frames that are checked together: their tables and columns stay in the cache
+AXES = ("x", "y", "z")
+RATE_PER_LSB = 2.0**-14  #: deg/s
+TEMPERATURE_PER_LSB = 2.0**-8  #: deg C
+COUNTS_PER_S = 2000  #: the counter of a datagram counts internal samples
+#: Status bits that make a reading invalid: integrity, start-up, outside conditions, overload, channel error.
+BAD_STATUS = 0xF8
+OVERLOAD = 0x10
+#: The output saturates at this rate, deg/s; a reading at the rail is not a measurement (data sheet, table 5-3).
+SATURATION_DPS = 480.0
+
+
+class DatagramOptions(Strict):
+    """Configuration of the unit's output: datagram, line end, bit rate in bit/s."""
+
+    datagram: Literal[0x90, 0x94, 0xA7] = 0x94
+    crlf: bool = False
+    baudrate: int = 460_800
 
 
 def crc32_mpeg2(data: bytes, start: int = 0xFFFFFFFF) -> int:
@@ -30,7 +50,7 @@ def crc32_mpeg2(data: bytes, start: int = 0xFFFFFFFF) -> int:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things stand in a datagram; offsets in bytes (data sheet TS1524, section 5.5.6)."""
+    """Offsets of the fields of a datagram, bytes (data sheet TS1524, section 5.5.6)."""
 
     id: int
     length: int  #: without CR LF
@@ -98,9 +118,14 @@ LAYOUTS = {
 }
 
 
+def layout_of(options: DatagramOptions) -> Layout:
+    """Return the layout of the datagrams that a unit is configured to send."""
+    return replace(LAYOUTS[options.datagram], crlf=options.crlf)
+
+
 @dataclass(frozen=True)
 class Scan:
-    """What was found in a stretch of bytes: whole frames (n, stride), bytes left over, frames' worth of damage."""
+    """Result of a scan: intact frames (n, stride), unfinished bytes at the end, damage in numbers of frames."""
 
     frames: Bytes
     rest: bytes
@@ -108,9 +133,9 @@ class Scan:
 
 
 def scan(data: bytes, layout: Layout) -> Scan:
-    """Find every intact frame in `data`; the unfinished end comes back as `rest`."""
+    """Find every intact frame in `data`; `rest` holds the unfinished end, for the next scan."""
     raw = np.frombuffer(data, dtype=np.uint8)
-    stride, found, at, garbage = layout.stride, [], 0, 0
+    stride, found, at, skipped = layout.stride, [], 0, 0
     while len(raw) - at >= stride:
         n = min((len(raw) - at) // stride, CHUNK)
         frames = raw[at : at + n * stride].reshape(n, stride)
@@ -121,15 +146,15 @@ def scan(data: bytes, layout: Layout) -> Scan:
             continue
         last = _last_at_stride(good)
         found.append(frames[:last][good[:last]])
-        garbage += int((~good[:last]).sum()) * stride
+        skipped += int((~good[:last]).sum()) * stride
         at += last * stride
         ahead = _next_intact(raw, at, layout)
-        garbage += ahead - at
+        skipped += ahead - at
         at = ahead
     return Scan(
         np.concatenate(found) if found else np.zeros((0, stride), dtype=np.uint8),
         raw[at:].tobytes(),
-        -(-garbage // stride),
+        -(-skipped // stride),
     )
 
 

@@ -1,1 +1,1 @@
-"""Simulated instruments: bytes in, bytes out, and the physics they share. Reached by ports.py and tests only."""
+"""Simulated instruments: bytes in, bytes out, and the physics they share. Imported by instruments.simulation only."""

@@ -1,4 +1,4 @@
-"""A simulated ADAM-6017: a Gyrostar's voltage on one input, its thermometer's on another, over Modbus TCP."""
+"""A simulated ADAM-6017 over Modbus TCP: the voltages of a Gyrostar and of a thermometer as input codes."""
 
 from __future__ import annotations
 
@@ -6,38 +6,45 @@ from functools import partial
 
 import numpy as np
 
-from instruments.bench_config import BenchFile
-from instruments.drivers.gyrostar import CHANNELS, FULL_CODE, RANGES_V, Options
-from instruments.simulators.links.faults import Faults
+from instruments.protocols.adam6017 import (
+    CHANNELS,
+    FULL_CODE,
+    INPUT,
+    MODULE_6017,
+    MODULE_NAME,
+    RANGE_CODE,
+    RANGES_V,
+    WiringOptions,
+)
 from instruments.simulators.links.modbus_device import ModbusDevice, int16, items
-from instruments.simulators.physics.world import World
+from instruments.simulators.setup import InstrumentSetup
 
+#: Range code of an input that carries nothing.
 UNUSED_RANGE = 0x0143
 
 
 def code_of(volts: float, range_code: int) -> int:
-    """Return the unsigned 16-bit code of a voltage: 0 and 65535 are the ends of the range, beyond them it clips."""
+    """Return the unsigned 16-bit code of a voltage, V: 0 and 65535 at the ends of the range, clipped beyond them."""
     low, high = RANGES_V[range_code]
     return round(min(max((volts - low) / (high - low), 0.0), 1.0) * FULL_CODE)
 
 
-class Adam6017(ModbusDevice):
-    """The world's Gyrostar as codes of the module's inputs; inputs that carry nothing read mid-scale."""
+class SimulatedAdam6017(ModbusDevice):
+    """The world's Gyrostar as codes of the module's inputs; unused inputs read mid-scale."""
 
-    def __init__(self, world: World, bench: BenchFile, gyro: str, faults: Faults) -> None:
-        settings = next(g for g in bench.gyros if g.name == gyro)
-        self._wiring = Options.model_validate(settings.options)
-        self._unit = world.gyro(gyro)
+    def __init__(self, setup: InstrumentSetup) -> None:
+        self._wiring = WiringOptions.model_validate(setup.gyro.options)
+        self._unit = setup.unit
         self._sampled_s = float("-inf")
-        self.module_name = 0x6017
+        self.module_name = MODULE_6017
         self.codes = [FULL_CODE // 2] * CHANNELS
-        self.ranges = [self._wiring.wired.get(n, UNUSED_RANGE) for n in range(CHANNELS)]
+        self.ranges = [self._wiring.range_codes.get(n, UNUSED_RANGE) for n in range(CHANNELS)]
         cells = {
-            **{n: int16(partial(self._code, n)) for n in range(CHANNELS)},
-            **items(200, 1, self.ranges),
-            210: int16(lambda _: self.module_name),
+            **{INPUT.number + n: int16(partial(self._code, n)) for n in range(CHANNELS)},
+            **items(RANGE_CODE.number, 1, self.ranges),
+            MODULE_NAME.number: int16(lambda _: self.module_name),
         }
-        super().__init__("tcp", cells, faults, self._wiring.address)
+        super().__init__("tcp", cells, setup.faults, self._wiring.address)
 
     def _code(self, channel: int, t_s: float) -> int:
         if t_s > self._sampled_s:

@@ -1,20 +1,22 @@
-"""A simulated C4: the confirmed subset of its wire, and a speed and a ramp command of our own invention."""
+"""A simulated Arrick C4: the public commands, and speed and ramp commands that only this simulator knows."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
 
-from instruments.bench_config import BenchFile
-from instruments.simulators.links.faults import Faults
-from instruments.simulators.physics.world import World
+from instruments.protocols import arrick_c4_lines as lines
+from instruments.simulators.setup import InstrumentSetup
 
 BITS_PER_BYTE = 10
-MOVE = re.compile(r"m1([fr])(\d+)n")
 SPEED = re.compile(r"sp1,(\d+)")
 RAMP = re.compile(r"ra1,(\d+)")
-REFUSAL = "e"
-LONGEST = 80
+#: The controller also accepts the home command of two motors.
+HOME_COMMANDS = frozenset({lines.HOME, "h12"})
+IDENTITY = "C4 simulated\r\n"
+REFUSED, BUSY = "e", "1"
+MAX_COMMAND_BYTES = 80
+CR = 0x0D
 
 
 @dataclass
@@ -26,24 +28,25 @@ class _Reply:
 class SimulatedC4:
     """A C4 controller with one motor, on the world's table."""
 
-    def __init__(self, world: World, bench: BenchFile, gyro: str, faults: Faults) -> None:  # noqa: ARG002  not a gyro's
-        self._world, self._faults = world, faults
-        self._byte_s = BITS_PER_BYTE / bench.table.baudrate
-        self._clock_hz = bench.table.step_clock_hz
-        self._acceleration_dps2 = bench.table.acceleration_dps2
-        self._step_deg = 360.0 / bench.table.steps_per_turn
-        self._direction = bench.table.direction
+    def __init__(self, setup: InstrumentSetup) -> None:
+        table = setup.bench.table
+        self._world, self._faults = setup.world, setup.faults
+        self._byte_s = BITS_PER_BYTE / table.baudrate
+        self._clock_hz = table.step_clock_hz
+        self._acceleration_dps2 = table.acceleration_dps2
+        self._step_deg = 360.0 / table.steps_per_turn
+        self._direction = table.direction
         self._divisor: int | None = None
         self._line = bytearray()
         self._replies: list[_Reply] = []
 
     def receive(self, data: bytes, t_s: float) -> None:
-        """Take bytes; a command is done when its CR arrives."""
+        """Take bytes; a command is executed when its CR arrives."""
         for byte in data:
-            if byte == 0x0D:
+            if byte == CR:
                 command, self._line = self._line.decode("latin-1"), bytearray()
-                self._obey(command, t_s)
-            elif len(self._line) < LONGEST:
+                self._execute(command, t_s)
+            elif len(self._line) < MAX_COMMAND_BYTES:
                 self._line.append(byte)
 
     def transmit(self, t_s: float) -> bytes:
@@ -56,52 +59,56 @@ class SimulatedC4:
         """Lose the replies that are due."""
         self.transmit(t_s)
 
-    def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  what waits is known
+    def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the times of all replies are known
         """Return when the next reply is due."""
         return min((reply.due_s for reply in self._replies), default=None)
 
-    def _say(self, text: str, t_s: float) -> float:
-        due = t_s + len(text) * self._byte_s
-        self._replies.append(_Reply(due, text.encode("ascii")))
-        return due
+    def _reply(self, text: str, t_s: float) -> float:
+        """Queue a reply; returns when its last byte is sent."""
+        due_s = t_s + len(text) * self._byte_s
+        self._replies.append(_Reply(due_s, text.encode("ascii")))
+        return due_s
 
-    def _obey(self, command: str, t_s: float) -> None:
-        if not command.startswith("!1"):
-            return  # another unit's, or noise
-        body = command[2:]
-        if self._faults.strike(["refusal"], t_s) is not None:
-            self._say(REFUSAL, t_s)
-        elif body == "fp":
-            self._say("C4 simulated\r\n", t_s)
-        elif body == "rs":
-            self._say("1" if self._world.table.moving(t_s) else "0", t_s)
-        elif body == "a":
+    def _execute(self, command: str, t_s: float) -> None:
+        if not command.startswith(lines.PREFIX):
+            return  # to another controller, or noise
+        body = command[len(lines.PREFIX) :]
+        if self._faults.trigger(["refusal"], t_s) is not None:
+            self._reply(REFUSED, t_s)
+        elif body == lines.IDENTIFY:
+            self._reply(IDENTITY, t_s)
+        elif body == lines.STATE:
+            self._reply(BUSY if self._world.table.moving(t_s) else lines.IDLE, t_s)
+        elif body == lines.ABORT:
             self._replies.clear()
             self._world.table.abort(t_s)
-            self._say("a", t_s)
-        elif body in {"h1", "h12"}:
+            self._reply(lines.ACCEPTED, t_s)
+        elif body in HOME_COMMANDS:
             self._finish(self._world.table.home(t_s), t_s)
-        elif match := SPEED.fullmatch(body):
+        else:
+            self._program_or_move(body, t_s)
+
+    def _program_or_move(self, body: str, t_s: float) -> None:
+        if match := SPEED.fullmatch(body):
             self._divisor = max(int(match[1]), 1)
-            self._say("a", t_s)
+            self._reply(lines.ACCEPTED, t_s)
         elif match := RAMP.fullmatch(body):
             self._acceleration_dps2 = max(int(match[1]), 1) * self._step_deg
-            self._say("a", t_s)
-        elif (match := MOVE.fullmatch(body)) and self._divisor and not self._world.table.moving(t_s):
-            self._move(match[1], int(match[2]), t_s)
+            self._reply(lines.ACCEPTED, t_s)
+        elif (match := lines.MOVE.fullmatch(body)) and self._divisor and not self._world.table.moving(t_s):
+            self._move(match[1], int(match[2]), self._divisor, t_s)
         else:
-            self._say(REFUSAL, t_s)
+            self._reply(REFUSED, t_s)
 
-    def _move(self, way: str, steps: int, t_s: float) -> None:
-        assert self._divisor is not None
-        begins = self._say("a", t_s)
+    def _move(self, way: str, steps: int, divisor: int, t_s: float) -> None:
+        start_s = self._reply(lines.ACCEPTED, t_s)
         signed = (steps if way == "f" else -steps) * self._direction
-        step_hz = self._clock_hz / self._divisor
-        ends = self._world.table.start(begins, signed, step_hz, self._acceleration_dps2)
-        if self._faults.strike(["stall"], t_s) is not None:
-            ends = self._world.table.abort(begins + 0.3 * (ends - begins))
-        self._finish(ends, t_s)
+        step_hz = self._clock_hz / divisor
+        end_s = self._world.table.start(start_s, signed, step_hz, self._acceleration_dps2)
+        if self._faults.trigger(["stall"], t_s) is not None:
+            end_s = self._world.table.abort(start_s + 0.3 * (end_s - start_s))
+        self._finish(end_s, t_s)
 
-    def _finish(self, ends_s: float, t_s: float) -> None:
-        if self._faults.strike(["lost_reply"], t_s) is None:
-            self._replies.append(_Reply(ends_s + self._byte_s, b"o"))
+    def _finish(self, end_s: float, t_s: float) -> None:
+        if self._faults.trigger(["lost_reply"], t_s) is None:
+            self._replies.append(_Reply(end_s + self._byte_s, lines.FINISHED.encode("ascii")))

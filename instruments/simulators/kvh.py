@@ -1,4 +1,4 @@
-"""Simulated KVH gyros: lines of text at their own pace."""
+"""Simulated KVH gyros: one text line per sampling interval, whether or not the port is read."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from instruments.bench_config import BenchFile
-from instruments.drivers.kvh import DSP3000, RD2100, LineFormat
-from instruments.simulators.links.faults import Faults
-from instruments.simulators.physics.world import World
+from instruments.protocols.kvh_lines import DSP3000, RD2100, LineFormat
+from instruments.simulators.setup import InstrumentSetup
 
-#: Lines that a port can hold: older ones are skipped.
-MOST_LINES = 400
+#: Lines that a port can hold; older ones are lost.
+MAX_LINES = 400
+#: A DSP-3000 clears its valid flag beyond this rate.
+DSP3000_FLAG_DPS = 500
 RD2100_LSB_DPS = 0.000305
 
 
@@ -21,35 +21,35 @@ class _SimulatedLines(ABC):
 
     format: LineFormat
 
-    def __init__(self, world: World, bench: BenchFile, gyro: str, faults: Faults) -> None:  # noqa: ARG002
-        self._unit, self._faults = world.gyro(gyro), faults
+    def __init__(self, setup: InstrumentSetup) -> None:
+        self._unit, self._faults = setup.unit, setup.faults
         self._rate_hz = self._unit.sample_rate_hz
         self._sent = 0
 
     def receive(self, data: bytes, t_s: float) -> None:
-        """Take mode letters, without an answer; the mode asked for is the one it is in."""
+        """Take mode letters without a reply; the requested mode is the present one."""
         del data, t_s
 
     def transmit(self, t_s: float) -> bytes:
-        """Return the lines up to now."""
+        """Return the lines up to `t_s`."""
         newest = int(np.floor(t_s * self._rate_hz + 1e-9))
         if newest <= self._sent:
             return b""
-        index = np.arange(max(self._sent + 1, newest - MOST_LINES + 1), newest + 1)
+        index = np.arange(max(self._sent + 1, newest - MAX_LINES + 1), newest + 1)
         self._sent = newest
         sample = self._unit.sample(index / self._rate_hz)
         lines = [
             self.line(self.format.sign * float(rate[0]), float(warm[0]))
             for rate, warm in zip(sample.rate_dps, sample.temperature_c, strict=True)
         ]
-        if self._faults.strike(["wrong_crc"], t_s) is not None:
+        if self._faults.trigger(["wrong_crc"], t_s) is not None:
             lines[0] = "?" + lines[0][1:]
-        if (gap := self._faults.strike(["counter_gap"], t_s)) is not None:
+        if (gap := self._faults.trigger(["counter_gap"], t_s)) is not None:
             lines = lines[gap.value :]
         return "".join(line + "\r\n" for line in lines).encode("ascii")
 
     def skip(self, t_s: float) -> None:
-        """Lose the lines up to now."""
+        """Lose the lines up to `t_s`."""
         self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))
 
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the stream never waits
@@ -58,7 +58,7 @@ class _SimulatedLines(ABC):
 
     @abstractmethod
     def line(self, rate_dps: float, temperature_c: float) -> str:
-        """Return one line without its end."""
+        """Return one line without its line end."""
 
 
 class SimulatedDsp3000(_SimulatedLines):
@@ -66,13 +66,13 @@ class SimulatedDsp3000(_SimulatedLines):
 
     format = DSP3000
 
-    def line(self, rate_dps: float, temperature_c: float) -> str:  # noqa: ARG002  this line has none
+    def line(self, rate_dps: float, temperature_c: float) -> str:  # noqa: ARG002  the line has no temperature
         """Return one line."""
-        return f"{rate_dps:15.6f}   {1 if abs(rate_dps) < 500 else 0}"
+        return f"{rate_dps:15.6f}   {1 if abs(rate_dps) < DSP3000_FLAG_DPS else 0}"
 
 
 class SimulatedRd2100(_SimulatedLines):
-    """The rate in whole bits of the unit, and the temperature."""
+    """The rate in whole steps of the unit's resolution, and the temperature."""
 
     format = RD2100
 

@@ -1,51 +1,52 @@
-"""A simulated STIM300: it sends datagrams at its sample rate from power-on, whether anybody listens or not."""
+"""A simulated STIM300: one datagram per sampling interval from power-on, whether or not the port is read."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from instruments.bench_config import BenchFile
-from instruments.drivers.stim300 import COUNTS_PER_S, RATE_PER_LSB, SATURATION_DPS, TEMPERATURE_PER_LSB, Options
-from instruments.protocols.stim300_frames import LAYOUTS, Bytes
-from instruments.simulators.links.faults import Faults
-from instruments.simulators.physics.world import World
+from instruments.protocols.stim300_frames import (
+    AXES,
+    COUNTS_PER_S,
+    OVERLOAD,
+    RATE_PER_LSB,
+    SATURATION_DPS,
+    TEMPERATURE_PER_LSB,
+    Bytes,
+    DatagramOptions,
+    layout_of,
+)
+from instruments.simulators.setup import InstrumentSetup
 
-AXES = ("x", "y", "z")
-OVERLOAD = 0x10
 LATENCY_US = 506
 
 
 class SimulatedStim300:
-    """Encodes the world's unit; what nobody read in time is skipped, as a full port would lose it."""
+    """Encodes the world's unit; frames that do not fit into the port's buffer are lost."""
 
-    def __init__(self, world: World, bench: BenchFile, gyro: str, faults: Faults) -> None:
-        settings = next(g for g in bench.gyros if g.name == gyro)
-        options = Options.model_validate(settings.options)
-        self._layout = replace(LAYOUTS[options.datagram], crlf=options.crlf)
-        self._unit, self._faults = world.gyro(gyro), faults
-        self._columns = [AXES.index(axis) for axis in settings.axes]
+    def __init__(self, setup: InstrumentSetup) -> None:
+        self._layout = layout_of(DatagramOptions.model_validate(setup.gyro.options))
+        self._unit, self._faults = setup.unit, setup.faults
+        self._columns = [AXES.index(axis) for axis in setup.gyro.axes]
         self._rate_hz = self._unit.sample_rate_hz
         self._step = round(COUNTS_PER_S / self._rate_hz)
         self._sent = 0  #: index of the newest frame sent
-        self._most = world.room_bytes // self._layout.stride + 1
+        self._max_frames = setup.port_buffer_bytes // self._layout.stride + 1
 
     def receive(self, data: bytes, t_s: float) -> None:
         """Normal mode answers no command that the driver uses."""
 
     def transmit(self, t_s: float) -> bytes:
-        """Return the frames up to now."""
+        """Return the frames up to `t_s`."""
         newest = int(np.floor(t_s * self._rate_hz + 1e-9))
         if newest <= self._sent:
             return b""
-        first = max(self._sent + 1, newest - self._most + 1)
+        first = max(self._sent + 1, newest - self._max_frames + 1)
         index = np.arange(first, newest + 1)
         self._sent = newest
         return self._encode(index, t_s).tobytes()
 
     def skip(self, t_s: float) -> None:
-        """Lose the frames up to now."""
+        """Lose the frames up to `t_s`."""
         self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))
 
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the stream never waits
@@ -68,13 +69,13 @@ class SimulatedStim300:
             codes = np.rint(warm / TEMPERATURE_PER_LSB).astype(">i2")
             frames[:, layout.temperature : layout.temperature + 6] = codes.view(np.uint8).reshape(n, 6)
         skip = 0
-        if (gap := self._faults.strike(["counter_gap"], t_s)) is not None:
+        if (gap := self._faults.trigger(["counter_gap"], t_s)) is not None:
             skip = gap.value
         frames[:, layout.counter] = (index * self._step) % 256
         frames[:, layout.counter + 1 : layout.counter + 3] = np.array([LATENCY_US], dtype=">u2").view(np.uint8)
         frames[:, layout.covered : layout.length] = layout.crc(frames).astype(">u4").view(np.uint8).reshape(n, 4)
         if layout.crlf:
             frames[:, layout.length :] = (0x0D, 0x0A)
-        if self._faults.strike(["wrong_crc"], t_s) is not None:
+        if self._faults.trigger(["wrong_crc"], t_s) is not None:
             frames[0, layout.covered] ^= 0x55
         return frames[skip:]

@@ -2,59 +2,59 @@
 
 from __future__ import annotations
 
-from instruments.bench_config import BenchFile
-from instruments.simulators.links.faults import Faults
+from instruments.protocols import watlow_f4_registers as f4
 from instruments.simulators.links.modbus_device import Cell, ModbusDevice, constant, int16, items
-from instruments.simulators.physics.world import World
+from instruments.simulators.setup import InstrumentSetup
 
-ROOM_C = 25.0
-EVENTS, INPUTS = 8, 4
-STATIC, PROFILE_RUNS = 0, 2
+AMBIENT_C = 25.0
+#: Registers that exist on the controller and that no driver reads.
+UNUSED_REGISTERS = (1, 2, 5, 600, 607)
 
 
 class SimulatedF4(ModbusDevice):
-    """Signed counts with implied decimals; what a person sets at its panel are attributes."""
+    """Signed counts with implied decimals; the settings of its front panel are attributes."""
 
-    def __init__(self, world: World, bench: BenchFile, gyro: str, faults: Faults) -> None:  # noqa: ARG002  not a gyro's
-        self._world = world
-        self.model = 5270
+    def __init__(self, setup: InstrumentSetup) -> None:
+        chamber = setup.bench.chamber
+        self._world = setup.world
+        self.model = f4.MODEL_F4
         self.decimals = 1
         self.scale = 1  #: 0: Fahrenheit
-        self.units = 0
-        self.mode = STATIC
-        self.setpoint = round(ROOM_C * self.counts_per_c)
-        self.min_c, self.max_c = bench.chamber.min_c, bench.chamber.max_c
-        self.on_run_page = True  #: elsewhere it answers writes and does nothing
+        self.units = f4.UNITS_TEMPERATURE
+        self.mode = f4.MODE_STATIC
+        self.setpoint = round(AMBIENT_C * self.counts_per_c)
+        self.min_c, self.max_c = chamber.min_c, chamber.max_c
+        self.on_run_page = True  #: on another page it acknowledges writes and ignores them
         self.sensor_code: int | None = None  #: sent instead of a measurement
-        self.writes: list[int] = []  #: set points written, as they would wear the EEPROM
-        self.inputs, self.input_functions, self.active_states = [0] * INPUTS, [0] * INPUTS, [1] * INPUTS
-        self.events = [1] * EVENTS
-        if bench.chamber.enable_event is not None:
-            self.events[bench.chamber.enable_event - 1] = 0
-        super().__init__("rtu", self._make_cells(), faults, bench.chamber.address)
+        self.writes: list[int] = []  #: every written set point: each one wears the EEPROM
+        self.inputs, self.input_functions, self.active_states = [0] * f4.INPUTS, [0] * f4.INPUTS, [1] * f4.INPUTS
+        self.events = [1] * f4.EVENTS
+        if chamber.enable_event is not None:
+            self.events[chamber.enable_event - 1] = 0
+        super().__init__("rtu", self._make_cells(), setup.faults, chamber.address)
 
     @property
     def counts_per_c(self) -> int:
-        """How many counts one kelvin is."""
+        """Counts per kelvin."""
         return int(10**self.decimals)
 
     def _make_cells(self) -> dict[int, Cell]:
         return {
-            0: int16(lambda _: self.model),
-            100: int16(self._air),
-            200: int16(lambda _: self.mode),
-            300: int16(lambda _: self.setpoint, self._set),
-            602: int16(lambda _: self.min_c * self.counts_per_c),
-            603: int16(lambda _: self.max_c * self.counts_per_c),
-            606: int16(lambda _: self.decimals),
-            608: int16(lambda _: self.units),
-            901: int16(lambda _: self.scale),
-            1217: Cell(lambda _: (0,), self._terminate),
-            **items(201, 12, self.inputs),
-            **items(1060, 2, self.input_functions),
-            **items(1061, 2, self.active_states),
-            **{2000 + 10 * n: self._event(n) for n in range(EVENTS)},
-            **{number: constant(0) for number in (1, 2, 5, 600, 607)},
+            f4.MODEL.number: int16(lambda _: self.model),
+            f4.AIR.number: int16(self._air),
+            f4.MODE.number: int16(lambda _: self.mode),
+            f4.SETPOINT.number: int16(lambda _: self.setpoint, self._set),
+            f4.SETPOINT_LOW.number: int16(lambda _: self.min_c * self.counts_per_c),
+            f4.SETPOINT_HIGH.number: int16(lambda _: self.max_c * self.counts_per_c),
+            f4.DECIMALS.number: int16(lambda _: self.decimals),
+            f4.UNITS.number: int16(lambda _: self.units),
+            f4.SCALE.number: int16(lambda _: self.scale),
+            f4.TERMINATE.number: Cell(lambda _: (0,), self._terminate),
+            **items(f4.INPUT_STATE.number, f4.INPUT_STRIDE, self.inputs),
+            **items(f4.INPUT_FUNCTION.number, f4.INPUT_SETUP_STRIDE, self.input_functions),
+            **items(f4.INPUT_ACTIVE.number, f4.INPUT_SETUP_STRIDE, self.active_states),
+            **{f4.EVENT.number + f4.EVENT_STRIDE * n: self._event(n) for n in range(f4.EVENTS)},
+            **{number: constant(0) for number in UNUSED_REGISTERS},
         }
 
     def _air(self, t_s: float) -> float:
@@ -70,8 +70,8 @@ class SimulatedF4(ModbusDevice):
         return True
 
     def _terminate(self, words: list[int], _t_s: float) -> bool:
-        self.mode = STATIC
-        return words == [1]
+        self.mode = f4.MODE_STATIC
+        return words == [f4.TERMINATE_PROFILE]
 
     def _event(self, n: int) -> Cell:
         def put(value: int, _t_s: float) -> bool:

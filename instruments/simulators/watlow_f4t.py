@@ -2,50 +2,51 @@
 
 from __future__ import annotations
 
-from instruments.bench_config import BenchFile
-from instruments.simulators.links.faults import Faults
+from instruments.protocols import watlow_f4t_registers as f4t
 from instruments.simulators.links.modbus_device import Cell, ModbusDevice, constant, float32, int16, items
-from instruments.simulators.physics.world import World
+from instruments.simulators.setup import InstrumentSetup
 
-ROOM_C = 25.0
-ALARMS = 4
-AUTO, QUIET, NO_PROFILE = 10, 61, 1782
+AMBIENT_C = 25.0
+PART_NUMBER = "F4T1A1A1A1A1A1A"
+#: Registers that exist on the controller and that no driver reads.
+CONTROL_MODE_COPY, SETPOINT_COPY, UNITS_COPY = 2730, 2810, 14080
 
 
 class SimulatedF4T(ModbusDevice):
-    """Low word first unless the bench file says otherwise; what a person sets at its panel are attributes."""
+    """Low word first unless the bench file says otherwise; the settings of its front panel are attributes."""
 
-    def __init__(self, world: World, bench: BenchFile, gyro: str, faults: Faults) -> None:  # noqa: ARG002  not a gyro's
-        self._world = world
-        self._order = bench.chamber.word_order
-        self.part_number = [ord(letter) for letter in "F4T1A1A1A1A1A1A"]
-        self.status = 138
-        self.units = 15  #: 30: Fahrenheit
-        self.control_mode = AUTO
-        self.profile_state = NO_PROFILE
-        self.alarms = [QUIET] * ALARMS
-        self.setpoint_c = ROOM_C
-        self.min_c, self.max_c = bench.chamber.min_c, bench.chamber.max_c
-        self.writes: list[float] = []  #: set points written, as they would wear the EEPROM
-        super().__init__("tcp", self._make_cells(), faults, bench.chamber.address)
+    def __init__(self, setup: InstrumentSetup) -> None:
+        chamber = setup.bench.chamber
+        self._world = setup.world
+        self._order = chamber.word_order
+        self.part_number = [ord(letter) for letter in PART_NUMBER]
+        self.status = f4t.STATUS_OK
+        self.units = f4t.UNITS_CELSIUS  #: 30: Fahrenheit
+        self.control_mode = f4t.MODE_AUTO
+        self.profile_state = f4t.PROFILE_NOT_STARTED
+        self.alarms = [f4t.ALARM_NONE] * f4t.ALARMS
+        self.setpoint_c = AMBIENT_C
+        self.min_c, self.max_c = chamber.min_c, chamber.max_c
+        self.writes: list[float] = []  #: every written set point: each one wears the EEPROM
+        super().__init__("tcp", self._make_cells(), setup.faults, chamber.address)
 
     def _make_cells(self) -> dict[int, Cell]:
         order = self._order
         return {
-            **items(16, 1, self.part_number),
-            90: int16(lambda _: self.status),
-            6730: int16(lambda _: self.units),
-            14080: int16(lambda _: self.units),
-            2730: constant(AUTO),
-            2814: int16(lambda _: self.control_mode),
-            16566: Cell(lambda _: (0,), self._act),
-            16568: int16(lambda _: self.profile_state),
-            **items(1356, 100, self.alarms),
-            2774: float32(order, lambda _: self.min_c),
-            2776: float32(order, lambda _: self.max_c),
-            2782: float32(order, lambda _: self.setpoint_c, self._set),
-            2810: float32(order, lambda _: self.setpoint_c),
-            2820: float32(order, self._world.heat.air_c),
+            **items(f4t.PART_NUMBER.number, 1, self.part_number),
+            f4t.STATUS.number: int16(lambda _: self.status),
+            f4t.ETHERNET_UNITS.number: int16(lambda _: self.units),
+            UNITS_COPY: int16(lambda _: self.units),
+            CONTROL_MODE_COPY: constant(f4t.MODE_AUTO),
+            f4t.CONTROL_MODE.number: int16(lambda _: self.control_mode),
+            f4t.PROFILE_ACTION.number: Cell(lambda _: (0,), self._profile_action),
+            f4t.PROFILE_STATE.number: int16(lambda _: self.profile_state),
+            **items(f4t.ALARM.number, f4t.ALARM_STRIDE, self.alarms),
+            f4t.SETPOINT_LOW.number: float32(order, lambda _: self.min_c),
+            f4t.SETPOINT_HIGH.number: float32(order, lambda _: self.max_c),
+            f4t.SETPOINT.number: float32(order, lambda _: self.setpoint_c, self._set),
+            SETPOINT_COPY: float32(order, lambda _: self.setpoint_c),
+            f4t.AIR.number: float32(order, self._world.heat.air_c),
         }
 
     def _set(self, temperature_c: float, t_s: float) -> bool:
@@ -56,6 +57,6 @@ class SimulatedF4T(ModbusDevice):
         self._world.heat.set(t_s, temperature_c)
         return True
 
-    def _act(self, words: list[int], _t_s: float) -> bool:
-        self.profile_state = NO_PROFILE
-        return words == [148]
+    def _profile_action(self, words: list[int], _t_s: float) -> bool:
+        self.profile_state = f4t.PROFILE_NOT_STARTED
+        return words == [f4t.PROFILE_TERMINATE]

@@ -1,109 +1,114 @@
-"""Opening a serial port or a Modbus link by address. `sim://` leads to a simulated instrument, by the same library.
+"""Links of one bench by address: serial ports, Modbus RTU and Modbus TCP, on hardware or on simulated instruments.
 
-This is the only file of the runtime that knows where the simulators are.
+An address that begins with `sim://` leads to the simulated instruments that the composition root hands in; this package
+imports no simulator.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Protocol
 
 import serial
+from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
-from instruments.bench_config import BenchFile
+from instruments.bench_config import is_simulated_address
 from instruments.clock import Clock
 from instruments.errors import LinkError
-from instruments.simulators.device import SimulatedDevice
-from instruments.transport import modbus
 from instruments.transport.serial import BROKEN
 
-if TYPE_CHECKING:
-    from instruments.simulators.links.faults import Faults
-
-SIMULATED = "sim://"
 NOT_OPENED: tuple[type[Exception], ...] = (*BROKEN, ValueError)
 
 
-class Simulation(Protocol):
-    """The simulated instruments of one bench, by address, and the world they stand in."""
+class LinkFactory(Protocol):
+    """Makes ports and Modbus clients of one kind, hardware or simulated. Time-outs are seconds of the bench clock."""
 
-    world: Any
-
-    def device(self, url: str) -> SimulatedDevice:
-        """Return the instrument at a sim:// address, always the same one."""
+    def serial_port(self, url: str, *, baudrate: int, timeout_s: float) -> serial.SerialBase:
+        """Return an open port with 8 data bits, no parity, one stop bit; raises what pyserial raises."""
         ...
 
-    def faults(self, url: str) -> Faults:
-        """Return the faults that can be armed in the instrument at a sim:// address."""
+    def port_timeout_s(self, timeout_s: float) -> float:
+        """Return the value of a port's `timeout` attribute that stands for `timeout_s` seconds of the bench clock."""
+        ...
+
+    def tcp_client(self, host: str, tcp_port: int, *, timeout_s: float) -> ModbusTcpClient:
+        """Return a Modbus TCP client that is not connected yet."""
+        ...
+
+    def rtu_client(self, url: str, *, baudrate: int, timeout_s: float) -> ModbusSerialClient:
+        """Return a Modbus RTU client (8N1) that is not connected yet."""
         ...
 
 
-def open_simulation(bench: BenchFile, clock: Clock) -> Simulation:
-    """Return the simulated instruments of a bench."""
-    from instruments.simulators.bench import SimulatedBench  # noqa: PLC0415  a real bench never loads the simulators
+class HardwareLinks:
+    """Real ports and hosts. A time-out of the bench clock becomes wall seconds."""
 
-    return SimulatedBench(bench, clock)
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
 
+    def serial_port(self, url: str, *, baudrate: int, timeout_s: float) -> serial.SerialBase:
+        """Return an open port, locked for this process; raises what pyserial raises."""
+        wall_s = self._clock.wall_s(timeout_s)
+        return serial.serial_for_url(url, baudrate=baudrate, timeout=wall_s, write_timeout=wall_s, exclusive=True)
 
-def serve_simulation(
-    bench: BenchFile,
-    clock: Clock,
-    out: Path | None,
-    ready: Callable[[dict[str, str]], None],
-    log: Path | None = None,
-) -> None:
-    """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until interrupted."""
-    from instruments.simulators.links.server import serve  # noqa: PLC0415  a real bench never loads the simulators
+    def port_timeout_s(self, timeout_s: float) -> float:
+        """Return the wall seconds of a time-out in seconds of the bench clock."""
+        return self._clock.wall_s(timeout_s)
 
-    serve(bench, clock, out, ready, log)
+    def tcp_client(self, host: str, tcp_port: int, *, timeout_s: float) -> ModbusTcpClient:
+        """Return a client of a real host, not connected yet."""
+        return ModbusTcpClient(host, port=tcp_port, timeout=self._clock.wall_s(timeout_s), retries=0)
+
+    def rtu_client(self, url: str, *, baudrate: int, timeout_s: float) -> ModbusSerialClient:
+        """Return a client on a real port, not connected yet."""
+        wall_s = self._clock.wall_s(timeout_s)
+        return ModbusSerialClient(url, framer=FramerType.RTU, baudrate=baudrate, timeout=wall_s, retries=0)
 
 
 class Ports:
-    """Opens the links of one bench."""
+    """Opens the links of one bench; `simulated` makes the links of `sim://` addresses, where the bench has any."""
 
-    def __init__(self, clock: Clock, simulation: Simulation | None = None) -> None:
-        self.clock = clock
-        self.simulation = simulation
+    def __init__(self, clock: Clock, simulated: LinkFactory | None = None) -> None:
+        self._hardware = HardwareLinks(clock)
+        self._simulated = simulated
 
     def serial(self, url: str, *, device: str, baudrate: int, timeout_s: float) -> serial.SerialBase:
-        """Open a serial port for this process alone, 8 data bits, no parity, one stop bit.
+        """Open a serial port, 8 data bits, no parity, one stop bit, locked for this process.
 
-        Raises LinkError naming port and remedy, also while another process has the port open.
+        Raises LinkError with port and remedy, also while another process has the port open.
         """
-        if url.startswith(SIMULATED):
-            from instruments.simulators.links.serial_port import SimSerial  # noqa: PLC0415
-
-            return SimSerial(self._simulated(url, device), self.clock, baudrate=baudrate, timeout=timeout_s)
         try:
-            wall_s = self.clock.wall_s(timeout_s)
-            return serial.serial_for_url(url, baudrate=baudrate, timeout=wall_s, write_timeout=wall_s, exclusive=True)
+            return self._links(url, device).serial_port(url, baudrate=baudrate, timeout_s=timeout_s)
         except NOT_OPENED as error:
             raise LinkError(
                 device, f"port {url} cannot be opened ({error}); check the cable, the port's name and who else uses it"
             ) from error
 
+    def port_timeout_s(self, url: str, timeout_s: float, *, device: str) -> float:
+        """Return the `timeout` of an open port that stands for `timeout_s` seconds of the bench clock."""
+        return self._links(url, device).port_timeout_s(timeout_s)
+
     def modbus_tcp(self, host: str, tcp_port: int, *, device: str, timeout_s: float) -> ModbusTcpClient:
-        """Open a Modbus TCP link; raises LinkError naming host and remedy."""
-        simulated = self._simulated(host, device) if host.startswith(SIMULATED) else None
-        return modbus.connect_tcp(host, tcp_port, device=device, clock=self.clock, timeout_s=timeout_s, at=simulated)
+        """Open a Modbus TCP link; raises LinkError with host and remedy."""
+        client = self._links(host, device).tcp_client(host, tcp_port, timeout_s=timeout_s)
+        if not client.connect():
+            raise LinkError(
+                device, f"no Modbus TCP at {host}:{tcp_port}; check address, cable and that it is switched on"
+            )
+        return client
 
     def modbus_rtu(self, url: str, *, device: str, baudrate: int, timeout_s: float) -> ModbusSerialClient:
-        """Open a Modbus RTU link on a serial port; raises LinkError naming port and remedy."""
-        simulated = self._simulated(url, device) if url.startswith(SIMULATED) else None
-        return modbus.connect_rtu(
-            url, baudrate=baudrate, device=device, clock=self.clock, timeout_s=timeout_s, at=simulated
-        )
+        """Open a Modbus RTU link on a serial port; raises LinkError with port and remedy."""
+        client = self._links(url, device).rtu_client(url, baudrate=baudrate, timeout_s=timeout_s)
+        if not client.connect():
+            raise LinkError(
+                device, f"serial port {url} cannot be opened; check its name, the cable and who else uses it"
+            )
+        return client
 
-    def _simulated(self, url: str, device: str) -> SimulatedDevice:
-        if self.simulation is None:
-            raise LinkError(device, f"{url} is a simulated instrument, but this bench has no simulation")
-        return self.simulation.device(url)
-
-
-def hidden_defaults() -> dict[str, float]:
-    """Return every effect that can be hidden in a simulated unit, with a size that a person would notice."""
-    from instruments.simulators.hidden import EFFECTS  # noqa: PLC0415  a real bench never loads the simulators
-
-    return {effect_id: kind.default for effect_id, kind in EFFECTS.items()}
+    def _links(self, address: str, device: str) -> LinkFactory:
+        if not is_simulated_address(address):
+            return self._hardware
+        if self._simulated is None:
+            raise LinkError(device, f"{address} is a simulated instrument, but this bench has no simulation")
+        return self._simulated

@@ -1,17 +1,17 @@
-"""When the readings of a stream were taken: spaced by the device's own period, anchored to the Clock."""
+"""Clock times of the readings of a stream: spaced by the period of the device, anchored to the clock."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: How much of the distance to the Clock is made up at each read: slow, so that no jitter of the wire is invented.
+#: Share of the distance to the clock that each read makes up: small, so that the times do not take on wire jitter.
 FOLLOW = 0.02
-#: A stream further behind than this many periods has lost readings that nothing else showed.
+#: A stream further behind than this many periods has lost readings that its counter does not show.
 LOST_PERIODS = 12.0
-#: A stream whose readings are awaited one by one is looked at this often, in periods: then they are known to be fresh.
+#: Polling interval for one fresh reading, in periods: a short one keeps the reading's age below a fraction of a period.
 FRESH_PERIODS = 0.125
-#: After readings were dropped a stream is found again by its phase, unless that is off by more than this many periods.
+#: After readings were dropped the known phase is kept, unless the next reading is off by more than this many periods.
 SAME_PHASE = 0.25
 
 
@@ -22,15 +22,15 @@ class StreamTime:
         self._period_s = period_s
         self._anchor_s = now_s
         self._index = -1
-        self._begun = False
+        self._started = False
         self._dropped = False
         self._last_s = -np.inf
 
     def drop(self) -> None:
-        """Expect any number of readings to be missing before the next ones, which are told as soon as they come.
+        """Expect any number of missing readings before the next ones, which must be passed on as soon as they come.
 
-        The device has gone on at its own even spacing meanwhile: what is known of its phase stays known, so that times
-        do not jump when a stream that was looked at now and then is read on.
+        The device continues at its own even spacing, so its known phase is kept: times do not jump when
+        reading resumes.
         """
         self._dropped = True
 
@@ -41,12 +41,12 @@ class StreamTime:
         the stream falls behind the Clock by whole wraps, they are counted as lost (0: any number of readings).
         """
         index = self._index + np.cumsum(advance)
-        if self._dropped and self._begun:
-            index += self._found_again(now_s) - index[-1]
+        if self._dropped and self._started:
+            index += self._resumed(now_s) - index[-1]
         self._dropped = False
         newest = int(index[-1])
-        if not self._begun:
-            self._anchor_s, self._begun = now_s - newest * self._period_s, True
+        if not self._started:
+            self._anchor_s, self._started = now_s - newest * self._period_s, True
         behind_s = now_s - (self._anchor_s + newest * self._period_s)
         lost = 0
         if behind_s > LOST_PERIODS * self._period_s:
@@ -63,7 +63,7 @@ class StreamTime:
         self._index, self._last_s = int(index[-1]), float(times[-1])
         return np.asarray(times, dtype=np.float64), lost
 
-    def _found_again(self, now_s: float) -> int:
+    def _resumed(self, now_s: float) -> int:
         """Return the index of a reading that has just come."""
         newest = max(round((now_s - self._anchor_s) / self._period_s), self._index + 1)
         behind_s = now_s - (self._anchor_s + newest * self._period_s)

@@ -1,4 +1,4 @@
-"""What pyserial lets out when the wire of an open port is gone."""
+"""Exceptions that pyserial raises when the wire of an open port is gone."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import importlib
 import serial
 
 
-def _terminal() -> type[Exception]:
-    """Return the error of the system's terminals; one without terminals has no such error."""
+def _terminal_error() -> type[Exception]:
+    """Return the error of the system's terminals; OSError on a system without terminals."""
     try:
         found: type[Exception] = importlib.import_module("termios").error
     except ImportError:
@@ -17,4 +17,4 @@ def _terminal() -> type[Exception]:
 
 
 #: Emptying the buffers of a port that went away raises the terminal's own error, which is not an OSError.
-BROKEN: tuple[type[Exception], ...] = (serial.SerialException, OSError, _terminal())
+BROKEN: tuple[type[Exception], ...] = (serial.SerialException, OSError, _terminal_error())

@@ -14,7 +14,8 @@ from instruments.drivers.gyrostar import Gyrostar
 from instruments.drivers.watlow_f4 import WatlowF4
 from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.simulators.bench import SimulatedBench
-from instruments.simulators.device import SimulatedDevice
+from instruments.simulators.links.device import SimulatedDevice
+from instruments.simulators.links.factory import SimulatedLinks
 from instruments.simulators.links.faults import Faults
 from instruments.transport.factory import Ports
 
@@ -82,7 +83,7 @@ class Rig:
         self.bench = BenchFile.model_validate(record)
         self.clock = VirtualClock()
         simulation = SimulatedBench(self.bench, self.clock)
-        self.ports = WatchedPorts(self.clock, simulation)
+        self.ports = WatchedPorts(self.clock, SimulatedLinks(simulation.device, self.clock))
         self.world = simulation.world
         self.faults: Faults = simulation.faults(url)
         wire: Any = simulation.device(url)
@@ -97,7 +98,7 @@ class Rig:
 
     def close(self) -> None:
         for client in self.ports.opened:
-            client.close()  # type: ignore[no-untyped-call]  # pymodbus left this one untyped
+            client.close()
 
 
 class F4Rig(Rig):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.transport.factory import hidden_defaults, open_simulation
+from instruments.simulation import hidden_defaults, open_simulation
 from studies import criticism
 from studies.campaigns import PROTOCOLS, campaign, drifting, protocol, spoiled
 from studies.effect_sizes import COMMAND, Z_LEVELS, sizes, sizing_of

@@ -12,19 +12,19 @@ from instruments.drivers.gyrostar import Gyrostar
 from instruments.drivers.watlow_f4 import WatlowF4
 from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.errors import InstrumentError, LinkError
-from instruments.simulators.links.server import Server
+from instruments.simulators.server import SimulationServer
 from instruments.transport.factory import Ports
 
 SPEED = 10.0
 
 
 @pytest.fixture
-def serve() -> Iterator[Callable[[str], tuple[BenchFile, Clock, Server]]]:
-    servers: list[Server] = []
+def serve() -> Iterator[Callable[[str], tuple[BenchFile, Clock, SimulationServer]]]:
+    servers: list[SimulationServer] = []
 
-    def start(name: str) -> tuple[BenchFile, Clock, Server]:
+    def start(name: str) -> tuple[BenchFile, Clock, SimulationServer]:
         clock = ScaledClock(SPEED)
-        servers.append(Server(read_bench(name), clock))
+        servers.append(SimulationServer(read_bench(name), clock))
         return servers[-1].start(), clock, servers[-1]
 
     yield start
@@ -32,7 +32,7 @@ def serve() -> Iterator[Callable[[str], tuple[BenchFile, Clock, Server]]]:
         server.stop()
 
 
-def test_an_f4_on_a_real_serial_port(serve: Callable[[str], tuple[BenchFile, Clock, Server]]) -> None:
+def test_an_f4_on_a_real_serial_port(serve: Callable[[str], tuple[BenchFile, Clock, SimulationServer]]) -> None:
     bench, clock, _ = serve("single-axis-sim")
     assert bench.chamber.port is not None
     assert not bench.chamber.port.startswith("sim:")
@@ -45,7 +45,7 @@ def test_an_f4_on_a_real_serial_port(serve: Callable[[str], tuple[BenchFile, Clo
         chamber.close()
 
 
-def test_an_f4t_and_an_adam_on_real_tcp(serve: Callable[[str], tuple[BenchFile, Clock, Server]]) -> None:
+def test_an_f4t_and_an_adam_on_real_tcp(serve: Callable[[str], tuple[BenchFile, Clock, SimulationServer]]) -> None:
     bench, clock, server = serve("gyrostar-sim")
     chamber = WatlowF4T(bench.chamber, Ports(clock), clock)
     gyro = Gyrostar(bench.gyros[0], Ports(clock), clock)

@@ -13,7 +13,7 @@ __all__ = ["EFFECTS", "HiddenEffect", "State", "hidden_effects"]
 
 
 def hidden_effects(sizes: dict[str, float | str], seed: list[int]) -> list[HiddenEffect]:
-    """Make the effects to hide; raises ValueError naming what there is."""
+    """Return effects by id and size; raises ValueError for an unknown id, with the known ones."""
     made = []
     for effect_id, size in sizes.items():
         if effect_id not in EFFECTS:

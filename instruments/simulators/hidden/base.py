@@ -1,4 +1,4 @@
-"""What a hidden effect sees, and what it does to a unit."""
+"""Inputs and outputs of a hidden effect."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class State:
-    """The world as a unit feels it at n times."""
+    """Quantities that act on a unit at n times."""
 
     t_s: Array
     on_s: Array
@@ -26,34 +26,34 @@ class State:
     rows: list[int]  #: body axis of each recorded axis
     g: Array  #: (n, 3)
     sensor_c: Array
-    start_c: float  #: what everything was at in the beginning
+    start_c: float  #: temperature of the whole bench at the start
     deep_c: Array
-    sensor_k_min: Array  #: how fast the sensor's temperature changes
+    sensor_k_min: Array  #: rate of change of the sensor temperature, K/min
     air_c: Array
     run: int
     mounting: int
     full_scale_dps: float
     north_deg: float
     supply_wander_v: Array
-    humidity_pct: Array  #: relative humidity of the room
-    own_at: Callable[[Array], Array]  #: times (k,) not long ago -> own rates then, (k, axes)
+    humidity_pct: Array  #: relative humidity around the bench
+    own_at: Callable[[Array], Array]  #: recent times (k,) s -> rates along the recorded axes, (k, axes) deg/s
 
 
 class HiddenEffect:
-    """One hidden cause; it may keep a memory, since times only rise."""
+    """One hidden physical effect; it may keep state, since times only rise."""
 
     id: ClassVar[str]
-    unit: ClassVar[str]  #: of its size, as in the catalogue
-    default: ClassVar[float]  #: a size that a person would notice
+    unit: ClassVar[str]  #: unit of its size, as in the catalogue
+    default: ClassVar[float]  #: a noticeable size
 
     def __init__(self, size: float, seed: list[int]) -> None:
         self.size = size
         self.rng = np.random.default_rng([*seed, zlib.crc32(self.id.encode())])
 
     def error_dps(self, state: State, rate_dps: Array) -> Array:
-        """Return what is added to the output, (n, axes) or something that fits it."""
+        """Return the addition to the output, deg/s, in a shape that broadcasts to (n, axes)."""
         return np.zeros((len(state.t_s), 1))
 
     def thermometer_c(self, state: State) -> Array:
-        """Return what is added to the thermometer, (n,)."""
+        """Return the addition to the thermometer, (n,) K."""
         return np.zeros(len(state.t_s))

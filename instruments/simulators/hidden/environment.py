@@ -29,7 +29,7 @@ class CrossGSensitivity(HiddenEffect):
 
 
 class GSquaredSensitivity(HiddenEffect):
-    """A bias that does not care for gravity's sign."""
+    """A bias in proportion to the square of the specific force along the axis."""
 
     id, unit, default = "g_squared_sensitivity", "deg/s/g^2", 0.01
 
@@ -39,7 +39,7 @@ class GSquaredSensitivity(HiddenEffect):
 
 
 class CentripetalAcceleration(HiddenEffect):
-    """The unit sits off the axis of rotation; size is what it gives at one g of centripetal acceleration, at 6 cm."""
+    """The unit sits off the axis of rotation; size is the error at one g of centripetal acceleration, at 6 cm."""
 
     id, unit, default = "centripetal_acceleration", "deg/s/g", 0.02
     radius_m = 0.06
@@ -59,7 +59,7 @@ class EarthRate(HiddenEffect):
 
 
 class OncePerTurn(HiddenEffect):
-    """Something that goes round once per turn."""
+    """An error that repeats once per turn of the table."""
 
     phase_deg = 0.0
 
@@ -77,7 +77,7 @@ class EarthRateTilt(OncePerTurn):
 
 
 class MagneticSensitivity(OncePerTurn):
-    """The field of the hall, and a little of its square."""
+    """The magnetic field around the bench, with a small quadratic part."""
 
     id, unit, default = "magnetic_sensitivity", "deg/s", 0.003
     phase_deg = 71.0
@@ -88,7 +88,7 @@ class MagneticSensitivity(OncePerTurn):
 
 
 class TableTilt(OncePerTurn):
-    """A table out of level: gravity goes round, and the bearing wobbles twice per turn."""
+    """A table out of level: gravity varies once per turn, and the bearing twice per turn."""
 
     id, unit, default = "table_tilt", "deg/s", 0.003
     phase_deg = 140.0
@@ -99,7 +99,7 @@ class TableTilt(OncePerTurn):
 
 
 class TableRateRatio(HiddenEffect):
-    """A table that turns faster than its steps say."""
+    """A table that turns faster than its step count gives."""
 
     id, unit, default = "table_rate_ratio", "1", 1e-4
 
@@ -136,7 +136,7 @@ class SupplySensitivity(HiddenEffect):
 
 
 class OutsideHumidity(HiddenEffect):
-    """No effect of the catalogue: the bias jumps where the room's humidity passes a value."""
+    """No effect of the catalogue: the bias jumps where the relative humidity passes a value."""
 
     id, unit, default = "outside_humidity", "deg/s", 0.01
 

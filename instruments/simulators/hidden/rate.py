@@ -1,4 +1,4 @@
-"""Hidden effects that hang on the rate."""
+"""Hidden effects that depend on the rate."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Bias(HiddenEffect):
 
 
 class ScaleFactor(HiddenEffect):
-    """A gain that is a little off."""
+    """A gain error."""
 
     id, unit, default = "scale_factor", "1", 1e-3
 
@@ -159,7 +159,7 @@ class StartTransient(HiddenEffect):
 
     id, unit, default = "start_transient", "1", 1e-3
     tau_s = 4.3
-    LOOK_S = 0.5
+    STEP_S = 0.5
 
     def __init__(self, size: float, seed: list[int]) -> None:
         super().__init__(size, seed)
@@ -180,13 +180,13 @@ class StartTransient(HiddenEffect):
         return -self.size * missing
 
     def _catch_up(self, state: State) -> None:
-        """Follow the table through a time in which nobody asked; what is long ago is forgotten anyway."""
+        """Follow the table through a gap between samples; twelve time constants back are enough."""
         gap_s = float(state.t_s[0]) - self._at_s
-        if gap_s <= self.LOOK_S or self._followed is None:
+        if gap_s <= self.STEP_S or self._followed is None:
             return
-        times = np.arange(max(self._at_s, float(state.t_s[0]) - 12 * self.tau_s), float(state.t_s[0]), self.LOOK_S)
+        times = np.arange(max(self._at_s, float(state.t_s[0]) - 12 * self.tau_s), float(state.t_s[0]), self.STEP_S)
         for own in state.own_at(times):
-            self._followed += (own - self._followed) * (1.0 - np.exp(-self.LOOK_S / self.tau_s))
+            self._followed += (own - self._followed) * (1.0 - np.exp(-self.STEP_S / self.tau_s))
         self._at_s = float(times[-1])
 
 

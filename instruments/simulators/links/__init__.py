@@ -1,1 +1,1 @@
-"""The far end of a wire: serial port, Modbus device, faults, and a server on real ports."""
+"""Links to the simulated instruments: serial ports, Modbus clients, faults on the wire, and a server on real ports."""

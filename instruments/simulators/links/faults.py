@@ -1,4 +1,4 @@
-"""Faults that can be armed in any simulated instrument, by time or by count; every one is drawn from a seed."""
+"""Faults that can be armed in any simulated instrument, by time or by count; random ones are drawn from a seed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import serial
 
-from instruments.simulators.device import SimulatedDevice
+from instruments.simulators.links.device import SimulatedDevice
 
 FaultKind = Literal[
     "silence",  # nothing comes out
@@ -37,13 +37,13 @@ class Fault:
     value: int = 1
 
     def active(self, t_s: float) -> bool:
-        """Whether it strikes at this time."""
+        """Return whether the fault is armed at this time, s."""
         return self.from_s <= t_s < self.until_s and self.count != 0
 
 
 @dataclass
 class Faults:
-    """What is wrong with one instrument."""
+    """Faults armed in one instrument."""
 
     seed: int = 1
     armed: list[Fault] = field(default_factory=list)
@@ -60,21 +60,21 @@ class Faults:
         count: int | None = None,
         value: int = 1,
     ) -> Fault:
-        """Arm a fault; it strikes between two times, at most `count` times."""
+        """Arm a fault between two clock times, for at most `count` occurrences; `value` is its size."""
         fault = Fault(kind, from_s, until_s, count, value)
         self.armed.append(fault)
         return fault
 
     def clear(self) -> None:
-        """Make the instrument well again."""
+        """Disarm every fault."""
         self.armed.clear()
 
     def present(self, kind: FaultKind, t_s: float) -> bool:
-        """Whether a fault is there now, without using it up."""
+        """Return whether a fault is active at this time, without counting it down."""
         return any(fault.kind == kind and fault.active(t_s) for fault in self.armed)
 
-    def strike(self, kinds: Iterable[FaultKind], t_s: float) -> Fault | None:
-        """Return the fault that strikes now, counted down; None when all is well."""
+    def trigger(self, kinds: Iterable[FaultKind], t_s: float) -> Fault | None:
+        """Return the first active fault of the given kinds, counted down; None when there is none."""
         wanted = set(kinds)
         for fault in self.armed:
             if fault.kind in wanted and fault.active(t_s):
@@ -85,7 +85,7 @@ class Faults:
 
 
 class FaultyWire:
-    """A wire to an instrument on which bytes get lost, mixed with others, cut and held back."""
+    """A wire to an instrument that loses, adds, splits and delays bytes as armed."""
 
     def __init__(self, device: SimulatedDevice, faults: Faults) -> None:
         self._device = device
@@ -94,12 +94,12 @@ class FaultyWire:
         self._later_s = 0.0
 
     def receive(self, data: bytes, t_s: float) -> None:
-        """Pass bytes on to the instrument; a dropped link raises as the operating system does."""
+        """Pass bytes on to the instrument; raises serial.SerialException on a dropped link."""
         self._check_link(t_s)
         self._device.receive(data, t_s)
 
     def transmit(self, t_s: float) -> bytes:
-        """Return what arrives of what the instrument sends."""
+        """Return the bytes that arrive; raises serial.SerialException on a dropped link."""
         self._check_link(t_s)
         if not self.faults.armed and not self._held:
             return self._device.transmit(t_s)
@@ -107,14 +107,14 @@ class FaultyWire:
         if self.faults.present("silence", t_s):
             self._held.clear()
             return b""
-        if sent and (noise := self.faults.strike(["noise"], t_s)) is not None:
+        if sent and (noise := self.faults.trigger(["noise"], t_s)) is not None:
             at = int(self.faults.rng.integers(0, len(sent) + 1))
             sent = sent[:at] + self.faults.rng.bytes(max(noise.value, 1)) + sent[at:]
         if self.faults.present("merge", t_s) or (self._held and t_s < self._later_s):
             self._held += sent
             return b""
         sent, self._held = bytes(self._held) + sent, bytearray()
-        if sent and self.faults.strike(["split"], t_s) is not None:
+        if sent and self.faults.trigger(["split"], t_s) is not None:
             at = int(self.faults.rng.integers(0, len(sent) + 1))
             self._held += sent[at:]
             self._later_s = t_s + 0.02
@@ -122,7 +122,7 @@ class FaultyWire:
         return sent
 
     def skip(self, t_s: float) -> None:
-        """Lose what has arrived and what is on its way."""
+        """Lose the bytes that have arrived and the delayed ones; raises serial.SerialException on a dropped link."""
         self._check_link(t_s)
         self._held.clear()
         self._device.skip(t_s)
@@ -137,5 +137,5 @@ class FaultyWire:
         return self._device.next_byte_s(t_s)
 
     def _check_link(self, t_s: float) -> None:
-        if self.faults.strike(["dropped_link"], t_s) is not None:
+        if self.faults.trigger(["dropped_link"], t_s) is not None:
             raise serial.SerialException("device disconnected")

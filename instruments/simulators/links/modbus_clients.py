@@ -1,7 +1,7 @@
 """pymodbus clients whose far end is a simulated instrument, served in the calling thread.
 
-Everything above the socket or port is pymodbus's own. Waiting is done by the Clock, up to the time-out, so that in
-virtual time a silent instrument costs no real second and the same bytes come at the same instants every time.
+Everything above the socket or port is pymodbus's own. Waits take bench clock time, up to the time-out: in virtual time
+a silent instrument costs no wall time, and the same bytes come at the same instants in every run.
 """
 
 from __future__ import annotations
@@ -14,47 +14,47 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException
 
 from instruments.clock import Clock
-from instruments.simulators.device import SimulatedDevice
-from instruments.simulators.links.serial_port import SimSerial
+from instruments.simulators.links.device import SimulatedDevice
+from instruments.simulators.links.serial_port import SimulatedSerialPort
 
-#: Time passes in steps no smaller than this while a reply is awaited.
-LEAST_WAIT_S = 1e-3
+#: Least step of the clock while a reply is awaited, s.
+MIN_WAIT_S = 1e-3
 RECEIVE_BYTES = 65536
 
 
-class PairedTcpClient(ModbusTcpClient):
+class SimulatedTcpClient(ModbusTcpClient):
     """A Modbus TCP client on one end of a socket pair; the instrument's bytes are put in at the other."""
 
     def __init__(self, device: SimulatedDevice, clock: Clock, timeout_s: float, **settings: Any) -> None:
         super().__init__("simulated", **settings)
         self._device, self._clock, self._timeout_s = device, clock, timeout_s
-        self._far: socket.socket | None = None
+        self._instrument_end: socket.socket | None = None
         self._ready = 0
 
     def connect(self) -> bool:
-        """Open the pair; False when the instrument cannot be reached. What it said to an earlier link is gone."""
+        """Open the pair; False when the instrument cannot be reached. Replies to an earlier link are lost."""
         if self.socket is None:
             try:
                 self._device.skip(self._clock.now_s())
             except OSError:
                 return False
-            self.socket, self._far = socket.socketpair()
+            self.socket, self._instrument_end = socket.socketpair()
             self._ready = 0
         return True
 
     def close(self) -> None:
         """Close both ends."""
-        super().close()  # type: ignore[no-untyped-call]  # pymodbus left this one untyped
-        if self._far is not None:
-            self._far.close()
-            self._far = None
+        super().close()
+        if self._instrument_end is not None:
+            self._instrument_end.close()
+            self._instrument_end = None
 
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
         """Send a request and hand it to the instrument."""
         sent = int(super().send(request, addr))
-        assert self._far is not None
+        assert self._instrument_end is not None
         try:
-            self._device.receive(self._far.recv(RECEIVE_BYTES), self._clock.now_s())
+            self._device.receive(self._instrument_end.recv(RECEIVE_BYTES), self._clock.now_s())
         except OSError as error:
             self.close()
             raise ConnectionException(f"{self}: {error}") from error
@@ -77,13 +77,13 @@ class PairedTcpClient(ModbusTcpClient):
                 if now_s >= deadline_s - 1e-9:
                     return
                 next_s = self._device.next_byte_s(now_s)
-                until_s = deadline_s if next_s is None else min(max(next_s, now_s + LEAST_WAIT_S), deadline_s)
+                until_s = deadline_s if next_s is None else min(max(next_s, now_s + MIN_WAIT_S), deadline_s)
                 self._clock.sleep(until_s - now_s)
         except OSError as error:
             self.close()
             raise ConnectionException(f"{self}: {error}") from error
-        if self._far is not None:
-            self._far.sendall(data)
+        if self._instrument_end is not None:
+            self._instrument_end.sendall(data)
             self._ready += len(data)
 
 
@@ -101,7 +101,7 @@ class SimulatedRtuClient(ModbusSerialClient):
     def connect(self) -> bool:
         """Open the port; False when the instrument cannot be reached."""
         if self.socket is None:
-            port = SimSerial(self._device, self._clock, timeout=self._timeout_s)
+            port = SimulatedSerialPort(self._device, self._clock, timeout=self._timeout_s)
             try:
                 port.reset_input_buffer()
             except OSError:
@@ -117,5 +117,5 @@ class SimulatedRtuClient(ModbusSerialClient):
             first: bytes = self.socket.read(1)
             return first + self.socket.read(self.socket.in_waiting) if first else b""
         except OSError as error:
-            self.close()  # type: ignore[no-untyped-call]  # pymodbus left this one untyped
+            self.close()
             raise ConnectionException(f"{self}: {error}") from error

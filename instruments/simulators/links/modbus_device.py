@@ -1,4 +1,4 @@
-"""A simulated Modbus instrument: pymodbus frames and decodes the bytes, a map of register cells answers."""
+"""A simulated Modbus instrument: pymodbus frames and decodes the bytes, a map of register cells gives the values."""
 
 from __future__ import annotations
 
@@ -17,31 +17,39 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
+from instruments.protocols.modbus_codes import (
+    ILLEGAL_ADDRESS,
+    ILLEGAL_FUNCTION,
+    ILLEGAL_VALUE,
+    READ_HOLDING,
+    READ_INPUT,
+    WRITE_MULTIPLE,
+    WRITE_SINGLE,
+)
 from instruments.protocols.modbus_registers import WordOrder
 from instruments.simulators.links.faults import Faults
 
-ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
-FUNCTIONS = frozenset({3, 4, 6, 16})
+FUNCTIONS = frozenset({READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE})
 ANY_UNIT = frozenset({0, 255})  #: unit numbers that every Modbus TCP instrument takes for its own
-LONGEST_FRAME = 264
+MAX_FRAME_BYTES = 264
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A quantity in `words` registers in a row: what it holds at a time, and what writing it does."""
+    """A quantity in `words` consecutive registers: its words at a clock time, and the effect of writing it."""
 
     get: Callable[[float], Sequence[int]]
-    put: Callable[[list[int], float], bool] | None = None  #: whether the value is accepted; None: it is read-only
+    put: Callable[[list[int], float], bool] | None = None  #: returns whether the value is accepted; None: read-only
     words: int = 1
 
 
 def constant(value: int) -> Cell:
-    """Return a register that always holds the same."""
+    """Return a read-only register with a constant value."""
     return Cell(lambda _: (value,))
 
 
 def int16(get: Callable[[float], float], put: Callable[[int, float], bool] | None = None) -> Cell:
-    """Return a signed 16-bit register; what it holds is rounded to whole counts."""
+    """Return a signed 16-bit register; its value is rounded to whole counts."""
 
     def write(words: list[int], t_s: float) -> bool:
         assert put is not None
@@ -77,7 +85,7 @@ def float32(order: WordOrder, get: Callable[[float], float], put: Callable[[floa
 class ModbusDevice:
     """Bytes in, bytes out, on a map of cells by their first register.
 
-    `absent` is what a register that is not there holds; None: exception 2, as the standard has it.
+    `absent` is the value of a register that does not exist; None: exception 2, as the standard requires.
     """
 
     def __init__(
@@ -95,47 +103,47 @@ class ModbusDevice:
         self._out = bytearray()
 
     def receive(self, data: bytes, t_s: float) -> None:
-        """Take bytes; every whole request to this address in them is answered."""
+        """Take bytes and answer every whole request to this address in them."""
         if self._pending and not self._is_whole(self._pending + data) and self._is_whole(data):
-            self._pending = b""  # the rest of something that never was a request
+            self._pending = b""  # bytes that never became a request
         self._pending += data
         while self._pending:
             used, unit, transaction, pdu = self._framer.decode(self._pending)
             if not used:
-                if len(self._pending) > LONGEST_FRAME or self._is_no_frame():
+                if len(self._pending) > MAX_FRAME_BYTES or self._cannot_be_a_frame():
                     self._pending = b""
                 return
             self._pending = self._pending[used:]
             if pdu and unit in self._units:
-                self._answer(pdu, unit, transaction, t_s)
+                self._reply_to(pdu, unit, transaction, t_s)
 
     def transmit(self, t_s: float) -> bytes:  # noqa: ARG002  a reply goes out at once
-        """Return what was answered."""
+        """Return the replies."""
         sent, self._out = bytes(self._out), bytearray()
         return sent
 
     def skip(self, t_s: float) -> None:
-        """Lose what was answered."""
+        """Lose the replies."""
         self.transmit(t_s)
 
     def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002
-        """Nothing comes unasked."""
+        """Return None: the instrument sends only replies."""
         return None
 
     def _is_whole(self, data: bytes) -> bool:
         return bool(self._framer.decode(data)[3])
 
-    def _is_no_frame(self) -> bool:
+    def _cannot_be_a_frame(self) -> bool:
         return not self._rtu and self._pending[2:4].strip(b"\0") != b""  # TCP: the protocol number is 0
 
-    def _answer(self, pdu: bytes, unit: int, transaction: int, t_s: float) -> None:
-        if self.faults.strike(["lost_reply", "silence"], t_s) is not None:
+    def _reply_to(self, pdu: bytes, unit: int, transaction: int, t_s: float) -> None:
+        if self.faults.trigger(["lost_reply", "silence"], t_s) is not None:
             return
-        fault = self.faults.strike(["modbus_exception"], t_s)
+        fault = self.faults.trigger(["modbus_exception"], t_s)
         response = ExceptionResponse(pdu[0], fault.value) if fault else self._respond(pdu, t_s)
         response.dev_id, response.transaction_id = unit, transaction
         frame = bytearray(self._framer.buildFrame(response))
-        if self.faults.strike(["wrong_crc"], t_s) is not None:
+        if self.faults.trigger(["wrong_crc"], t_s) is not None:
             frame[-1 if self._rtu else 2] ^= 0x55  # TCP frames carry no checksum; their protocol number breaks instead
         self._out += frame
 
@@ -146,22 +154,22 @@ class ModbusDevice:
         request = self._decoder.decode(pdu)
         if request is None:
             return ExceptionResponse(code, ILLEGAL_VALUE)
-        return (self._read_reply if code in {3, 4} else self._write_reply)(request, t_s)
+        return (self._read_reply if code in {READ_HOLDING, READ_INPUT} else self._write_reply)(request, t_s)
 
     def _read_reply(self, request: ModbusPDU, t_s: float) -> ModbusPDU:
         words = self._read(request.address, request.count, t_s)
         if words is None:
             return ExceptionResponse(request.function_code, ILLEGAL_ADDRESS)
-        reply = ReadHoldingRegistersResponse if request.function_code == 3 else ReadInputRegistersResponse
+        reply = ReadHoldingRegistersResponse if request.function_code == READ_HOLDING else ReadInputRegistersResponse
         return reply(registers=words)
 
     def _write_reply(self, request: ModbusPDU, t_s: float) -> ModbusPDU:
         code, words = request.function_code, list(request.registers)
-        if not words or (code == 16 and len(words) != request.count):
+        if not words or (code == WRITE_MULTIPLE and len(words) != request.count):
             return ExceptionResponse(code, ILLEGAL_VALUE)
         if refusal := self._write(request.address, words, t_s):
             return ExceptionResponse(code, refusal)
-        if code == 6:
+        if code == WRITE_SINGLE:
             return WriteSingleRegisterResponse(address=request.address, registers=words)
         return WriteMultipleRegistersResponse(address=request.address, count=len(words))
 

@@ -1,4 +1,4 @@
-"""A pyserial port whose far end is a simulated instrument; time passes by the Clock, so in virtual time reads jump."""
+"""A pyserial port to a simulated instrument; reads wait on the bench clock: in virtual time at no cost."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from typing import Any
 import serial
 
 from instruments.clock import Clock
-from instruments.simulators.device import SimulatedDevice
+from instruments.simulators.links.device import SimulatedDevice
 
-#: A real port keeps so many unread bytes and loses the rest, oldest first.
+#: A real port keeps this many unread bytes and loses the rest, oldest first.
 BUFFER_BYTES = 4096
-#: A silent instrument is looked at this often, in case it is woken by somebody else.
-LOOK_S = 0.05
+#: Polling period of a silent instrument, s: another link may make it send.
+POLL_S = 0.05
 
 
-def room_bytes(clock: Clock) -> int:
-    """Return how much a port keeps unread: a host is held up in the wall's time, however fast the clock runs."""
+def port_buffer_bytes(clock: Clock) -> int:
+    """Return the unread bytes that a port keeps; more for a fast clock, since the host is delayed in wall time."""
     return round(BUFFER_BYTES * max(1.0, 1.0 / clock.wall_s(1.0)))
 
 
-class SimSerial(serial.SerialBase):  # type: ignore[misc]  # pyserial has no types
+class SimulatedSerialPort(serial.SerialBase):
     """A serial port to a simulated instrument."""
 
     def __init__(self, device: SimulatedDevice, clock: Clock, **settings: Any) -> None:
         self._device = device
         self._clock = clock
         self._unread = bytearray()
-        self._room = room_bytes(clock)
+        self._buffer_bytes = port_buffer_bytes(clock)
         self.is_open = False
         super().__init__(**settings)
         self.open()
@@ -44,35 +44,35 @@ class SimSerial(serial.SerialBase):  # type: ignore[misc]  # pyserial has no typ
         self.is_open = False
 
     def _reconfigure_port(self, *_: Any) -> None:
-        """Simulated instruments take any line settings."""
+        """Accept any line settings."""
 
-    def _take(self) -> None:
+    def _receive(self) -> None:
         if not self.is_open:
             raise serial.PortNotOpenError
         self._unread += self._device.transmit(self._clock.now_s())
-        if len(self._unread) > self._room:
-            del self._unread[: -self._room]
+        if len(self._unread) > self._buffer_bytes:
+            del self._unread[: -self._buffer_bytes]
 
     @property
     def in_waiting(self) -> int:
-        """How many bytes can be read at once."""
-        self._take()
+        """Number of bytes that can be read without waiting."""
+        self._receive()
         return len(self._unread)
 
     def read(self, size: int = 1) -> bytes:
         """Read `size` bytes, or as many as come before the time-out."""
-        self._take()
+        self._receive()
         deadline_s = None if self.timeout is None else self._clock.now_s() + self.timeout
         while len(self._unread) < size:
             now_s = self._clock.now_s()
             if deadline_s is not None and now_s >= deadline_s:
                 break
             next_s = self._device.next_byte_s(now_s)
-            until_s = now_s + LOOK_S if next_s is None and deadline_s is None else next_s
+            until_s = now_s + POLL_S if next_s is None and deadline_s is None else next_s
             if deadline_s is not None:
                 until_s = deadline_s if until_s is None else min(until_s, deadline_s)
             self._clock.sleep(max((until_s or 0.0) - now_s, 1e-6))
-            self._take()
+            self._receive()
         found = bytes(self._unread[:size])
         del self._unread[:size]
         return found
@@ -85,14 +85,14 @@ class SimSerial(serial.SerialBase):  # type: ignore[misc]  # pyserial has no typ
         return len(data)
 
     def flush(self) -> None:
-        """Everything is on the wire at once."""
+        """Do nothing: written bytes arrive at once."""
 
     def reset_input_buffer(self) -> None:
-        """Drop what was not read."""
+        """Drop unread bytes."""
         if not self.is_open:
             raise serial.PortNotOpenError
         self._device.skip(self._clock.now_s())
         self._unread.clear()
 
     def reset_output_buffer(self) -> None:
-        """Nothing waits to be sent."""
+        """Do nothing: no byte waits to be sent."""

@@ -1,4 +1,4 @@
-"""What changes around a bench while nobody looks: the supply's voltage and the room's humidity, over hours."""
+"""Slow changes around a bench, over hours: supply voltage and relative humidity."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ Array = NDArray[np.float64]
 
 
 def supply_wander_v(t_s: Array) -> Array:
-    """Return by how much the supply is off its nominal voltage at times (n,), V."""
+    """Return the deviation of the supply voltage from nominal, (n,) V, at times (n,) s."""
     return _waves(t_s, (0.06, 5.3, 0.0), (0.04, 1.7, 1.0))
 
 
 def humidity_pct(t_s: Array) -> Array:
-    """Return the room's relative humidity at times (n,), per cent."""
+    """Return the relative humidity around the bench, (n,) per cent, at times (n,) s."""
     return 45.0 + _waves(t_s, (4.0, 23.0, 2.0), (3.0, 6.1, 0.5), (1.5, 2.3, 4.0))
 
 

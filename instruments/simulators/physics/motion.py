@@ -12,8 +12,8 @@ Array = NDArray[np.float64]
 
 #: Half steps of one electrical cycle of the motor: four full steps.
 ELECTRICAL_CYCLE_STEPS = 8
-#: Moves that are remembered, so that readings that are fetched late still see the motion of their own time.
-REMEMBERED = 16
+#: Moves in the history: a reading that is fetched late still gets the motion at its own time.
+HISTORY_MOVES = 16
 
 
 @dataclass(frozen=True)
@@ -30,17 +30,17 @@ class Move:
 
     @property
     def from_s(self) -> float:
-        """From when on this move says where the table is."""
+        """Time from which this move gives the position of the table, s."""
         return self.start_s if self.counts_from_s is None else self.counts_from_s
 
     @property
     def ramp_s(self) -> float:
-        """How long each ramp takes."""
+        """Duration of each ramp, s."""
         return self.rate_hz / self.acceleration_hz_s
 
     @property
     def end_s(self) -> float:
-        """When the table is at rest again."""
+        """Time at which the table is at rest again, s."""
         ramps = self.rate_hz**2 / self.acceleration_hz_s
         return self.start_s + 2 * self.ramp_s + (self.steps - ramps) / self.rate_hz
 
@@ -72,7 +72,7 @@ def trapezoid(start_s: float, from_steps: float, steps: int, rate_hz: float, acc
 
 
 class TableMotion:
-    """The table: where it is commanded to be, and where it really is."""
+    """Commanded and true motion of the table."""
 
     def __init__(self, steps_per_turn: int, *, step_error_deg: float = 0.0225, gear_error_deg: float = 0.0) -> None:
         self.step_deg = 360.0 / steps_per_turn
@@ -82,14 +82,14 @@ class TableMotion:
         self._moves = [Move(-1.0, 0.0, 1, 0.0, 1.0, 1.0)]
 
     def start(self, t_s: float, steps: int, step_rate_hz: float, acceleration_dps2: float) -> float:
-        """Begin a move of whole steps (signed); returns when it will be over."""
+        """Begin a move of whole steps (signed) at a time, s; returns the time of its end."""
         from_steps = float(self._moves[-1].position(np.array([t_s]))[0])
         move = trapezoid(t_s, from_steps, steps, step_rate_hz, acceleration_dps2 / self.step_deg)
-        self._moves = [*self._moves[1 - REMEMBERED :], move]
+        self._moves = [*self._moves[1 - HISTORY_MOVES :], move]
         return move.end_s
 
     def abort(self, t_s: float) -> float:
-        """Ramp down from the present rate; returns when the table is at rest."""
+        """Ramp down from the present rate; returns the time at which the table is at rest."""
         move = self._moves[-1]
         rate = move.rate(t_s)
         if rate <= 0:
@@ -101,7 +101,7 @@ class TableMotion:
         tail = Move(
             begun, here - move.direction * ramp_steps, move.direction, 2 * ramp_steps, rate, move.acceleration_hz_s, t_s
         )
-        self._moves = [*self._moves[1 - REMEMBERED :], tail]
+        self._moves = [*self._moves[1 - HISTORY_MOVES :], tail]
         return tail.end_s
 
     def home(self, t_s: float) -> float:
@@ -114,7 +114,7 @@ class TableMotion:
         return back.end_s
 
     def moving(self, t_s: float) -> bool:
-        """Whether the table turns."""
+        """Return whether the table turns at a time, s."""
         return self._moves[-1].steps > 0 and t_s < self._moves[-1].end_s
 
     def commanded_deg(self, t_s: Array) -> Array:
@@ -122,7 +122,7 @@ class TableMotion:
         return self._steps(t_s) * self.step_deg
 
     def angle_deg(self, t_s: Array) -> Array:
-        """Return the true angle, (n,) degrees: the commanded one and the errors of steps and gear."""
+        """Return the true angle, (n,) degrees: the commanded angle plus the errors of steps and gear."""
         steps = self._steps(t_s)
         angle = steps * self.step_deg
         if self._step_error_deg:

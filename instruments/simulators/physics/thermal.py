@@ -1,7 +1,7 @@
-"""Heat: chamber air that ramps and settles, and units that follow it and warm themselves.
+"""Heat: chamber air that ramps and settles, and units that follow the air and heat themselves.
 
-Everything is integrated on one grid of whole seconds, each step exact for an input that does not change within it, so
-the result does not depend on when anybody looks.
+All temperatures are integrated on one grid of whole seconds, each step exact for a constant input, so the result does
+not depend on the times of sampling.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ GRID_S = 1.0
 
 @dataclass
 class Body:
-    """A unit's heat: its sensor follows the air, and a deeper part follows the sensor."""
+    """Temperatures of a unit, deg C: its sensor follows the air, and a deeper part follows the sensor."""
 
     sensor_tau_s: float
     self_heating_c: float
@@ -57,7 +57,7 @@ class Heat:
         self._target_c = self._ramped_c = self._air_c = start_c
         self._bodies = bodies
         self._noise_c = noise_c
-        self._wobble = 0.0
+        self._air_noise_c = 0.0
         self._rng = np.random.default_rng([seed, 11])
         self._draws: list[float] = []
         self._air = [start_c]
@@ -65,30 +65,30 @@ class Heat:
         self._deep = {name: [body.deep_c] for name, body in bodies.items()}
 
     def set(self, t_s: float, temperature_c: float) -> None:
-        """Give the chamber another set point."""
+        """Change the set point of the chamber, deg C."""
         self._advance(t_s)
         self._target_c = temperature_c
 
     def power(self, t_s: float, *, on: bool) -> None:
-        """Switch every unit."""
+        """Switch the power of every unit."""
         self._advance(t_s)
         for body in self._bodies.values():
             body.powered = on
 
     def air_c(self, t_s: float) -> float:
-        """Return the chamber air's temperature at one time."""
+        """Return the air temperature of the chamber at one time, deg C."""
         return float(self._at(self._air, np.array([t_s]))[0])
 
     def airs_c(self, t_s: Array) -> Array:
-        """Return the chamber air's temperature, (n,)."""
+        """Return the air temperature of the chamber, (n,) deg C, at rising times (n,) s."""
         return self._at(self._air, t_s)
 
     def sensor_c(self, name: str, t_s: Array) -> Array:
-        """Return a unit's sensor temperature, (n,)."""
+        """Return the sensor temperature of a unit, (n,) deg C, at rising times (n,) s."""
         return self._at(self._sensor[name], t_s)
 
     def deep_c(self, name: str, t_s: Array) -> Array:
-        """Return the temperature of the part that its thermometer does not touch, (n,)."""
+        """Return the temperature of the part away from the thermometer, (n,) deg C, at rising times (n,) s."""
         return self._at(self._deep[name], t_s)
 
     def _at(self, series: list[float], t_s: Array) -> Array:
@@ -105,8 +105,8 @@ class Heat:
             distance = self._target_c - self._ramped_c
             self._ramped_c += math.copysign(min(abs(distance), self._ramp_per_s * GRID_S), distance)
             self._air_c += (self._ramped_c - self._air_c) * self._air_share
-            self._wobble += -self._wobble * 0.05 + self._noise_c * 0.31 * self._draw()
-            air = self._air_c + self._wobble
+            self._air_noise_c += -self._air_noise_c * 0.05 + self._noise_c * 0.31 * self._draw()
+            air = self._air_c + self._air_noise_c
             self._air.append(air)
             for name, body in self._bodies.items():
                 body.step(air)

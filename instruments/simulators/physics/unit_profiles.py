@@ -1,4 +1,4 @@
-"""What simulated units are like inside: scale, alignment, bias, noise and heat, by profile."""
+"""Profiles of simulated units: scale, alignment, bias, noise and thermal behaviour."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-#: (temperature (n,)) -> (n, axes, 3): what each axis makes of the rate along x, y and z.
+#: temperature (n,) deg C -> (n, axes, 3): gain of each axis for the rates along x, y and z
 Gain = Callable[[Array], Array]
-#: (temperature (n,)) -> (n, axes)
+#: temperature (n,) deg C -> bias (n, axes) deg/s
 Offset = Callable[[Array], Array]
-#: (own rates (n, axes), temperature (n,)) -> (n, axes): what bends
+#: own rates (n, axes) deg/s, temperature (n,) deg C -> nonlinearity (n, axes) deg/s
 Bend = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True)
 class UnitTruth:
-    """One simulated unit. Nothing here is shared with the models that are fitted to it."""
+    """True properties of one simulated unit. Models that are fitted to its data share no formula with it."""
 
     axes: tuple[str, ...]
     gain: Gain
@@ -123,14 +123,14 @@ PROFILES: dict[str, Callable[[tuple[str, ...], np.random.Generator], UnitTruth]]
     "gyrostar": gyrostar,
 }
 
-#: The profile of a unit that the bench file says nothing of.
-BY_DRIVER = {"stim300": "mems-triaxial", "kvh-rd2100": "rd2100", "kvh-dsp3000": "rd2100", "gyrostar": "gyrostar"}
+#: Profile of a unit without one in the bench file, by driver.
+DEFAULT_PROFILES = {"stim300": "mems-triaxial", "kvh-rd2100": "rd2100", "kvh-dsp3000": "rd2100", "gyrostar": "gyrostar"}
 
 
 def make_unit(driver: str, axes: tuple[str, ...], settings: dict[str, Any], seed: list[int]) -> UnitTruth:
-    """Make one unit by its profile, with what the bench file changes in it."""
+    """Return one unit of a profile with the deviations of the bench file; raises ValueError for unknown names."""
     given = dict(settings)
-    profile = given.pop("profile", BY_DRIVER[driver])
+    profile = given.pop("profile", DEFAULT_PROFILES[driver])
     if profile not in PROFILES:
         raise ValueError(f"simulated unit profile {profile!r} is not known (there are {', '.join(PROFILES)})")
     made = PROFILES[profile](axes, np.random.default_rng(seed))

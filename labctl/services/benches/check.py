@@ -10,7 +10,7 @@ from typing import Any
 from instruments.bench import check
 from instruments.bench_config import shipped_benches
 from instruments.clock import ScaledClock, SystemClock, VirtualClock
-from instruments.transport.factory import serve_simulation
+from instruments.simulation import serve_simulation
 from labctl.errors import BadInput
 from labctl.services.campaigns.status import abandoned_campaigns, describe_interrupted, outlives_its_process
 from labctl.services.planning.loading import load_bench

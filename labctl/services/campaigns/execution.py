@@ -11,9 +11,9 @@ from pydantic import Field
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
+from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
-from instruments.interfaces.unit_handler import ManualUnitHandler
 from labctl.config import default_database
 from labctl.errors import BadInput, Conflict, Stopped, StoreError
 from labctl.recording import OutputUnit, RecordingInfo

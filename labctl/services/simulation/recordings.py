@@ -18,8 +18,8 @@ from pydantic import Field
 
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
 from instruments.clock import VirtualClock
-from instruments.drivers.arrick_c4 import plan_run
-from instruments.transport.factory import open_simulation
+from instruments.protocols.arrick_c4_moves import plan_move
+from instruments.simulation import hidden_defaults, open_simulation
 from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo, write_recording
 from labctl.services.commands.protocol import Request
@@ -114,8 +114,6 @@ def _is_z(text: str) -> bool:
 
 def hidden_sizes(texts: list[str]) -> dict[str, float]:
     """Read `EFFECT` or `EFFECT=SIZE`; without a size one that a person would notice. Raises BadInput."""
-    from instruments.transport.factory import hidden_defaults  # noqa: PLC0415  simulators are loaded only when something is hidden
-
     known = hidden_defaults()
     sizes: dict[str, float] = {}
     for text in texts:
@@ -209,14 +207,14 @@ class _Walk:
         table, step_deg = self._world.table, self._world.table.step_deg
         achieved, steady_from = 0.0, self._t
         if step.rate_dps:
-            run = plan_run(self._bench.table, step.rate_dps, step.settle_s + step.duration_s + 1.0)
+            run = plan_move(self._bench.table, step.rate_dps, step.settle_s + step.duration_s + 1.0)
             achieved = float(np.copysign(run.step_hz * step_deg, step.rate_dps))
             end_s = table.start(self._t, run.steps, run.step_hz, self._bench.table.acceleration_dps2)
             steady_from += run.ramp_s
         else:
             end_s = self._t + step.settle_s + step.duration_s
         first = steady_from + step.settle_s + self._period
-        times = first + np.arange(round(step.duration_s / self._period)) * self._period
+        times = first + np.arange(round(step.duration_s / self._period), dtype=np.float64) * self._period
         sample = self._unit.sample(times)
         n = len(times)
         part: dict[str, NDArray[Any]] = {

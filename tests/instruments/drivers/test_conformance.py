@@ -38,9 +38,18 @@ FIRST_WORDS = ("Get", "Control", "Measure", "Set", "What")
 @pytest.fixture(params=DRIVERS, ids=[driver for _, driver in DRIVERS])
 def one(request: pytest.FixtureRequest, stand: Make) -> Any:
     """A driver on its bench: stand, kind, driver, url."""
-    kind, name = request.param
-    bench, gyro = PLACES[name]
-    s = stand(bench, gyro=gyro)
+    return placed(stand, *request.param)
+
+
+@pytest.fixture(params=GYROS)
+def gyro(request: pytest.FixtureRequest, stand: Make) -> Any:
+    """A gyro driver on its bench."""
+    return placed(stand, "gyro", request.param)
+
+
+def placed(stand: Make, kind: str, name: str) -> Any:
+    bench, changes = PLACES[name]
+    s = stand(bench, gyro=changes)
     s.kind = kind
     s.driver = {"table": s.bench.table, "chamber": s.bench.chamber, "gyro": s.gyro}[kind]
     place = {"table": s.file.table, "chamber": s.file.chamber, "gyro": s.file.gyros[0]}[kind]
@@ -153,19 +162,17 @@ def test_limits_are_refused_before_anything_moves(one: Any) -> None:
         assert limits.min_c < limits.max_c
 
 
-def test_a_gyro_gives_whole_numbers_at_rising_times(one: Any) -> None:
-    if one.kind != "gyro":
-        pytest.skip("a gyro's")
-    one.driver.start()
-    parts = [one.driver.read(1.0) for _ in range(4)]
+def test_a_gyro_gives_whole_numbers_at_rising_times(gyro: Any) -> None:
+    gyro.driver.start()
+    parts = [gyro.driver.read(1.0) for _ in range(4)]
     times = np.concatenate([p.t_s for p in parts])
     assert np.all(np.diff(times) > 0)
-    assert len(times) == pytest.approx(4 * one.driver.sample_rate_hz, abs=3)
-    names = {channel.name for channel in one.driver.channels}
+    assert len(times) == pytest.approx(4 * gyro.driver.sample_rate_hz, abs=3)
+    names = {channel.name for channel in gyro.driver.channels}
     for part in parts:
         assert set(part.raw) == names
         assert all(values.dtype == np.int64 for values in part.raw.values())
         assert part.valid.dtype == bool
-    glanced = one.driver.read_latest()
+    glanced = gyro.driver.read_latest()
     assert len(glanced) == 1
-    assert one.clock.now_s() - glanced.t_s[0] <= 2 / one.driver.sample_rate_hz + 0.1
+    assert gyro.clock.now_s() - glanced.t_s[0] <= 2 / gyro.driver.sample_rate_hz + 0.1

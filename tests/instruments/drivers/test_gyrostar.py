@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from instruments.drivers.gyrostar import FULL_CODE, RANGES_V, Options, make_channels
+from instruments.drivers.gyrostar import make_channels
 from instruments.errors import LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
+from instruments.protocols.adam6017 import FULL_CODE, RANGES_V, WiringOptions
 from instruments.simulators.adam6017 import code_of
 
 pytest_plugins = ["tests.helpers.modbus_rig"]
@@ -21,7 +22,7 @@ pytest_plugins = ["tests.helpers.modbus_rig"]
     [(0x0143, 305.2, 0.0139, 40959), (0x0142, 152.6, 0.0069, 49151), (0x0147, 76.3, 0.0035, 32768)],
 )
 def test_codes_of_the_ranges(range_code: int, uv_per_code: float, dps_per_code: float, at_rest: int) -> None:
-    (rate,) = make_channels("z", Options(range_code=range_code))
+    (rate,) = make_channels("z", WiringOptions(range_code=range_code))
     assert rate.unit == "V"
     assert rate.scale * 1e6 == pytest.approx(uv_per_code, abs=0.05)
     assert rate.scale / 0.022 == pytest.approx(dps_per_code, abs=5e-5)
@@ -32,13 +33,15 @@ def test_codes_of_the_ranges(range_code: int, uv_per_code: float, dps_per_code: 
 @pytest.mark.parametrize("range_code", RANGES_V)
 def test_zero_is_the_low_end_and_65535_the_high_end(range_code: int) -> None:
     low, high = RANGES_V[range_code]
-    channel = make_channels("z", Options(range_code=range_code))[0]
+    channel = make_channels("z", WiringOptions(range_code=range_code))[0]
     assert channel.value(np.array([0, FULL_CODE])) == pytest.approx([low, high])
     assert [code_of(v, range_code) for v in (low - 1, low, high, high + 1)] == [0, 0, FULL_CODE, FULL_CODE]
 
 
 def test_full_rate_is_within_the_recommended_range() -> None:
-    volts = make_channels("z", Options())[0].value(np.array([code_of(2.5 + 0.022 * r, 0x0147) for r in (-90, 90)]))
+    volts = make_channels("z", WiringOptions())[0].value(
+        np.array([code_of(2.5 + 0.022 * r, 0x0147) for r in (-90, 90)])
+    )
     assert volts == pytest.approx([0.52, 4.48], abs=4e-5)
 
 

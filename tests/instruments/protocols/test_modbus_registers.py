@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instruments.drivers import gyrostar, watlow_f4, watlow_f4t
+from instruments.protocols import adam6017, watlow_f4_registers, watlow_f4t_registers
 from instruments.protocols.modbus_registers import Register
 
 SIGNED = Register(100, "air", "int16", "counts")
@@ -50,26 +50,26 @@ def test_every_float_comes_back(value: float, order: str) -> None:
 
 def test_words_in_the_wrong_order_leave_the_range_of_a_temperature() -> None:
     for temperature_c in (-40.0, 25.0, 85.1, 150.0):
-        swapped = watlow_f4t.AIR.decode(watlow_f4t.AIR.encode(temperature_c, "big"), "little")
-        assert not watlow_f4t.AIR.holds(swapped) or abs(swapped) < 1e-3
+        swapped = watlow_f4t_registers.AIR.decode(watlow_f4t_registers.AIR.encode(temperature_c, "big"), "little")
+        assert not watlow_f4t_registers.AIR.holds(swapped) or abs(swapped) < 1e-3
 
 
 def test_nothing_holds_what_is_no_number() -> None:
     assert not FLOAT.holds(math.nan)
     assert FLOAT.holds(math.inf)
-    assert not watlow_f4t.AIR.holds(math.inf)
+    assert not watlow_f4t_registers.AIR.holds(math.inf)
 
 
 def test_equal_inputs_are_counted_by_their_stride() -> None:
-    assert watlow_f4.INPUT_STATE.nth(4, 12).number == 237
-    assert watlow_f4.EVENT.nth(8, 10).number == 2070
-    assert watlow_f4t.ALARM.nth(3, 100).number == 1556
-    assert str(gyrostar.RANGE_CODE.nth(7, 1, first=0)) == "range code of input 7 (register 207)"
+    assert watlow_f4_registers.INPUT_STATE.nth(4, 12).number == 237
+    assert watlow_f4_registers.EVENT.nth(8, 10).number == 2070
+    assert watlow_f4t_registers.ALARM.nth(3, 100).number == 1556
+    assert str(adam6017.RANGE_CODE.nth(7, 1, first=0)) == "range code of input 7 (register 207)"
 
 
-@pytest.mark.parametrize("driver", [watlow_f4, watlow_f4t, gyrostar])
-def test_every_declared_register_says_what_it_is_and_where_its_number_is_from(driver: object) -> None:
-    declared = [value for value in vars(driver).values() if isinstance(value, Register)]
+@pytest.mark.parametrize("table", [watlow_f4_registers, watlow_f4t_registers, adam6017])
+def test_every_declared_register_says_what_it_is_and_where_its_number_is_from(table: object) -> None:
+    declared = [value for value in vars(table).values() if isinstance(value, Register)]
     assert len(declared) >= 3
     for register in declared:
         assert register.meaning

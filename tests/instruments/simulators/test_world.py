@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from instruments.simulation import hidden_defaults
 from instruments.simulators.physics.motion import TableMotion
-from instruments.transport.factory import hidden_defaults
 
 Make = Callable[..., Any]
 EARTH_DPS = 360 / 86164.0905

@@ -14,14 +14,16 @@ from hypothesis import strategies as st
 from instruments.clock import VirtualClock
 from instruments.errors import InstrumentError, LimitError, LinkError, MalformedReply, NoReply, RequestRejected
 from instruments.protocols.modbus_registers import Register
+from instruments.simulators.links.factory import SimulatedLinks
 from instruments.simulators.links.faults import Faults, FaultyWire
 from instruments.simulators.links.modbus_device import ModbusDevice, constant, int16
-from instruments.transport import modbus
-from instruments.transport.modbus import Client, RefusedRegister, Registers
+from instruments.transport.factory import Ports
+from instruments.transport.modbus import Registers
+from instruments.transport.modbus_link import RETRY_PAUSES_S, Client, RefusedRegister
 
 AIR = Register(100, "air temperature", "int16", "counts")
 SETPOINT = Register(300, "set point", "int16", "counts", low=-400, high=1500, access="rw")
-ALL_TRIES_S = 3 * 1.0 + sum(modbus.RETRY_PAUSES_S)
+ALL_TRIES_S = 3 * 1.0 + sum(RETRY_PAUSES_S)
 
 
 class Bench:
@@ -45,11 +47,11 @@ class Bench:
         return value != 666
 
     def link(self) -> Client:
-        place: dict[str, Any] = {"device": "chamber", "clock": self.clock, "timeout_s": 1.0, "at": self.wire}
+        ports = Ports(self.clock, SimulatedLinks(lambda _: self.wire, self.clock))
         if self.framing == "tcp":
-            self.clients.append(modbus.connect_tcp("sim://it", 502, **place))
+            self.clients.append(ports.modbus_tcp("sim://it", 502, device="chamber", timeout_s=1.0))
         else:
-            self.clients.append(modbus.connect_rtu("sim://it", baudrate=19200, **place))
+            self.clients.append(ports.modbus_rtu("sim://it", device="chamber", baudrate=19200, timeout_s=1.0))
         return self.clients[-1]
 
 
@@ -320,26 +322,25 @@ def test_closing_twice_is_fine_and_the_next_request_opens_again(bench: Bench) ->
 
 
 def test_a_real_host_that_refuses_is_named() -> None:
-    clock = VirtualClock()
     with pytest.raises(LinkError, match=r"chamber: no Modbus TCP at 127\.0\.0\.1:1; check address"):
-        modbus.connect_tcp("127.0.0.1", 1, device="chamber", clock=clock, timeout_s=1.0, at=None)
+        Ports(VirtualClock()).modbus_tcp("127.0.0.1", 1, device="chamber", timeout_s=1.0)
 
 
 def test_a_real_port_that_is_not_there_is_named() -> None:
-    clock = VirtualClock()
     with pytest.raises(LinkError, match="chamber: serial port /dev/no-such-port cannot be opened; check its name"):
-        modbus.connect_rtu("/dev/no-such-port", device="chamber", clock=clock, baudrate=9600, timeout_s=1.0, at=None)
+        Ports(VirtualClock()).modbus_rtu("/dev/no-such-port", device="chamber", baudrate=9600, timeout_s=1.0)
 
 
 def test_a_real_port_on_which_nobody_answers_is_silence_too() -> None:
     ours, theirs = os.openpty()
     try:
-        place: dict[str, Any] = {"device": "chamber", "clock": VirtualClock(), "timeout_s": 1.0, "at": None}
+        clock = VirtualClock()
+        port = os.ttyname(theirs)
         registers = Registers(
             "chamber",
             1,
-            place["clock"],
-            lambda: modbus.connect_rtu(os.ttyname(theirs), baudrate=19200, **place),
+            clock,
+            lambda: Ports(clock).modbus_rtu(port, device="chamber", baudrate=19200, timeout_s=1.0),
         )
         with pytest.raises(NoReply, match="no answer to read air temperature"):
             registers.get(AIR)

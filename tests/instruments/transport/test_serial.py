@@ -11,7 +11,7 @@ import pytest
 from instruments.bench_config import GyroSettings, TableSettings
 from instruments.clock import VirtualClock
 from instruments.drivers.arrick_c4 import ArrickC4
-from instruments.drivers.kvh import KvhDsp3000
+from instruments.drivers.kvh import KVH_DSP3000, KvhGyro
 from instruments.drivers.stim300 import Stim300
 from instruments.errors import LinkError
 from instruments.transport.factory import Ports
@@ -27,7 +27,7 @@ def stim(port: str, clock: VirtualClock) -> Callable[[], Any]:
 
 def kvh(port: str, clock: VirtualClock) -> Callable[[], Any]:
     settings = GyroSettings(name="fog", driver="kvh-dsp3000", port=port, serial="F-1", max_rate_dps=100.0)
-    unit = KvhDsp3000(settings, Ports(clock), clock)
+    unit = KvhGyro(settings, Ports(clock), clock, model=KVH_DSP3000)
     unit.start()
     return unit.read_latest
 
@@ -35,8 +35,8 @@ def kvh(port: str, clock: VirtualClock) -> Callable[[], Any]:
 def table(port: str, clock: VirtualClock) -> Callable[[], Any]:
     settings = TableSettings(port=port, max_rate_dps=100.0, acceleration_dps2=50.0)
     found = ArrickC4(settings, Ports(clock), clock)
-    found._open()
-    return found._fresh
+    found._link.open()
+    return found._link.discard_input
 
 
 @pytest.mark.parametrize("instrument", [stim, kvh, table])

@@ -1,0 +1,113 @@
+"""Serial link to the Arrick C4: commands out, reply letters in, every failure an InstrumentError."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NoReturn
+
+import serial
+
+from instruments.bench_config import TableSettings
+from instruments.clock import Clock
+from instruments.errors import LinkError, NoReply, RequestRejected
+from instruments.protocols import arrick_c4_lines as lines
+from instruments.transport.factory import Ports
+from instruments.transport.serial import BROKEN
+
+REPLY_S = 1.0
+#: Replies of an earlier move that can arrive before the reply to the present command.
+LATE_LETTERS = lines.ACCEPTED + lines.FINISHED
+LINE_END = b"\r\n"
+
+
+class C4Link:
+    """The port of one controller, opened at first use; `opened` is called each time, for what has to be sent again."""
+
+    def __init__(
+        self, device: str, settings: TableSettings, ports: Ports, clock: Clock, opened: Callable[[], None]
+    ) -> None:
+        self._device, self._settings = device, settings
+        self._ports, self._clock = ports, clock
+        self._opened = opened
+        self._port: serial.SerialBase | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the port is open."""
+        return self._port is not None
+
+    def open(self) -> serial.SerialBase:
+        """Return the port, opened where it was closed; raises LinkError."""
+        if self._port is None:
+            settings = self._settings
+            self._port = self._ports.serial(
+                settings.port, device=self._device, baudrate=settings.baudrate, timeout_s=REPLY_S
+            )
+            self._opened()
+        return self._port
+
+    def close(self) -> None:
+        """Close the port; safe to call twice."""
+        if self._port is not None:
+            self._port.close()
+            self._port = None
+
+    def discard_input(self) -> None:
+        """Drop unread replies; raises LinkError."""
+        try:
+            self.open().reset_input_buffer()
+        except BROKEN as error:
+            self._fail(error)
+
+    def send(self, command: str) -> None:
+        """Send a command line with the terminator of the bench file; raises LinkError."""
+        try:
+            self.open().write((command + self._settings.terminator).encode("ascii"))
+        except BROKEN as error:
+            self._fail(error)
+
+    def read_letter(self, timeout_s: float = REPLY_S, skip: str = "") -> str:
+        """Return the next letter that is neither a line end nor one of `skip`; raises NoReply or LinkError."""
+        port = self.open()
+        deadline_s = self._clock.now_s() + timeout_s
+        try:
+            while True:
+                port.timeout = self._port_timeout_s(deadline_s)
+                found = bytes(port.read(1))
+                if found and found not in LINE_END and found.decode("latin-1") not in skip:
+                    return found.decode("latin-1")
+                if not found and self._clock.now_s() >= deadline_s - 1e-9:
+                    raise NoReply(
+                        self._device,
+                        f"{self._settings.port} gave no answer in {timeout_s:.1f} s; check power, cable and baud rate",
+                    )
+        except BROKEN as error:
+            self._fail(error)
+
+    def read_line(self) -> str:
+        """Return the next line of text; raises NoReply or LinkError."""
+        text = self.read_letter(skip=LATE_LETTERS)
+        port = self.open()
+        while (found := bytes(port.read(1))) and found not in LINE_END:
+            text += found.decode("latin-1")
+        return text
+
+    def expect(self, letter: str, what: str, timeout_s: float = REPLY_S) -> None:
+        """Read one letter; raises RequestRejected for another one, NoReply or LinkError. `what` is for the message."""
+        found = self.read_letter(timeout_s)
+        if found != letter:
+            raise RequestRejected(
+                self._device, f"answered {found!r} where {letter!r} was expected, so it did not {what}; home the table"
+            )
+
+    def _port_timeout_s(self, deadline_s: float) -> float:
+        remaining_s = max(deadline_s - self._clock.now_s(), 0.0)
+        if remaining_s == 0:
+            return 0.0
+        return self._ports.port_timeout_s(self._settings.port, remaining_s, device=self._device)
+
+    def _fail(self, error: Exception) -> NoReturn:
+        self.close()
+        raise LinkError(
+            self._device, f"the link {self._settings.port} broke ({error}); check the cable, then try again"
+        ) from error

@@ -1,0 +1,53 @@
+"""Unit handlers of a bench without simulated units in this process: a person, or a simulator in another process."""
+
+from __future__ import annotations
+
+import socket
+
+from instruments.errors import LinkError, RequestRejected
+from instruments.protocols.simulator_control import OK, mount_line, power_line
+
+#: Device name in messages.
+DEVICE = "unit handler"
+
+
+class ManualUnitHandler:
+    """A bench on which only a person can turn and switch the units: every request is rejected with that advice."""
+
+    def mount(self, position: str) -> None:
+        """Control nothing: a person has to turn the units. Raises RequestRejected."""
+        raise RequestRejected(DEVICE, f"only a person can turn the units to {position} up; confirm when it is done")
+
+    def power(self, on: bool) -> None:
+        """Control nothing: a person has to switch the units. Raises RequestRejected."""
+        raise RequestRejected(
+            DEVICE, f"only a person can switch the units {'on' if on else 'off'}; confirm when it is done"
+        )
+
+
+class RemoteUnitHandler:
+    """The simulator in another process at `address` (HOST:PORT): one control line per request."""
+
+    TIMEOUT_S = 5.0
+
+    def __init__(self, address: str) -> None:
+        host, _, port = address.rpartition(":")
+        self._address = (host, int(port))
+
+    def mount(self, position: str) -> None:
+        """Control the simulator: turn its units. Raises LinkError, RequestRejected."""
+        self._request(mount_line(position))
+
+    def power(self, on: bool) -> None:
+        """Control the simulator: switch its units. Raises LinkError, RequestRejected."""
+        self._request(power_line(on))
+
+    def _request(self, line: str) -> None:
+        try:
+            with socket.create_connection(self._address, timeout=self.TIMEOUT_S) as link:
+                link.sendall(f"{line}\n".encode())
+                reply = link.makefile().readline().strip()
+        except OSError as error:
+            raise LinkError(DEVICE, f"the simulator at {self._address} does not answer ({error})") from error
+        if reply != OK:
+            raise RequestRejected(DEVICE, f"the simulator answered {reply!r} to {line!r}")

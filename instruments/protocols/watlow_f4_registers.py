@@ -1,0 +1,41 @@
+"""Registers of the Watlow Series F4: signed 16-bit counts with implied decimals.
+
+No complete register list of this controller is public. The numbers come from projects that operate real chambers
+(ChamberConnectLibrary of Espec North America; gateways for the F4); a number that only one of them shows is a setting
+of the bench file.
+"""
+
+from __future__ import annotations
+
+from instruments.protocols.modbus_registers import Register
+
+CCL = "ChamberConnectLibrary, watlowf4.py"
+FIELD = "seen on real chambers by several gateways"
+#: The controller needs this pause between two requests, s (ChamberConnectLibrary, modbus.py).
+PAUSE_S = 0.03
+#: Counts at or below this value are codes for absent or broken sensors (Watlow communications guide).
+LOWEST_COUNT = -31999
+
+MODEL = Register(0, "model", source="pymodbus driver of an F4 chamber")
+AIR = Register(100, "air temperature", "int16", "counts", low=LOWEST_COUNT, source=FIELD)
+MODE = Register(200, "mode", low=0, high=3, source=CCL)
+INPUT_STATE = Register(201, "state of digital input", source=CCL)
+SETPOINT = Register(300, "set point", "int16", "counts", low=LOWEST_COUNT, access="rw", source=FIELD)
+SETPOINT_LOW = Register(602, "set point low limit", "int16", "counts", access="rw", source=CCL)
+SETPOINT_HIGH = Register(603, "set point high limit", "int16", "counts", access="rw", source=CCL)
+DECIMALS = Register(606, "decimals of input 1", low=0, high=3, source=CCL)
+UNITS = Register(608, "units of input 1", low=0, high=3, source=CCL)
+SCALE = Register(901, "temperature scale", source=CCL)
+INPUT_FUNCTION = Register(1060, "function of digital input", source=CCL)
+INPUT_ACTIVE = Register(1061, "active state of digital input", source=CCL)
+TERMINATE = Register(1217, "end of the profile", low=1, high=1, access="w", source=CCL)
+EVENT = Register(2000, "event output", low=0, high=1, access="rw", source=CCL)
+INPUT_STRIDE, INPUT_SETUP_STRIDE, EVENT_STRIDE = 12, 2, 10
+INPUTS, EVENTS = 4, 8
+
+MODEL_F4 = 5270
+UNITS_TEMPERATURE, SCALE_FAHRENHEIT = 0, 0
+MODE_STATIC, MODE_PROFILE_RUNNING, MODE_PROFILE_HELD = 0, 2, 3
+TERMINATE_PROFILE = 1
+#: Digital input function: a profile waits for the input, so the input is not an alarm.
+FUNCTION_WAIT_FOR = 10

@@ -1,0 +1,55 @@
+"""Rates and specific force in body axes: the turning table, the rotation of the Earth, and gravity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+#: One sidereal turn, deg/s.
+EARTH_DPS = 360.0 / 86164.0905
+
+
+@dataclass(frozen=True)
+class BodyFrame:
+    """Orientation of the units: body axis along the table axis, the two level axes in cyclic order, and the sign."""
+
+    up: int
+    first: int
+    second: int
+    sign: float
+
+    @classmethod
+    def of(cls, position: str) -> BodyFrame:
+        """Return the frame of a mounting position: the body axis that points up, x, -x, y ..."""
+        up = "xyz".index(position.lstrip("-"))
+        return cls(up, (up + 1) % 3, (up + 2) % 3, -1.0 if position.startswith("-") else 1.0)
+
+    def gravity(self, n: int) -> Array:
+        """Return the specific force in body axes, (n, 3) g: one g up."""
+        g = np.zeros((n, 3))
+        g[:, self.up] = self.sign
+        return g
+
+
+@dataclass(frozen=True)
+class EarthRotation:
+    """Rotation of the Earth at a latitude (None leaves it out); `north_deg` is the table angle of north."""
+
+    latitude_deg: float | None
+    north_deg: float
+
+    def body_rates(self, frame: BodyFrame, table_dps: Array, angle_deg: Array) -> Array:
+        """Return the inertial rate in body axes, (n, 3) deg/s, at table rates and table angles (n,)."""
+        rates = np.zeros((len(table_dps), 3))
+        rates[:, frame.up] = frame.sign * table_dps
+        if self.latitude_deg is not None:
+            latitude = np.radians(self.latitude_deg)
+            rates[:, frame.up] += frame.sign * EARTH_DPS * np.sin(latitude)
+            heading = np.radians(angle_deg - self.north_deg)
+            level = EARTH_DPS * np.cos(latitude)
+            rates[:, frame.first] += level * np.cos(heading)
+            rates[:, frame.second] -= frame.sign * level * np.sin(heading)
+        return rates

@@ -1,0 +1,30 @@
+"""What a simulated instrument is built from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from instruments.bench_config import BenchFile, GyroSettings
+from instruments.simulators.links.faults import Faults
+from instruments.simulators.physics.world import SimulatedGyro, World
+
+
+@dataclass(frozen=True)
+class InstrumentSetup:
+    """Place of one simulated instrument: its bench, the world it shares, its faults, and the gyro of its address."""
+
+    world: World
+    bench: BenchFile
+    gyro_name: str
+    faults: Faults
+    port_buffer_bytes: int  #: unread bytes that a serial port keeps
+
+    @property
+    def gyro(self) -> GyroSettings:
+        """Settings of the gyro at the instrument's address; raises StopIteration where the bench has none so named."""
+        return next(gyro for gyro in self.bench.gyros if gyro.name == self.gyro_name)
+
+    @property
+    def unit(self) -> SimulatedGyro:
+        """Simulated unit at the instrument's address; raises KeyError where the bench has none so named."""
+        return self.world.gyro(self.gyro_name)

@@ -1,0 +1,22 @@
+"""Unit handler of the simulated world in this process."""
+
+from __future__ import annotations
+
+from instruments.clock import Clock
+from instruments.simulators.physics.world import World
+
+
+class SimulatedUnitHandler:
+    """Turns and switches the units of the simulated world at the present clock time."""
+
+    def __init__(self, world: World, clock: Clock) -> None:
+        self._world = world
+        self._clock = clock
+
+    def mount(self, position: str) -> None:
+        """Control the world: turn its units."""
+        self._world.mount(self._clock.now_s(), position)
+
+    def power(self, on: bool) -> None:
+        """Control the world: switch its units on or off."""
+        self._world.power(self._clock.now_s(), on)

@@ -1,0 +1,91 @@
+"""Serial port of a device that sends unsolicited; a broken wire becomes a LinkError that names the device."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import serial
+
+from instruments.clock import Clock, sleep_until
+from instruments.errors import LinkError
+from instruments.transport.factory import Ports
+from instruments.transport.serial import BROKEN
+
+#: Clock seconds that count as no time: rounding of sums of durations.
+TINY_S = 1e-9
+
+
+class SerialStream:
+    """One serial port, opened by `open` and read as bytes on the bench clock. Every failure is a LinkError."""
+
+    def __init__(self, device: str, url: str, ports: Ports, clock: Clock, *, baudrate: int, timeout_s: float) -> None:
+        self._device, self._url = device, url
+        self._ports, self._clock = ports, clock
+        self._baudrate, self._timeout_s = baudrate, timeout_s
+        self._port: serial.SerialBase | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the port is open."""
+        return self._port is not None
+
+    def open(self) -> None:
+        """Open the port unless it is open; raises LinkError."""
+        if self._port is None:
+            self._port = self._ports.serial(
+                self._url, device=self._device, baudrate=self._baudrate, timeout_s=self._timeout_s
+            )
+
+    def close(self) -> None:
+        """Close the port; safe to call twice."""
+        if self._port is not None:
+            self._port.close()
+            self._port = None
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; raises LinkError."""
+        try:
+            self._opened().write(data)
+        except BROKEN as error:
+            self._fail(error)
+
+    def discard_input(self) -> None:
+        """Drop every byte that was not read yet; raises LinkError."""
+        try:
+            self._opened().reset_input_buffer()
+        except BROKEN as error:
+            self._fail(error)
+
+    def read_available(self) -> bytes:
+        """Return the bytes that have arrived, without waiting; raises LinkError."""
+        port = self._opened()
+        try:
+            waiting = port.in_waiting
+            return bytes(port.read(waiting)) if waiting else b""
+        except BROKEN as error:
+            self._fail(error)
+
+    def read_for(self, duration_s: float, every_s: float) -> bytes:
+        """Return the bytes of the next `duration_s` clock seconds; the port is emptied every `every_s` seconds.
+
+        Raises LinkError.
+        """
+        end_s = self._clock.now_s() + duration_s
+        data = b""
+        while True:
+            sleep_until(self._clock, min(self._clock.now_s() + every_s, end_s))
+            data += self.read_available()
+            if self._clock.now_s() >= end_s - TINY_S:
+                return data
+
+    def _opened(self) -> serial.SerialBase:
+        if self._port is None:
+            raise LinkError(self._device, f"the stream on {self._url} was not started")
+        return self._port
+
+    def _fail(self, error: Exception) -> NoReturn:
+        self.close()
+        raise LinkError(
+            self._device,
+            f"the link {self._url} broke ({error}); check the cable; the stream must be started again",
+        ) from error
