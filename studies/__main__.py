@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-STUDIES = ("coverage", "criticism", "kills", "real_kills", "faults")
+STUDIES = ("coverage", "criticism", "crash_recovery", "process_kill", "faults")
 
 
 def main(names: list[str]) -> int:

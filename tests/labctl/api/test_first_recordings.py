@@ -51,7 +51,7 @@ def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClien
     (row,) = client.get("/api/recordings").json()
     assert (row["serial"], row["readings"], row["campaign"]) == ("HIDDEN-7", answer["readings"], None)
     assert "simulated: recipe short, seed 7" in row["notes"]
-    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
+    store: Store = client.app.state.service.store  # type: ignore[attr-defined]
     (act,) = store.audit.rows()
     assert act.action == "simulate"
     assert act.detail.items() >= {"hidden": answer["hidden"], "seed": 7, "serial": "HIDDEN-7"}.items()
@@ -94,7 +94,7 @@ def run(client: TestClient, **body: Any) -> int:  # noqa: F811
 def test_a_simulated_campaign_can_hide_an_effect(client: TestClient) -> None:  # noqa: F811
     plain, hidden = run(client), run(client, hide=HIDE)
     assert asymmetry(client, hidden) - asymmetry(client, plain) == pytest.approx(0.04, rel=0.1)
-    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
+    store: Store = client.app.state.service.store  # type: ignore[attr-defined]
     assert store.campaigns.get(1).bench["simulation"]["hidden"] == {}
     assert store.campaigns.get(2).bench["simulation"]["hidden"] == {"scale_factor_asymmetry": 0.02}
     starts = [row.detail for row in store.audit.rows() if row.action == "campaign start"]

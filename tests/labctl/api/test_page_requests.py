@@ -76,7 +76,7 @@ def test_certifications_are_listed_newest_first(fog: TestClient) -> None:
 
 def taken_in(client: TestClient, recording: Recording) -> int:
     """Take a recording in past the door; returns its number."""
-    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
+    store: Store = client.app.state.service.store  # type: ignore[attr-defined]
     return store.recordings.add_import(recording, recording.info.started_at)
 
 
@@ -132,7 +132,7 @@ def test_a_preview_is_what_improve_makes_and_changes_nothing(
     unit = "/api/units/ONE/calibrations"
     client.post(unit, json={"effects": ["bias", "scale_factor"]})
     path, change = f"{unit}/1", {"add": ["scale_factor_asymmetry"]}
-    store: Store = client.app.state.lab_service.store  # type: ignore[attr-defined]
+    store: Store = client.app.state.service.store  # type: ignore[attr-defined]
     before = store.audit.rows()
     preview = client.post(f"{path}/preview", json=change)
     assert preview.status_code == 200, preview.text

@@ -76,8 +76,8 @@ def test_a_campaigns_steps_tell_what_became_of_them(ran: TestClient) -> None:  #
     assert (plan["state"], set(line["state"]), plan["datasets"]) == ("done", {"done"}, 15)
     assert line["forecast_s"] == line["started_s"]
     assert line["started_s"] == sorted(line["started_s"])
-    store: Store = ran.app.state.lab_service.store  # type: ignore[attr-defined]
-    bench = ran.app.state.lab_service.bench  # type: ignore[attr-defined]
+    store: Store = ran.app.state.service.store  # type: ignore[attr-defined]
+    bench = ran.app.state.service.bench  # type: ignore[attr-defined]
     prepare(store, "short", bench, VirtualClock(), clip=False).bench.close()
     later = ran.get("/api/campaigns/2/plan").json()["timeline"]
     assert set(later["state"]) == {"to come"}
