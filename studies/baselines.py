@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.evidence import LEAST_LEFT, Design
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.data.channels import Array
 from labctl.fitting.data.temperature_levels import folds
+from labctl.fitting.numeric.arrays import Array
 
 #: What the extra `study` brings.
 DISTRIBUTIONS = ("statsmodels", "scikit-learn", "pysindy")

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.data.channels import Array
 from labctl.fitting.data.earth import turning_size_dps
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
 from labctl.fitting.models.error_model import ErrorModel, expand
+from labctl.fitting.numeric.arrays import Array
 
 #: Knots of a smooth function of a channel: a coarse and a fine one compete.
 KNOTS = (5, 9)

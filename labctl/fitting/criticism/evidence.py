@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 
 from labctl.fitting.criticism.candidates import Option
 from labctl.fitting.criticism.noise_grid import Noise, factors, whiten
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 
 #: Directions of an option that the base leaves less of than this (squared share) are taken as the base's.
 LEAST_LEFT = 1e-4

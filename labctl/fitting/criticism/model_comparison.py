@@ -13,9 +13,9 @@ from labctl.fitting.criticism.candidates import Option, base_rows, options_of
 from labctl.fitting.criticism.evidence import AxisEvidence, Design, eliminate_base, evidence, gains_of, solve_option
 from labctl.fitting.criticism.noise_grid import Noise, noise_grid
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.data.channels import Array
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.numeric.arrays import Array
 
 #: From this evidence on, the scatter of the coordinates is estimated again without what the leader explains.
 SECOND_LOOK = 6.0

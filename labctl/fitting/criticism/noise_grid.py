@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 
 #: Drift time constants, s; 0 stands for three of them in equal parts, as bias instability has.
 TAUS_S = (0.0, 120.0, 900.0, 4000.0)

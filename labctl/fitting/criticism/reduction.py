@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.channels import Array, Carrier, Channels, body_rates, channels_of
+from labctl.fitting.data.channels import Carrier, Channels, body_rates, channels_of
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.static_record import StaticRecord
 from labctl.fitting.data.temperature_channel import with_temperature
-from labctl.fitting.data.temperature_history import past_of
+from labctl.fitting.data.temperature_history import history_of
 from labctl.fitting.effects import Column
+from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording, RecordingInfo, to_points
 from labctl.recording.points import dataset_starts, pieces
 
@@ -310,7 +311,7 @@ def _nodes(
     position = texts["position"][begin] if "position" in texts else np.full(m, recording.info.axes[0])
     text: dict[str, NDArray[np.str_]] = {"position": np.repeat(np.asarray(position, dtype=np.str_), bins)}
     true = columns["table_rate_dps"] + up_rate_dps(recording.info)
-    channels = Channels({**columns, **text}, body_rates(true, text["position"]), past_of(recording))
+    channels = Channels({**columns, **text}, body_rates(true, text["position"]), history_of(recording))
     return channels, weights
 
 

@@ -15,7 +15,7 @@ from labctl.fitting.criticism.evidence import stack
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.noise_grid import factors
 from labctl.fitting.criticism.reduction import KINDS, ReducedRecording
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 
 #: Bins of a channel in which a residual is looked at.
 BINS = 8

@@ -1,4 +1,4 @@
-"""What a regressor can see: named arrays of equal length, means of data sets or single readings alike."""
+"""Channels: the logged columns that a regressor can depend on, for means of data sets and single readings alike."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.temperature_history import TemperatureHistory, past_of
+from labctl.fitting.data.temperature_history import TemperatureHistory, history_of
+from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 
-Array = NDArray[np.float64]
 BODY_AXES = ("x", "y", "z")
 #: A wave, "cos" or "sin", and how often it comes per turn of the table.
 Carrier = tuple[str, int]
-#: How long a data set is taken to be where nobody says.
+#: Duration of a data set, s, where the recording does not give it.
 USUAL_DURATION_S = 60.0
 
 
@@ -24,12 +24,12 @@ USUAL_DURATION_S = 60.0
 class Channels:
     """Logged channels under the recording's column names, (n,) each, and the rate along each body axis.
 
-    `rates` is what a rate regressor sees: the true rate for a forward law, the gyro's output for a direct one.
+    `rates` is the argument of a rate regressor: the true rate for a forward law, the gyro's output for a direct one.
     """
 
     columns: Mapping[str, NDArray[Any]]
     rates: Mapping[str, Array]  #: body axis -> (n,) deg/s
-    past: TemperatureHistory = field(default_factory=TemperatureHistory)  #: what was before each row
+    history: TemperatureHistory = field(default_factory=TemperatureHistory)  #: of the whole recording
     harmonics: Mapping[Carrier, Array] = field(default_factory=dict)  #: means over each row of waves in the table angle
 
     def __len__(self) -> int:
@@ -42,7 +42,7 @@ class Channels:
         return self.columns[name]
 
     def rate_dps(self, axis: str) -> Array:
-        """Return the rate along a body axis, (n,) deg/s; zero along an axis of which nothing is known."""
+        """Return the rate along a body axis, (n,) deg/s; zero along an axis without a rate."""
         return self.rates[axis] if axis in self.rates else np.zeros(len(self))
 
     def temperature_c(self, axis: str) -> Array:
@@ -59,7 +59,7 @@ class Channels:
         return Channels(
             {name: values[rows] for name, values in self.columns.items()},
             {axis: values[rows] for axis, values in self.rates.items()},
-            self.past,
+            self.history,
             {carrier: values[rows] for carrier, values in self.harmonics.items()},
         )
 
@@ -114,11 +114,11 @@ def body_rates(table_rate_dps: Array, position: NDArray[Any]) -> dict[str, Array
 def channels_of(points: Recording, up_rate_dps: float = 0.0) -> Channels:
     """Return the channels of a recording, with the true rate along each body axis.
 
-    `up_rate_dps` is a rate that the table axis has besides the table's own: the Earth's, upwards.
+    `up_rate_dps` is added to the table's rate, deg/s: the Earth's rate along the table axis, upwards.
     """
     columns = dict(points.columns)
     columns.setdefault("position", np.full(len(points), points.info.axes[0]))
     true = np.asarray(columns["table_rate_dps"], dtype=np.float64) + up_rate_dps
     if "previous_rate_dps" not in columns and points.info.kind == "points":
         columns["previous_rate_dps"] = np.concatenate([[0.0], np.asarray(columns["table_rate_dps"])[:-1]])
-    return Channels(columns, body_rates(true, np.asarray(columns["position"])), past_of(points))
+    return Channels(columns, body_rates(true, np.asarray(columns["position"])), history_of(points))

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from labctl.fitting.data.channels import Array, Channels
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.recording import RecordingInfo
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import BadInput, NotEnoughData
-from labctl.fitting.data.channels import Array, Channels, channels_of
+from labctl.fitting.data.channels import Channels, channels_of
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.temperature_channel import with_temperature
 from labctl.fitting.data.temperature_levels import temperature_levels
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.recording import Recording, RecordingInfo, to_points
 

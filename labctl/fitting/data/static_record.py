@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.channels import Array
 from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, allan
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 from labctl.recording import Recording
 from labctl.recording.points import temperature_of

@@ -1,77 +1,86 @@
-"""What was before a reading: temperatures between and during data sets, their direction, runs and mountings."""
+"""History of a recording: temperature between and during data sets, powered runs, mountings, the range of the rate.
+
+The temperature of each powered run is resampled to an even spacing of `SPACING_S`. What an effect asks of it (slope,
+lag, hysteresis) is computed once over the whole run and interpolated at the times of the rows that ask.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
+from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 
-if TYPE_CHECKING:
-    from labctl.fitting.data.channels import Channels
-
-Array = NDArray[np.float64]
-#: The temperature's course is brought to this spacing.
+#: Logged columns by name, (n,) each.
+LoggedColumns = Mapping[str, NDArray[Any]]
+#: Spacing of a resampled temperature course, s.
 SPACING_S = 10.0
 
 
 @dataclass(frozen=True)
 class TemperatureCourse:
-    """The temperature of one powered run, evenly spaced."""
+    """Temperature of one powered run, evenly spaced by `SPACING_S`."""
 
-    begin_s: float
-    temperature_c: Array
+    begin_s: float  #: time of the first value, s
+    temperature_c: Array  #: (k,) deg C
 
     def at(self, values: Array, t_s: Array) -> Array:
-        """Return values of this course, (k,), at times (n,)."""
+        """Return values of this course (k,) interpolated linearly at times `t_s` (n,), as (n,)."""
         times = self.begin_s + SPACING_S * np.arange(len(values))
         return np.interp(t_s, times, values)
 
 
 @dataclass(frozen=True, eq=False)
 class TemperatureHistory:
-    """The history of a recording; every question is asked for the rows of some channels."""
+    """History of a recording.
 
-    courses: Mapping[int, TemperatureCourse] = field(default_factory=dict)  #: by run
+    Each method takes the logged columns of the rows (n,) that it answers for; they need `t_s`, and `run` where there
+    is more than one. A history without courses answers 0 for every row.
+    """
+
+    courses: Mapping[int, TemperatureCourse] = field(default_factory=dict)  #: by number of the run
     counted: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  #: "run", "mounting" -> numbers, rising
-    rate_dps: float = 1.0  #: the greatest
-    span_c: tuple[float, float] = (0.0, 1.0)
+    rate_dps: float = 1.0  #: largest table rate, deg/s, without sign
+    span_c: tuple[float, float] = (0.0, 1.0)  #: lowest and highest temperature, deg C
 
     def numbers(self, name: str) -> tuple[int, ...]:
-        """Return which runs or mountings there are."""
+        """Return the numbers of the runs ("run") or mountings ("mounting") of the recording, rising."""
         return self.counted.get(name, (1,))
 
-    def rate_k_min(self, channels: Channels, over_s: float) -> Array:
-        """Return how fast the temperature changes, (n,) K/min, as the slope of a line over so many seconds."""
-        return self._ask(channels, lambda course: _slope(course.temperature_c, over_s))
+    def rate_k_min(self, columns: LoggedColumns, over_s: float) -> Array:
+        """Return the rate of change of the temperature, (n,) K/min: slope of a line over `over_s` seconds."""
+        return self._evaluate(columns, lambda temperature_c: _slope(temperature_c, over_s))
 
-    def lag_k(self, channels: Channels, tau_s: float) -> Array:
-        """Return how far a part with a time constant is behind the thermometer, (n,) K."""
-        return self._ask(channels, lambda course: _behind(course.temperature_c, tau_s))
+    def lag_k(self, columns: LoggedColumns, tau_s: float) -> Array:
+        """Return by how much a first-order follower with time constant `tau_s` lags the thermometer, (n,) K."""
+        return self._evaluate(columns, lambda temperature_c: _lag(temperature_c, tau_s))
 
-    def leg(self, channels: Channels, width_k: float) -> Array:
-        """Return from which side the temperature came, (n,), 1 from below to -1; it turns over within a width."""
-        return self._ask(channels, lambda course: _play(course.temperature_c, width_k))
+    def hysteresis_state(self, columns: LoggedColumns, width_k: float) -> Array:
+        """Return the state of a play hysteresis of width `width_k`, (n,), 1: approached from below, -1: from above."""
+        return self._evaluate(columns, lambda temperature_c: _play(temperature_c, width_k))
 
-    def _ask(self, channels: Channels, question: Any) -> Array:
+    def _evaluate(self, columns: LoggedColumns, function: Callable[[Array], Array]) -> Array:
+        """Return a function of each run's temperature course, (k,) to (k,), at the times of the rows, (n,)."""
         if not self.courses:
-            return np.zeros(len(channels))
-        t_s = np.asarray(channels["t_s"], dtype=np.float64)
-        run = np.asarray(channels["run"]) if "run" in channels else np.ones(len(t_s), dtype=np.int64)
+            return np.zeros(len(next(iter(columns.values()), ())))
+        t_s = np.asarray(columns["t_s"], dtype=np.float64)
+        run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
         found = np.zeros(len(t_s))
         for number, course in self.courses.items():
             here = run == number
             if here.any():
-                found[here] = course.at(question(course), t_s[here])
+                found[here] = course.at(function(course.temperature_c), t_s[here])
         return found
 
 
 def _slope(temperature_c: Array, over_s: float) -> Array:
+    """Return the slope of a least-squares line over `over_s` seconds about each value, (k,) K/min."""
     half = max(round(over_s / SPACING_S / 2), 1)
     if len(temperature_c) < 3:
         return np.zeros(len(temperature_c))
@@ -81,8 +90,8 @@ def _slope(temperature_c: Array, over_s: float) -> Array:
     return np.asarray(np.convolve(padded, weights[::-1], mode="valid"))
 
 
-def _behind(temperature_c: Array, tau_s: float) -> Array:
-    """Return how far a first-order follower is behind: f[i] - keep f[i-1] = (1 - keep) T[i], at rest at the start."""
+def _lag(temperature_c: Array, tau_s: float) -> Array:
+    """Return follower minus temperature, (k,) K: f[i] - keep f[i-1] = (1 - keep) T[i], in equilibrium at the start."""
     keep = np.exp(-SPACING_S / tau_s)
     band = np.array([np.ones(len(temperature_c)), np.full(len(temperature_c), -keep)])
     pull = (1 - keep) * temperature_c
@@ -91,7 +100,7 @@ def _behind(temperature_c: Array, tau_s: float) -> Array:
 
 
 def _play(temperature_c: Array, width_k: float) -> Array:
-    """Return how far a follower with play is behind the temperature, over half of the play: -1 to 1."""
+    """Return temperature minus a follower with play, over half of the play, (k,): -1 to 1."""
     half = width_k / 2
     behind = np.empty(len(temperature_c))
     follower = temperature_c[0]
@@ -101,8 +110,8 @@ def _play(temperature_c: Array, width_k: float) -> Array:
     return behind / half
 
 
-def past_of(recording: Recording) -> TemperatureHistory:
-    """Return the history of a recording: from its environment where that was logged, else from its data sets."""
+def history_of(recording: Recording) -> TemperatureHistory:
+    """Return the history of a recording: from its environment log where there is one, else from its data sets."""
     columns = recording.columns
     environment = recording.environment
     source = environment if environment and "temperature_c" in environment and "t_s" in environment else columns

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 
 #: Within this span everything counts as one temperature.
 ONE_LEVEL_SPAN_C = 1.0

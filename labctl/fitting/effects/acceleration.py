@@ -6,8 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from labctl.fitting.data.channels import BODY_AXES, Array, Channels
+from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Rows, Span, Term, by_parameter
+from labctl.fitting.numeric.arrays import Array
 
 GRAVITY = 9.80665
 

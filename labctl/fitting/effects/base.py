@@ -13,7 +13,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from labctl.fitting.data.channels import Array, Carrier, Channels
+from labctl.fitting.data.channels import Carrier, Channels
+from labctl.fitting.numeric.arrays import Array
 
 Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
 #: Which output axes an effect shows on: the one that turns, the others, or all alike.

@@ -16,8 +16,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labctl.errors import BadInput
-from labctl.fitting.data.channels import Array, Channels
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Span, Term
+from labctl.fitting.numeric.arrays import Array
 
 OPERATORS: Mapping[type, Callable[..., Any]] = {
     ast.Add: operator.add,

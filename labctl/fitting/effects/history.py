@@ -33,7 +33,7 @@ class _Shift(Effect):
     rows: ClassVar[Rows] = "all"
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        later = channels.past.numbers(self.counted)[1:]
+        later = channels.history.numbers(self.counted)[1:]
         numbers = np.asarray(channels[self.counted]) if later else np.zeros(len(channels))
         return [
             Column(f"{self.counted}_{int(number)}", "deg/s", (numbers == number).astype(np.float64)) for number in later
@@ -86,7 +86,7 @@ class RateHysteresis(Effect):
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         before = np.asarray(channels["previous_rate_dps"], dtype=np.float64)
         soft = term.parameters.get("by_sign", 0.0)
-        shape = before / channels.past.rate_dps if not soft else np.tanh(soft * before / channels.past.rate_dps)
+        shape = before / channels.history.rate_dps if not soft else np.tanh(soft * before / channels.history.rate_dps)
         return [Column("previous_rate", "deg/s", shape)]
 
     def options(self, span: Span) -> list[Term]:

@@ -31,7 +31,7 @@ class TemperatureRate(Effect):
             lead = np.asarray(channels["chamber_c"], dtype=np.float64) - channels.temperature_c(axis)
             return [Column("chamber_lead", "deg/s/K", lead)]
         over_s = term.parameters.get("over_s", 300.0)
-        return [Column("temperature_rate", "deg/s/(K/min)", channels.past.rate_k_min(channels, over_s))]
+        return [Column("temperature_rate", "deg/s/(K/min)", channels.history.rate_k_min(channels.columns, over_s))]
 
     def options(self, span: Span) -> list[Term]:
         """A thermometer's noise asks for a long slope, a quick gyro for a short one."""
@@ -55,7 +55,11 @@ class ThermalLag(Effect):
     draws = ("legs", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        return [Column("thermal_lag", "deg/s/K", channels.past.lag_k(channels, term.parameters.get("tau_s", 600.0)))]
+        return [
+            Column(
+                "thermal_lag", "deg/s/K", channels.history.lag_k(channels.columns, term.parameters.get("tau_s", 600.0))
+            )
+        ]
 
     def options(self, span: Span) -> list[Term]:
         return by_parameter(self.id, tau_s=np.geomspace(150.0, 3600.0, 7))
@@ -77,13 +81,13 @@ class ThermalHysteresis(Effect):
     draws = ("legs", "temperature_c")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        leg = channels.past.leg(channels, term.parameters.get("width_k", 3.0))
+        state = channels.history.hysteresis_state(channels.columns, term.parameters.get("width_k", 3.0))
         if term.parameters.get("bowed", 0.0):
             warm = channels.temperature_c(axis)
-            low, high = channels.past.span_c
+            low, high = channels.history.span_c
             share = np.clip((warm - low) / max(high - low, 1e-9), 0.0, 1.0)
-            leg = leg * 4 * share * (1 - share)
-        return [Column("leg", "deg/s", leg)]
+            state = state * 4 * share * (1 - share)
+        return [Column("leg", "deg/s", state)]
 
     def options(self, span: Span) -> list[Term]:
         plain = by_parameter(self.id, width_k=np.array([1.5, 4.0, 8.0]), bowed=np.array([0.0]))

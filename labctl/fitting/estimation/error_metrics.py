@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from labctl.fitting.data.channels import Array
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.numeric.arrays import Array
 
 
 @dataclass(frozen=True)

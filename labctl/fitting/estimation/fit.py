@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.data.channels import Array
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, up_rate_dps, with_known_size
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.temperature_channel import is_chambers
@@ -21,6 +20,7 @@ from labctl.fitting.estimation.error_metrics import ErrorFigures, floor_from_rep
 from labctl.fitting.models.error_model import AxisFit, ErrorModel, FittedModel
 from labctl.fitting.models.presets import Preset, preset_for
 from labctl.fitting.models.temperature import LagrangeTable
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.least_squares import Solution, rank_of, solve
 from labctl.recording import Recording

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.data.channels import Array
 from labctl.fitting.effects import Reference, Term
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.fit import FitResult
 from labctl.fitting.models.error_model import AxisFit, ErrorModel, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable, lagrange_weights
+from labctl.fitting.numeric.arrays import Array
 from labctl.recording import OutputUnit, Recording
 
 TERMS = (Term("bias"), Term("scale_factor"))

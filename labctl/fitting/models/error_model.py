@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import LabctlError
-from labctl.fitting.data.channels import Array, Channels
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Column, Reference, Term, kind_of
 from labctl.fitting.models.temperature import Constant, TemperatureBasis, basis_from_dict
+from labctl.fitting.numeric.arrays import Array
 
 Argument = Literal["rate", "output"]
 #: Effects of these origins belong to the unit and leave the house with its calibration.

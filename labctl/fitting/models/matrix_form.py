@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.channels import BODY_AXES, Array, Channels
+from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.models.error_model import FittedModel
+from labctl.fitting.numeric.arrays import Array
 
 LINEAR = frozenset(
     {"bias", "bias_temperature", "scale_factor", "scale_factor_temperature", "misalignment", "non_orthogonality"}

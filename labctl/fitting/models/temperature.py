@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.special import chdtri
 
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 
 #: Fewer readings than this say nothing about noise.
 LEAST_READINGS = 300

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 
 #: Drift time constants tried, in units of the median spacing of data sets; the first is white from set to set.
 TAU_SPACINGS = (0.25, 3.0, 12.0, 50.0, 200.0)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.data.channels import Array
 from labctl.fitting.numeric import drift_noise
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Drift, Scatter
 
 #: Scaled columns closer to dependence than this cannot be told apart by the data.

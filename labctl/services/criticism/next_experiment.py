@@ -171,8 +171,8 @@ def _like(found: Criticism) -> Recipe:
     warm = data.nodes["chamber_setpoint_c"] if "chamber_setpoint_c" in data.nodes else data.nodes.temperature_c("")
     levels = np.unique(np.round(data.at_sets(np.asarray(warm, dtype=np.float64))))
     rates = np.unique(np.round(data.at_sets(data.nodes.table_rate_dps()), 1))
-    past = data.nodes.past
-    each = 1 < len(past.numbers("mounting")) <= len(past.numbers("run"))
+    history = data.nodes.history
+    each = 1 < len(history.numbers("mounting")) <= len(history.numbers("run"))
     lasted = data.nodes.durations_s().reshape(len(data), -1).sum(axis=1)
     return Recipe.model_validate(
         {

@@ -10,8 +10,9 @@ import numpy as np
 from labctl.fitting import FitResult
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import Residuals
-from labctl.fitting.data.channels import Array, Channels
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.services.schemas.answers import ResidualColumns
 

@@ -11,7 +11,7 @@ from scipy.special import chdtri
 from labctl.fitting.criticism.diagnostics.axis import BAND
 from labctl.fitting.criticism.diagnostics.within_dataset import LEAST_READINGS, Residual, Within
 from labctl.fitting.criticism.reduction import STEP_LINES
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 
 #: A wave in the angle is looked for in data sets of at least this many turns ...

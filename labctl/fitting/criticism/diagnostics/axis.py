@@ -11,7 +11,7 @@ from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.noise_grid import correlation, factors, whiten
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import Residuals
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 
 #: Of a 95 % band, in standard deviations.
 BAND = 1.96

@@ -12,7 +12,7 @@ from scipy.special import ndtr
 from labctl.fitting.criticism.candidates import smooth_channels
 from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 
 #: Points of a running mean, and how many levels of a channel are still shown one by one.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.diagnostics.axis import AxisView
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain_list
 
 POINTS = 150

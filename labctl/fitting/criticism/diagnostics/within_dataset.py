@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.reduction import APART, OUTLIER, STEP_LINES, thin
-from labctl.fitting.data.channels import Array
+from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.points import dataset_starts
 
