@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.models.error_model import FittedModel
+from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
 

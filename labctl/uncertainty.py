@@ -10,7 +10,7 @@ import numpy as np
 from labctl.calibration import Calibration
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.models.error_model import FittedModel
+from labctl.fitting.models.fitted_model import FittedModel
 
 #: Coverage factor of the expanded uncertainty: about 95 % for a normal distribution (GUM 6.2).
 COVERAGE = 2.0

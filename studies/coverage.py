@@ -15,7 +15,7 @@ from instruments.bench_config import SimulationSettings
 from instruments.clock import VirtualClock
 from instruments.simulation import open_simulation
 from labctl.fitting import fit
-from labctl.fitting.estimation.fit import FitResult
+from labctl.fitting.estimation.result import FitResult
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.simulation.recordings import simulate
 from procedures.planning.plan import make_plan

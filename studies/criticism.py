@@ -20,7 +20,7 @@ from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.residuals import residuals_of
 from labctl.fitting.criticism.verdict import overlap
 from labctl.fitting.data.fit_data import fit_data_of
-from labctl.fitting.estimation.fit import fit_context
+from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording
@@ -155,7 +155,7 @@ def nodes(found: Criticism) -> int:
 def held_out(recording: Recording, model: ErrorModel, found: Criticism) -> float | None:
     """Return held-out RMS over floor with what was named added; None where that cannot be fitted or inverted."""
     try:
-        error = fit_context(fit_data_of(recording), changed(model, tuple(found.verdict.terms.values()))).error
+        error = fit_preset(fit_data_of(recording), changed(model, tuple(found.verdict.terms.values()))).error
     except LabctlError:
         return None
     if not error.noise_floor_dps or error.heldout_rms_dps is None:

@@ -30,7 +30,8 @@ from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.static_record import LONG_S, static_record
 from labctl.fitting.data.temperature_channel import with_temperature
 from labctl.fitting.effects import CATALOGUE, Effect
-from labctl.fitting.estimation.fit import FitResult, fit_context
+from labctl.fitting.estimation.fit import fit_preset
+from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.numeric.blas_threads import single_threaded
@@ -105,7 +106,7 @@ def criticise(
     context = fit_data_of(points or recording)
     if shape_only:
         return Criticism(_shapes(data, changed(model).build(context)[0], catalogue), data, None, None, None)
-    base = fit_context(context, changed(model)) if full else None
+    base = fit_preset(context, changed(model)) if full else None
     forward, _ = changed(model).build(context)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, base, None, None)
@@ -116,7 +117,7 @@ def criticise(
     assert base is not None
     seen = weighed if last is weighed else with_noise_of(weighed, last)
     left = residuals_of(seen)
-    direct = fit_context(context, _direct(model)).error.rms_dps if model.argument == "output" else None
+    direct = fit_preset(context, _direct(model)).error.rms_dps if model.argument == "output" else None
     suspects = tuple(_suspects(weighed, seen, context, forward, verdict))
     spoken_for = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return Criticism(
@@ -181,7 +182,7 @@ def _suspects(
         if candidate.log_bf >= 0 and candidate.term is not None:
             term = verdict.terms.get(candidate.id, candidate.term)
             try:
-                after = fit_context(context, changed(model, (term,)))
+                after = fit_preset(context, changed(model, (term,)))
             except LabctlError:  # it cannot be fitted beside the base, or not be inverted: there is no figure
                 after = None
         group = alias_group(weighed, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,)

@@ -50,9 +50,9 @@ def rms(errors: Mapping[str, Array]) -> float | None:
     return float(np.sqrt(np.mean(pooled**2))) if len(pooled) else None
 
 
-def by_turning_axis(context: FitData, errors: Mapping[str, Array]) -> dict[str, dict[str, Spread]]:
+def by_turning_axis(data: FitData, errors: Mapping[str, Array]) -> dict[str, dict[str, Spread]]:
     """Return the figures by axis that turns and output axis, as in Yang et al. 2018, Tables 3 and 4."""
-    turning = np.char.lstrip(np.asarray(context.channels["position"]).astype(np.str_), "-")
+    turning = np.char.lstrip(np.asarray(data.channels["position"]).astype(np.str_), "-")
     return {
         str(axis): {output: Spread.of(values[turning == axis]) for output, values in errors.items()}
         for axis in np.unique(turning)
@@ -65,16 +65,16 @@ REPEAT_TEMPERATURE_C = 0.25
 REPEATS_NEEDED = 8
 
 
-def floor_from_repeats(context: FitData, residual: Mapping[str, Array]) -> float | None:
+def floor_from_repeats(data: FitData, residual: Mapping[str, Array]) -> float | None:
     """Return the noise of one data set from pairs that repeat a rate and a temperature; None when they are too few."""
-    rate = np.asarray(context.channels["table_rate_dps"], dtype=np.float64)
+    rate = np.asarray(data.channels["table_rate_dps"], dtype=np.float64)
     near_rate = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
-    order = np.lexsort((context.temperature_c, np.round(rate / near_rate)))
+    order = np.lexsort((data.temperature_c, np.round(rate / near_rate)))
     first, second = order[:-1], order[1:]
     close = (np.abs(rate[first] - rate[second]) <= near_rate) & (
-        np.abs(context.temperature_c[first] - context.temperature_c[second]) <= REPEAT_TEMPERATURE_C
+        np.abs(data.temperature_c[first] - data.temperature_c[second]) <= REPEAT_TEMPERATURE_C
     )
-    position = np.asarray(context.channels["position"])
+    position = np.asarray(data.channels["position"])
     close &= position[first] == position[second]
     if close.sum() < REPEATS_NEEDED:
         return None

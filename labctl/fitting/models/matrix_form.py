@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.data.channels import BODY_AXES, Channels
-from labctl.fitting.models.error_model import FittedModel
+from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.arrays import Array
 
 LINEAR = frozenset(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import comb
 from typing import Any
 
-from labctl.fitting.models.error_model import AxisFit, FittedModel
+from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable
 
 

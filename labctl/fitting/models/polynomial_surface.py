@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.models.error_model import FittedModel
+from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.arrays import Array
 
 #: Samples that are worked on together: every array of the scheme stays in the first- and second-level cache.

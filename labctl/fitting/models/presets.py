@@ -28,25 +28,25 @@ class Preset:
     inner_only: bool = False  #: held out: outer temperatures of a table cannot be interpolated
 
 
-def _all(context: FitData) -> Rows:
-    return np.ones(len(context), dtype=bool)
+def _all(data: FitData) -> Rows:
+    return np.ones(len(data), dtype=bool)
 
 
-def _centre(context: FitData) -> Reference:
+def _centre(data: FitData) -> Reference:
     """Centre on the middle of what was measured, to a whole degree."""
-    return Reference(float(np.round((context.temperature_c.min() + context.temperature_c.max()) / 2)))
+    return Reference(float(np.round((data.temperature_c.min() + data.temperature_c.max()) / 2)))
 
 
-def _nodes(context: FitData, points: int, name: str) -> tuple[float, ...]:
-    if context.levels is None:
+def _nodes(data: FitData, points: int, name: str) -> tuple[float, ...]:
+    if data.levels is None:
         raise NotEnoughData(
-            f"{context.info.serial}: model {name} needs discrete temperature levels; these temperatures run on from "
-            f"{context.temperature_c.min():.1f} to {context.temperature_c.max():.1f} deg C without gaps"
+            f"{data.info.serial}: model {name} needs discrete temperature levels; these temperatures run on from "
+            f"{data.temperature_c.min():.1f} to {data.temperature_c.max():.1f} deg C without gaps"
         )
-    means = level_means(context.temperature_c, context.levels)
+    means = level_means(data.temperature_c, data.levels)
     if len(means) < points:
         raise NotEnoughData(
-            f"{context.info.serial}: model {name} interpolates between {points} temperatures; the recording has "
+            f"{data.info.serial}: model {name} interpolates between {points} temperatures; the recording has "
             f"{len(means)}, measure at {points - len(means)} more; a recording at fewer is fitted by "
             "`--effects bias,scale_factor,misalignment`"
         )
@@ -56,34 +56,34 @@ def _nodes(context: FitData, points: int, name: str) -> tuple[float, ...]:
 ALIGNED = (Term("bias"), Term("scale_factor"), Term("misalignment"))
 
 
-def _ojeda2000(context: FitData) -> tuple[ErrorModel, Rows]:
-    terms = (Term("rate_temperature_surface", 3), *((Term("misalignment"),) if len(context.info.axes) > 1 else ()))
-    return ErrorModel("ojeda2000", terms, "output", reference=_centre(context)), _all(context)
+def _ojeda2000(data: FitData) -> tuple[ErrorModel, Rows]:
+    terms = (Term("rate_temperature_surface", 3), *((Term("misalignment"),) if len(data.info.axes) > 1 else ()))
+    return ErrorModel("ojeda2000", terms, "output", reference=_centre(data)), _all(data)
 
 
-def _yang2018(context: FitData) -> tuple[ErrorModel, Rows]:
-    table = LagrangeTable(_nodes(context, 3, "yang2018"), 3)
-    return ErrorModel("yang2018", ALIGNED, "rate", table, _centre(context)), _all(context)
+def _yang2018(data: FitData) -> tuple[ErrorModel, Rows]:
+    table = LagrangeTable(_nodes(data, 3, "yang2018"), 3)
+    return ErrorModel("yang2018", ALIGNED, "rate", table, _centre(data)), _all(data)
 
 
-def _single_temperature(context: FitData) -> tuple[ErrorModel, Rows]:
-    levels = context.levels
+def _single_temperature(data: FitData) -> tuple[ErrorModel, Rows]:
+    levels = data.levels
     if levels is None:
-        raise NotEnoughData(f"{context.info.serial}: model single_temperature needs discrete temperature levels")
-    nearest = int(np.argmin(np.abs(level_means(context.temperature_c, levels) - 25.0)))
+        raise NotEnoughData(f"{data.info.serial}: model single_temperature needs discrete temperature levels")
+    nearest = int(np.argmin(np.abs(level_means(data.temperature_c, levels) - 25.0)))
     return ErrorModel("single_temperature", ALIGNED, "rate", reference=Reference(25.0)), levels == nearest
 
 
-def _weiss1995(context: FitData) -> tuple[ErrorModel, Rows]:
-    table = LagrangeTable(_nodes(context, 2, "weiss1995"), 2)
+def _weiss1995(data: FitData) -> tuple[ErrorModel, Rows]:
+    table = LagrangeTable(_nodes(data, 2, "weiss1995"), 2)
     terms = (Term("bias"), Term("scale_factor"))
-    return ErrorModel("weiss1995", terms, "rate", table, _centre(context)), _all(context)
+    return ErrorModel("weiss1995", terms, "rate", table, _centre(data)), _all(data)
 
 
-def _bias_scale(context: FitData) -> tuple[ErrorModel, Rows]:
-    aligned = (Term("misalignment"),) if len(context.info.axes) > 1 else ()
+def _bias_scale(data: FitData) -> tuple[ErrorModel, Rows]:
+    aligned = (Term("misalignment"),) if len(data.info.axes) > 1 else ()
     terms = (Term("bias"), Term("bias_temperature"), Term("scale_factor"), Term("scale_factor_temperature"), *aligned)
-    return ErrorModel("bias_scale", terms, "rate", reference=_centre(context)), _all(context)
+    return ErrorModel("bias_scale", terms, "rate", reference=_centre(data)), _all(data)
 
 
 #: name -> (preset, one sentence for a person)
@@ -120,15 +120,15 @@ def preset_for(model: str | None, effects: list[str]) -> Preset:
     if model is None and not terms:
         raise BadInput(f"say which model to fit: --model {'|'.join(PRESETS)} or --effects A,B,C")
     if model is None:
-        return Preset("custom", lambda context: (_custom(terms, context), _all(context)))
+        return Preset("custom", lambda data: (_custom(terms, data), _all(data)))
     if model not in PRESETS:
         raise BadInput(f"error model {model!r} is not known; there are {', '.join(PRESETS)}")
     preset, _ = PRESETS[model]
     if not terms:
         return preset
 
-    def extended(context: FitData) -> tuple[ErrorModel, Rows]:
-        base, rows = preset.build(context)
+    def extended(data: FitData) -> tuple[ErrorModel, Rows]:
+        base, rows = preset.build(data)
         added = tuple(replace(term, steady=True) for term in terms if term.effect not in base.effect_ids)
         return base.with_terms((*base.terms, *added), f"{model}+{'+'.join(t.effect for t in added)}"), rows
 
@@ -140,18 +140,18 @@ def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ..
     kept = tuple(t for t in model.terms if t.effect not in {*remove, *(term.effect for term in add)})
     name = model.name + "".join(f"+{t.effect}" for t in add) + "".join(f"-{effect_id}" for effect_id in remove)
 
-    def build(context: FitData) -> tuple[ErrorModel, Rows]:
+    def build(data: FitData) -> tuple[ErrorModel, Rows]:
         table = model.temperature
         if isinstance(table, LagrangeTable):
-            table = LagrangeTable(_nodes(context, table.points, model.name), table.points)
+            table = LagrangeTable(_nodes(data, table.points, model.name), table.points)
         terms = (*kept, *(replace(term, steady=True) for term in add))
-        return replace(model.forward(), name=name, terms=terms, temperature=table), _all(context)
+        return replace(model.forward(), name=name, terms=terms, temperature=table), _all(data)
 
     return Preset(name, build, isinstance(model.temperature, LagrangeTable))
 
 
-def _custom(terms: tuple[Term, ...], context: FitData) -> ErrorModel:
-    return ErrorModel("custom", terms, "rate", reference=_centre(context))
+def _custom(terms: tuple[Term, ...], data: FitData) -> ErrorModel:
+    return ErrorModel("custom", terms, "rate", reference=_centre(data))
 
 
 def describe_presets() -> list[dict[str, Any]]:

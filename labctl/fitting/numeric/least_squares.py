@@ -33,7 +33,6 @@ class Solution:
     drift: Drift
     scale: float  #: factor on the covariance estimated from the residuals; 1 where the white noise is known;
     #: NaN, as the covariance then is, where neither the residuals nor the readings say anything about noise
-    rank: int
 
 
 @dataclass(frozen=True)
@@ -152,5 +151,4 @@ def _collect(points: list[_Point], design: NDArray[np.float64], y: Array, scatte
         white,
         Drift(float(size), best.drift.tau_s, best.drift.per_rate * float(np.sqrt(best.scale))),
         best.scale * blind,
-        design.shape[1],
     )

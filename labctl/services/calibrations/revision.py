@@ -19,7 +19,7 @@ from labctl.fitting.criticism.model_comparison import compare_models, with_noise
 from labctl.fitting.criticism.residuals import residuals_of
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formula
-from labctl.fitting.estimation.fit import fit_context
+from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.numeric.blas_threads import single_threaded
@@ -169,8 +169,8 @@ def _fitted(store: Store, row: CalibrationRecord, number: int, request: ImproveR
     _refuse_what_changes_nothing(wanted, model, request, row.version)
     base, _ = changed(model, (), tuple(request.remove)).build(context)
     add = tuple(_shaped(store, number, points, base, term) for term in wanted)
-    before = fit_context(context, changed(model))
-    after = fit_context(context, changed(model, add, tuple(request.remove)))
+    before = fit_preset(context, changed(model))
+    after = fit_preset(context, changed(model, add, tuple(request.remove)))
     return _Change(row, number, points, before, after)
 
 

@@ -10,7 +10,8 @@ from pydantic import Field
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
-from labctl.fitting.models.error_model import FittedModel, NotConverged
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.numeric.arrays import Array
 from labctl.services.schemas.answers import ResponseModel, Validity
 from labctl.store import CalibrationRecord, Store

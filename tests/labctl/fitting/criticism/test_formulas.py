@@ -14,7 +14,7 @@ from labctl.fitting import FitResult
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Reference, Term, formulas
-from labctl.fitting.estimation.fit import fit_context
+from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording
 from labctl.services.simulation.sizing import hidden_recording
@@ -36,7 +36,7 @@ def fitted_with(recording: Recording, text: str) -> FitResult:
     (formula,) = formulas(text)
     context = fit_data_of(recording)
     model, _ = preset_for("bias_scale", []).build(context)
-    return fit_context(context, changed(model, (Term(formula.id, formula=formula.text),)))
+    return fit_preset(context, changed(model, (Term(formula.id, formula=formula.text),)))
 
 
 def in_use(recording: Recording, text: str) -> Compensator:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from labctl.errors import NotEnoughData
 from labctl.fitting.effects import Reference, Term
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
-from labctl.fitting.estimation.fit import FitResult
-from labctl.fitting.models.error_model import AxisFit, ErrorModel, FittedModel
+from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable, lagrange_weights
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import OutputUnit, Recording

@@ -1,0 +1,58 @@
+"""Design matrix of one output axis: the regressors of a model times its functions of temperature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from labctl.fitting.data.earth import turning_columns
+from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.models.error_model import ErrorModel
+
+#: A column is a combination of others when less than this share of its length is left beside them.
+DEPENDENT_SHARE = 1e-9
+
+
+@dataclass(frozen=True)
+class AxisDesign:
+    """Design of one axis over m data sets: c estimated columns for k named coefficients at each temperature node."""
+
+    columns: NDArray[np.float64]  #: (m, c)
+    spread: NDArray[np.float64]  #: (k * nodes, c): from the estimated columns to the coefficients of the table
+    names: list[tuple[str, str, str]]  #: (effect, name, unit) of the k
+    turning: NDArray[np.float64]  #: (m, e): the Earth's rate that goes round with the table
+
+
+def axis_design(data: FitData, model: ErrorModel, axis: str) -> AxisDesign:
+    """Return the design of one axis. Columns that are zero throughout were never exercised and are left out."""
+    channels = data.channels if model.argument == "rate" else data.channels.with_rates(data.outputs)
+    steady = model.steady
+    found = [(owner, column) for owner, column in model.columns(channels, axis) if np.any(column.values)]
+    basis = model.temperature.basis(data.channels.temperature_c(axis))
+    nodes = basis.shape[1]
+    columns, spread, names = [np.zeros((len(data), 0))], [], []
+    for owner, column in found:
+        added = column.values[:, None] if owner in steady else column.values[:, None] * basis
+        if owner in steady and _is_dependent(np.concatenate(columns, axis=1), added):
+            continue  # an added polynomial repeats the powers that the model has already
+        columns.append(added)
+        spread.append(np.ones((nodes, 1)) if owner in steady else np.eye(nodes))
+        names.append((owner, column.name, column.unit))
+    return AxisDesign(
+        np.concatenate(columns, axis=1),
+        block_diag(*spread) if spread else np.zeros((0, 0)),
+        names,
+        turning_columns(data.info, data.channels, axis),
+    )
+
+
+def _is_dependent(columns: NDArray[np.float64], added: NDArray[np.float64]) -> bool:
+    """Return whether a column (m, 1) is a linear combination of others (m, c)."""
+    if columns.shape[1] == 0:
+        return False
+    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    solution, *_ = np.linalg.lstsq(scaled, added, rcond=1e-12)
+    return float(np.linalg.norm(added - scaled @ solution)) < DEPENDENT_SHARE * float(np.linalg.norm(added))

@@ -1,0 +1,41 @@
+"""Held-out errors: each temperature corrected by a fit that has not seen it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from labctl.errors import NotEnoughData
+from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.temperature_levels import folds
+from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
+from labctl.fitting.estimation.requirements import require_enough_data
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.presets import Preset
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.least_squares import Solution
+
+
+def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solution]) -> dict[str, Array]:
+    """Return axis -> (m,) deg/s, corrected minus true rate of each temperature left out in turn.
+
+    The drift of each axis stays that of `solutions`, the fit to all data sets. Empty where a fold leaves too little.
+    """
+    masks = folds(data.temperature_c)
+    if preset.inner_only:
+        masks = masks[1:-1]
+    errors: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
+    for mask in masks:
+        if mask.all():
+            return {}
+        seen = data.take(~mask)
+        try:
+            model, rows = preset.build(seen)
+            require_enough_data(seen.take(rows), model)
+            found = solve_axes(seen.take(rows), model, solutions)
+        except NotEnoughData:
+            return {}
+        for axis, values in residuals(FittedModel(model, found.fits), data.take(mask), found.turning).items():
+            errors[axis].append(values)
+    return {axis: np.concatenate(parts) for axis, parts in errors.items() if parts}

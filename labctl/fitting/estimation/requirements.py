@@ -1,0 +1,52 @@
+"""Requirements of a model on a recording: channels, different rates, different temperatures and their span."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from labctl.errors import NotEnoughData
+from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.effects import kind_of
+from labctl.fitting.models.error_model import ErrorModel
+
+#: A polynomial of order q in temperature needs at least q times this span.
+SPAN_PER_ORDER_C = 1.0
+
+
+def require_enough_data(data: FitData, model: ErrorModel) -> None:
+    """Raise NotEnoughData, saying what is missing and how much, where the data sets cannot determine the model."""
+    serial = data.info.serial
+    for term in model.terms:
+        if absent := data.channels.missing(kind_of(term).needs):
+            raise NotEnoughData(f"{serial}: effect {term.effect} needs column {absent[0]!r}; the recording has none")
+    _require_rates(data, model)
+    _require_temperatures(data, model)
+
+
+def _require_rates(data: FitData, model: ErrorModel) -> None:
+    for axis in data.outputs:
+        rates = data.distinct_rates(axis)
+        for term in model.terms:
+            least, _ = kind_of(term).least(term)
+            if rates < least:
+                raise NotEnoughData(
+                    f"{data.info.serial}, axis {axis}: {term.effect} needs at least {least} different rates; the "
+                    f"recording has {rates}, measure at {least - rates} more"
+                )
+
+
+def _require_temperatures(data: FitData, model: ErrorModel) -> None:
+    serial = data.info.serial
+    temperatures, span = data.distinct_temperatures(), float(np.ptp(data.temperature_c))
+    for term in model.terms:
+        _, least = kind_of(term).least(term)
+        if temperatures < least:
+            raise NotEnoughData(
+                f"{serial}: {term.effect} needs at least {least} different temperatures; the recording has "
+                f"{temperatures}, measure at {least - temperatures} more"
+            )
+        if span < SPAN_PER_ORDER_C * (least - 1):
+            raise NotEnoughData(
+                f"{serial}: the temperatures span {span:.2f} deg C, too little for order {least - 1} of {term.effect}; "
+                f"it takes at least {SPAN_PER_ORDER_C * (least - 1):.0f} deg C, or a lower order (`{term.effect}:N`)"
+            )

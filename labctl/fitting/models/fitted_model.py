@@ -1,0 +1,125 @@
+"""An error model with its coefficients: predicts the error of a gyro and compensates its output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.effects import kind_of
+from labctl.fitting.models.error_model import ErrorModel, is_exported
+from labctl.fitting.models.inversion import invert
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.json_numbers import none_for_nan
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """The coefficients of one output axis: k names by m temperature functions."""
+
+    effects: tuple[str, ...]  #: the effect that each name belongs to
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: NDArray[np.float64]  #: (k, m)
+    covariance: NDArray[np.float64]  #: (k*m, k*m), the temperature functions running fastest
+
+    @property
+    def u(self) -> NDArray[np.float64]:
+        """Standard uncertainties, (k, m); NaN where there were no more data than coefficients."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(self.values.shape)
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """An error model with its coefficients."""
+
+    model: ErrorModel
+    axes: Mapping[str, AxisFit]
+
+    def error_dps(self, channels: Channels, axis: str) -> Array:
+        """Return the modelled error of an output axis, (n,) deg/s: gyro minus true rate."""
+        fit = self.axes[axis]
+        basis = self.model.temperature.basis(channels.temperature_c(axis))
+        at_temperature = fit.values @ basis.T  # (k, n)
+        error = np.zeros(len(channels))
+        by_name = dict(zip(fit.names, at_temperature, strict=True))
+        for _, column in self.model.columns(channels, axis):
+            if column.name in by_name:
+                error += column.values * by_name[column.name]
+        return error
+
+    def compensate(self, outputs: Mapping[str, Array], channels: Channels) -> dict[str, Array]:
+        """Return the true rate along each recorded axis, axis -> (n,) deg/s, from outputs axis -> (n,) deg/s.
+
+        A direct law is subtracted (Ojeda et al. 2000, eq. 13); a forward law is solved for the rate (`invert`).
+        Raises NotConverged where it has no solution.
+        """
+        if self.model.argument == "output":
+            seen = channels.with_rates(outputs)
+            return {axis: outputs[axis] - self.error_dps(seen, axis) for axis in outputs}
+        return invert(outputs, lambda rates, axis: self.error_dps(channels.with_rates(rates), axis), self.model.name)
+
+    def exported(self) -> tuple[FittedModel, list[dict[str, str]]]:
+        """Return the part that belongs to the unit, and what was left out with its origin."""
+        kept = tuple(t for t in self.model.terms if is_exported(t))
+        left_out = [
+            {"effect": t.effect, "origin": kind_of(t).origin, "term": kind_of(t).term}
+            for t in self.model.terms
+            if not is_exported(t)
+        ]
+        if not left_out:
+            return self, []
+        model = self.model.with_terms(kept)
+        return FittedModel(
+            model, {axis: _only(fit, set(model.effect_ids)) for axis, fit in self.axes.items()}
+        ), left_out
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything needed to rebuild this model, as JSON."""
+        return {
+            **self.model.to_dict(),
+            "axes": {
+                axis: {
+                    "effects": list(fit.effects),
+                    "names": list(fit.names),
+                    "units": list(fit.units),
+                    "values": fit.values.tolist(),
+                    "covariance": none_for_nan(fit.covariance),
+                }
+                for axis, fit in self.axes.items()
+            },
+        }
+
+    @staticmethod
+    def from_dict(record: Mapping[str, Any]) -> FittedModel:
+        """Return the model that `to_dict` described."""
+        model = ErrorModel.from_dict(record)
+        axes = {
+            axis: AxisFit(
+                tuple(fit["effects"]),
+                tuple(fit["names"]),
+                tuple(fit["units"]),
+                np.asarray(fit["values"], dtype=np.float64),
+                np.asarray(fit["covariance"], dtype=np.float64),
+            )
+            for axis, fit in record["axes"].items()
+        }
+        return FittedModel(model, axes)
+
+
+def _only(fit: AxisFit, effects: set[str]) -> AxisFit:
+    """Return the coefficients of some effects, with their part of the covariance."""
+    kept = [index for index, owner in enumerate(fit.effects) if owner in effects]
+    m = fit.values.shape[1]
+    flat = np.concatenate([np.arange(index * m, (index + 1) * m) for index in kept]) if kept else np.zeros(0, dtype=int)
+    return AxisFit(
+        tuple(fit.effects[i] for i in kept),
+        tuple(fit.names[i] for i in kept),
+        tuple(fit.units[i] for i in kept),
+        fit.values[kept],
+        fit.covariance[np.ix_(flat, flat)],
+    )
