@@ -1,4 +1,4 @@
-"""How far a corrected rate of a version may be off, at one rate and temperature."""
+"""Uncertainty of a corrected rate of a calibration version, at one rate and temperature."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import asdict
 
 from pydantic import Field
 
-from labctl.calibration import read_calibration
+from labctl.calibration import Calibration, read_calibration
+from labctl.fitting.uncertainty import COVERAGE, RateUncertainty, rate_uncertainty
 from labctl.services.schemas.answers import ResponseModel
 from labctl.store import Store
-from labctl.uncertainty import COVERAGE, is_inside, rate_uncertainty
 
 
 class AxisUncertainty(ResponseModel):
@@ -41,7 +41,7 @@ def uncertainty_at(
     """Return the uncertainty about each axis. Raises NotFound, BadInput."""
     document, _ = store.calibrations.document(serial, version)
     calibration = read_calibration(document)
-    found = rate_uncertainty(calibration, rate_dps, temperature_c)
+    found = uncertainty_of(calibration, rate_dps, temperature_c)
     return UncertaintyResponse(
         serial=serial,
         version=version,
@@ -51,3 +51,22 @@ def uncertainty_at(
         inside=is_inside(calibration, rate_dps, temperature_c),
         axes={axis: AxisUncertainty(**asdict(one)) for axis, one in found.items()},
     )
+
+
+def uncertainty_of(calibration: Calibration, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
+    """Return axis -> the uncertainty of a calibration's corrected rate. Raises BadInput, NotEnoughData."""
+    error = calibration.document["error"]
+    return rate_uncertainty(
+        calibration.fitted,
+        rate_dps,
+        temperature_c,
+        heldout_rms_dps=error.get("heldout_rms_dps"),
+        noise_floor_dps=error.get("noise_floor_dps"),
+        name=f"{calibration.serial} version {calibration.version}",
+    )
+
+
+def is_inside(calibration: Calibration, rate_dps: float, temperature_c: float) -> bool:
+    """Return whether a rate and a temperature are within the calibrated ranges."""
+    (cold, warm), (slow, fast) = calibration.temperature_c, calibration.rate_dps
+    return cold <= temperature_c <= warm and slow <= rate_dps <= fast

@@ -15,7 +15,7 @@ from labctl.errors import BadInput
 from labctl.fitting import FittedModel, fit
 from labctl.fitting.data.channels import Channels
 from labctl.recording import Recording
-from labctl.uncertainty import is_inside, rate_uncertainty
+from labctl.services.calibrations.uncertainty import is_inside, uncertainty_of
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 NOISE_DPS = 0.01
@@ -56,14 +56,14 @@ def test_it_is_the_spread_of_what_drawn_coefficients_give(
     if not forward:  # the law is a function of the output; its argument is what the output is near
         output = np.array([rate])
     found = [drawn(fitted, rng).compensate({"z": output}, channels)["z"][0] for _ in range(600)]
-    expected = rate_uncertainty(calibration, rate, warm)["z"].coefficients_dps
+    expected = uncertainty_of(calibration, rate, warm)["z"].coefficients_dps
     assert expected > 0
     assert np.std(found) == pytest.approx(expected, rel=0.12)
 
 
 def test_it_grows_outside_and_says_so(make_points: Callable[..., Recording], grid_11_by_11: Any) -> None:
     calibration = calibrated(make_points, grid_11_by_11, "ojeda2000")
-    inside, outside = (rate_uncertainty(calibration, 0.0, warm)["z"] for warm in (35.0, 80.0))
+    inside, outside = (uncertainty_of(calibration, 0.0, warm)["z"] for warm in (35.0, 80.0))
     assert outside.combined_dps > 3 * inside.combined_dps
     assert is_inside(calibration, 0.0, 35.0)
     assert not is_inside(calibration, 0.0, 80.0)
@@ -76,4 +76,4 @@ def test_a_number_that_is_none_is_refused(
 ) -> None:
     calibration = calibrated(make_points, grid_11_by_11, "bias_scale")
     with pytest.raises(BadInput, match="must be a number between"):
-        rate_uncertainty(calibration, rate, warm)
+        uncertainty_of(calibration, rate, warm)

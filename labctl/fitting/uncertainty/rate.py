@@ -1,0 +1,92 @@
+"""Uncertainty of a corrected rate at one rate and temperature, from a fitted model and its error figures alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from labctl.errors import BadInput, NotEnoughData
+from labctl.fitting.data.channels import BODY_AXES, Channels
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.numeric.arrays import Array
+
+#: Coverage factor of the expanded uncertainty: about 95 % for a normal distribution (GUM 6.2).
+COVERAGE = 2.0
+#: Largest rate, deg/s, and temperature, deg C, that are taken for a gyro's.
+LARGEST = 1e5
+#: Step of the numerical derivative of the error along the rate, deg/s.
+STEP_DPS = 0.01
+
+
+@dataclass(frozen=True)
+class RateUncertainty:
+    """Uncertainties of one axis' corrected rate, deg/s; the noise of a single reading is not included."""
+
+    coefficients_dps: float  #: standard, of the coefficients, propagated through the inverted law (GUM 5.2)
+    model_dps: float | None  #: standard, held-out temperatures beyond the noise floor; None where either is unknown
+    combined_dps: float  #: root of the sum of squares
+    expanded_dps: float  #: combined, times the coverage factor
+
+
+def rate_uncertainty(
+    fitted: FittedModel,
+    rate_dps: float,
+    temperature_c: float,
+    *,
+    heldout_rms_dps: float | None,
+    noise_floor_dps: float | None,
+    name: str,
+) -> dict[str, RateUncertainty]:
+    """Return axis -> the uncertainty of a corrected rate of `rate_dps` about that axis, the other axes at rest.
+
+    `heldout_rms_dps` and `noise_floor_dps` are the calibration's error figures; `name` identifies it in messages.
+    Raises BadInput for a number that no gyro measures, and where the model needs more than rate and temperature;
+    NotEnoughData where the coefficients have no uncertainty.
+    """
+    for what, value, unit in (("rate_dps", rate_dps, "deg/s"), ("temperature_c", temperature_c, "deg C")):
+        if not abs(value) <= LARGEST:  # also false for NaN
+            raise BadInput(f"{what} = {value} {unit}: must be a number between {-LARGEST:g} and {LARGEST:g} {unit}")
+    if fitted.model.needs:
+        raise BadInput(
+            f"{name}: its model also needs {', '.join(fitted.model.needs)};"
+            " an uncertainty at a rate and a temperature alone is not defined"
+        )
+    if any(np.isnan(fit.covariance).any() for fit in fitted.axes.values()):
+        raise NotEnoughData(
+            f"{name} has as many coefficients as data sets: nothing is left to be uncertain by; measure more data sets"
+        )
+    beyond = _beyond_floor(heldout_rms_dps, noise_floor_dps)
+    return {axis: _of_axis(fitted, axis, rate_dps, temperature_c, beyond) for axis in fitted.axes}
+
+
+def _beyond_floor(heldout_rms_dps: float | None, noise_floor_dps: float | None) -> float | None:
+    """Return the part of the held-out error that is not noise, deg/s."""
+    if heldout_rms_dps is None or noise_floor_dps is None:
+        return None
+    return math.sqrt(max(heldout_rms_dps**2 - noise_floor_dps**2, 0.0))
+
+
+def _of_axis(
+    fitted: FittedModel, axis: str, rate_dps: float, temperature_c: float, beyond: float | None
+) -> RateUncertainty:
+    fit = fitted.axes[axis]
+    basis = fitted.model.temperature.basis(np.array([temperature_c]))[0]
+    here = _channels(axis, np.array([rate_dps, rate_dps + STEP_DPS]), temperature_c)
+    slope = float(np.diff(fitted.error_dps(here, axis))[0] / STEP_DPS) if fitted.model.argument == "rate" else 0.0
+    by_name = {column.name: float(column.values[0]) for _, column in fitted.model.columns(here, axis)}
+    gradient = np.concatenate([by_name.get(name, 0.0) * basis for name in fit.names])
+    coefficients = math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0)) / abs(1.0 + slope)
+    combined = math.hypot(coefficients, beyond or 0.0)
+    return RateUncertainty(coefficients, beyond, combined, COVERAGE * combined)
+
+
+def _channels(axis: str, rates_dps: Array, temperature_c: float) -> Channels:
+    n = len(rates_dps)
+    columns = {
+        "temperature_c": np.full(n, temperature_c),
+        "table_rate_dps": rates_dps,
+        "position": np.full(n, axis),
+    }
+    return Channels(columns, {name: rates_dps if name == axis else np.zeros(n) for name in BODY_AXES})
