@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.evidence import LEAST_LEFT, Design
+from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.gains import LEAST_LEFT
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.temperature_levels import folds
 from labctl.fitting.numeric.arrays import Array

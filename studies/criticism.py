@@ -94,10 +94,10 @@ def one(task: Task) -> Task:
     answer = {**task, **_said(found)}
     if task["kind"] == "effect" and task["z"] == HELD_OUT_AT_Z and found.verdict.form == "missing":
         answer["held_out"] = clock("improve", lambda: held_out(recording, model, found))
-    if task["kind"] == "drifting" and found.weighed is not None:
-        answer["drift"] = replace(found, residuals=residuals_of(found.weighed)).drift_over_datasheet
-    if WITH_PEERS and found.weighed is not None:
-        designs = found.weighed.designs
+    if task["kind"] == "drifting" and found.comparison is not None:
+        answer["drift"] = replace(found, residuals=residuals_of(found.comparison)).drift_over_datasheet
+    if WITH_PEERS and found.comparison is not None:
+        designs = found.comparison.designs
         answer["peers"] = clock("peers", lambda: baselines.ask(found.data, designs))
     return {**answer, "seconds": clock.seconds}
 
@@ -120,7 +120,7 @@ class _Stopwatch:
 
 
 def _said(found: Criticism) -> dict[str, Any]:
-    top = [(c.id, c.smooth, round(c.log_bf, 2)) for c in found.weighed.candidates[:4]] if found.weighed else []
+    top = [(c.id, c.smooth, round(c.log_bf, 2)) for c in found.comparison.candidates[:4]] if found.comparison else []
     return {
         "verdict": found.verdict.form,
         "named": list(found.verdict.named),
@@ -137,18 +137,18 @@ def alike(found: Criticism) -> float:
 
     At 1 this schedule makes them the same, whatever its readings.
     """
-    if found.weighed is None or len(found.verdict.groups) != 1:
+    if found.comparison is None or len(found.verdict.groups) != 1:
         return 0.0
-    known = {c.id: c for c in found.weighed.candidates if not c.smooth}
+    known = {c.id: c for c in found.comparison.candidates if not c.smooth}
     named = [known[name] for name in found.verdict.named if name in known]
-    return min((overlap(found.weighed, named[0], rival) for rival in named[1:]), default=1.0) if named else 0.0
+    return min((overlap(found.comparison, named[0], rival) for rival in named[1:]), default=1.0) if named else 0.0
 
 
 def nodes(found: Criticism) -> int:
     """Return how many different things were named; effects with the same columns are one with several names."""
     if found.verdict.form == "missing":
         return len(found.verdict.named)
-    known = {c.id: round(c.log_bf, 6) for c in found.weighed.candidates if not c.smooth} if found.weighed else {}
+    known = {c.id: round(c.log_bf, 6) for c in found.comparison.candidates if not c.smooth} if found.comparison else {}
     return len({known.get(effect) for effect in found.verdict.named})
 
 

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from instruments.simulation import hidden_defaults
-from labctl.services.simulation.sizing import CLOSE, Sizing
+from labctl.fitting.criticism.effect_size import CLOSE
+from labctl.services.simulation.sizing import Sizing
 from studies.campaigns import PROTOCOLS, protocol
 
 FILE = Path(__file__).with_name("effect_sizes.json")

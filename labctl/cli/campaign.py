@@ -35,7 +35,7 @@ def plan(
 ) -> None:
     """Say what a campaign would do and how long it takes. Nothing moves."""
     from labctl.services.planning.loading import describe_plan
-    from labctl.services.simulation.walk import visibility as look
+    from labctl.services.simulation.visibility import visibility as look
 
     with one_clear_line():
         answer = describe_plan(recipe, bench, clip=clip, look=look if visibility else None)

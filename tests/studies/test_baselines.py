@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from labctl.fitting.criticism.evidence import Design
+from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.model_comparison import design_of
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.data.fit_data import fit_data_of

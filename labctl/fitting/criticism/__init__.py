@@ -1,5 +1,54 @@
-"""A model held against measurements: lack of fit, where, suspects, and what cannot be told."""
+"""Criticism: a model held against measurements. Lack of fit, where, suspects, and what cannot be tested.
 
-from labctl.fitting.criticism.criticise import Criticism, criticise
+This is the public face: other packages import from here only, never from a submodule.
+"""
 
-__all__ = ["Criticism", "criticise"]
+from labctl.fitting.criticism.criticise import (
+    LARGE_DRIFT,
+    Criticism,
+    best_shapes,
+    criticise,
+    residuals_beside_missing,
+)
+from labctl.fitting.criticism.effect_size import SizeReference, effect_size, size_for_z, size_reference
+from labctl.fitting.criticism.reduction import ReducedRecording, decimate
+from labctl.fitting.criticism.residuals import Residuals, residual_maps, where_it_fails, worst_data_sets
+from labctl.fitting.criticism.separation import (
+    SEPARATED_CHI2,
+    LeadingSignal,
+    leading_signal,
+    separation,
+    separation_power,
+)
+from labctl.fitting.criticism.suspects import Suspect
+from labctl.fitting.criticism.verdict import Verdict
+from labctl.fitting.criticism.visibility import EffectVisibility, Schedule, effect_visibilities, schedule_of
+
+__all__ = [
+    "LARGE_DRIFT",
+    "SEPARATED_CHI2",
+    "Criticism",
+    "EffectVisibility",
+    "LeadingSignal",
+    "ReducedRecording",
+    "Residuals",
+    "Schedule",
+    "SizeReference",
+    "Suspect",
+    "Verdict",
+    "best_shapes",
+    "criticise",
+    "decimate",
+    "effect_size",
+    "effect_visibilities",
+    "leading_signal",
+    "residual_maps",
+    "residuals_beside_missing",
+    "schedule_of",
+    "separation",
+    "separation_power",
+    "size_for_z",
+    "size_reference",
+    "where_it_fails",
+    "worst_data_sets",
+]

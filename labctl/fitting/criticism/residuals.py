@@ -1,4 +1,4 @@
-"""What the base leaves of a recording, data set by data set, and where that is more than noise."""
+"""Residuals of a recording beside the base, data set by data set, and where they are more than noise."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from labctl.fitting.criticism.candidates import smooth_channels
-from labctl.fitting.criticism.evidence import stack
+from labctl.fitting.criticism.channel_functions import smooth_channels
+from labctl.fitting.criticism.evidence.elimination import stack
+from labctl.fitting.criticism.evidence.noise_grid import factors
 from labctl.fitting.criticism.model_comparison import Comparison
-from labctl.fitting.criticism.noise_grid import factors
-from labctl.fitting.criticism.reduction import KINDS, ReducedRecording
+from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.numeric.arrays import Array
 
-#: Bins of a channel in which a residual is looked at.
+#: Bins of a channel over which residuals are averaged.
 BINS = 8
-#: A bin is worth a line from here on.
-WORTH = 3.0
+#: A bin is reported from this z on, and at most this many bins are.
+LEAST_Z = 3.0
 LINES = 12
 
 
@@ -28,13 +28,13 @@ LINES = 12
 class Residuals:
     """One axis: coordinates (R, m) in deg/s, the floor of the means (m,), and the noise that goes with it."""
 
-    rows: NDArray[np.float64]
-    floor_dps: Array
+    rows: NDArray[np.float64]  #: (R, m)
+    floor_dps: Array  #: (m,) standard deviation of a mean, white and drift together
     white_dps: float
     drift_dps: float
     drift_tau_s: float | None
-    chi2: float  #: of everything that is left, over its noise
-    freedom: int
+    chi2: float  #: of all residual coordinates over their noise
+    freedom: int  #: degrees of freedom of chi2
 
     @property
     def means(self) -> Array:
@@ -47,21 +47,21 @@ class Residuals:
         return self.means / self.floor_dps
 
 
-def residuals_of(weighed: Comparison) -> dict[str, Residuals]:
-    """Return what the base leaves on each axis, at the likeliest noise."""
-    return {axis: _axis(weighed, axis) for axis in weighed.axes}
+def residuals_of(comparison: Comparison) -> dict[str, Residuals]:
+    """Return the residuals of each axis beside the base, at the likeliest noise."""
+    return {axis: _axis(comparison, axis) for axis in comparison.axes}
 
 
-def _axis(weighed: Comparison, axis: str) -> Residuals:
-    data, design, found = weighed.data, weighed.designs[axis], weighed.axes[axis]
-    y = data.output[axis] - data.rows_of(data.nodes.rate_dps(axis)[:, None])[:, :, 0]
-    noise, white = found.best.noise, weighed.white_var[axis]
+def _axis(comparison: Comparison, axis: str) -> Residuals:
+    data, design, found = comparison.data, comparison.designs[axis], comparison.axes[axis]
+    y = data.error_dps(axis)
+    noise, white = found.best.noise, comparison.white_var[axis]
     blocks, _ = factors(noise, white, design.t_s, design.run)
     together = np.concatenate([design.base, y[:, :, None]], axis=2)
     means = np.empty_like(together[0])
     for rows, factor in blocks:
         means[rows] = solve_triangular(factor, together[0][rows], lower=True, check_finite=False)
-    other = stack(together, weighed.scales[axis], design.present)
+    other = stack(together, comparison.scales[axis], design.present)
     prior = np.diag(np.sqrt(design.precision))[design.precision > 0]
     prior = np.column_stack([prior, np.zeros(len(prior))]) if len(prior) else np.zeros((0, means.shape[1]))
     whole = np.vstack([means, other, prior])
@@ -88,7 +88,7 @@ def where_it_fails(data: ReducedRecording, left: Mapping[str, Residuals]) -> lis
             for low, high, rows in _bins(values):
                 score = residuals.score[rows]
                 z = float(abs(score.mean()) * np.sqrt(len(score)))
-                if z >= WORTH:
+                if z >= LEAST_Z:
                     rms = float(np.sqrt(np.mean(residuals.means[rows] ** 2)))
                     found.append({"axis": axis, "channel": name, "from": low, "to": high, "rms_dps": rms, "z": z})
     return sorted(found, key=lambda line: -line["z"])[:LINES]
@@ -105,7 +105,7 @@ def _bins(values: Array) -> list[tuple[float, float, NDArray[np.int64]]]:
     ]
 
 
-def maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
+def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
     """Return residual over floor in rate x temperature, one map per axis and position: lists of equal length."""
     rate = data.at_sets(data.nodes.table_rate_dps())
     position = np.asarray(data.nodes["position"]).reshape(len(data), -1)[:, 0]
@@ -129,7 +129,7 @@ def maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[dict[str
 
 
 def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most: int = 10) -> list[dict[str, Any]]:
-    """Return the data sets furthest from the model, with the coordinate in which they are."""
+    """Return the data sets with the largest mean residual over its floor, at most `most`, worst first."""
     found: list[dict[str, Any]] = []
     for axis, residuals in left.items():
         order = np.argsort(-np.abs(residuals.score))[:most]
@@ -143,8 +143,3 @@ def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most:
             for i in order
         ]
     return sorted(found, key=lambda line: -abs(line["over_floor"]))[:most]
-
-
-def kinds_of(data: ReducedRecording) -> tuple[str, ...]:
-    """Return what the coordinates of this recording are called."""
-    return KINDS[: data.present.shape[0]]

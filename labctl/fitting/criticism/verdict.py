@@ -1,4 +1,4 @@
-"""What the evidence comes to, in one of five forms, and never with more confidence than it has.
+"""Verdict of a criticism: one of five forms, never with more confidence than the evidence has.
 
 The thresholds are in nats of log evidence: about 3 to 1 odds against some thirty alternatives before anything is said
 to be missing, and about 20 to 1 before one effect is named and its rivals are not.
@@ -12,9 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from labctl.fitting.criticism.candidates import TIMES
-from labctl.fitting.criticism.evidence import reproduced, solve_option
-from labctl.fitting.criticism.model_comparison import Candidate, Comparison
+from labctl.fitting.criticism.channel_functions import TIMES
+from labctl.fitting.criticism.evidence.gains import reproduced_and_size, solve_option
+from labctl.fitting.criticism.model_comparison import Comparison
+from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.effects import Term
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
@@ -25,10 +26,11 @@ ENOUGH = 4.5
 ENOUGH_NEXT = 7.0
 #: A lead of less than this over another candidate leaves both.
 LEAD = 3.0
-#: A rival that leaves less of the leader's signal than this (chi2), or a smaller share than that, is not told apart.
-UNTOLD_CHI2 = 7.0
+#: A rival that leaves less than this of the leader's signal (chi2) cannot be distinguished from it ...
+INDISTINGUISHABLE_CHI2 = 7.0
 #: A lead from which on the evidence alone decides against a rival with more coefficients.
 FAR = 12.0
+#: ... nor one with no more coefficients that reproduces more than this share of it.
 ALIKE = 0.995
 #: A smooth function of a channel is only then unexplained when no effect explains this share of it.
 EXPLAINED = 0.90
@@ -45,7 +47,7 @@ MOST = 4
 
 @dataclass(frozen=True)
 class Step:
-    """One round of asking: what leads, whom it cannot be told from."""
+    """Judgement of one step of the search: the leader, and the effects that cannot be distinguished from it."""
 
     form: Form
     group: tuple[str, ...]
@@ -59,96 +61,97 @@ class Verdict:
     """The answer."""
 
     form: Form
-    groups: tuple[tuple[str, ...], ...] = ()  #: one per cause: its name, or those that cannot be told apart, best first
+    groups: tuple[
+        tuple[str, ...], ...
+    ] = ()  #: one per missing effect: its id, or those that cannot be distinguished, best first
     depends_on: tuple[str, ...] = ()
     reason: str = ""
     terms: Mapping[str, Term] = field(default_factory=dict)  #: effect id -> the shape that fits best
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Every effect that the verdict stands on."""
+        """The ids of all effects that the verdict names."""
         return tuple(name for group in self.groups for name in group)
 
     @property
-    def untold(self) -> tuple[str, ...]:
-        """The first group of effects that cannot be told apart; empty where all can."""
+    def indistinguishable(self) -> tuple[str, ...]:
+        """The first group of effects that cannot be distinguished; empty where all can."""
         return next((group for group in self.groups if len(group) > 1), ())
 
 
-def judge(weighed: Comparison, *, first: bool = True) -> Step:
-    """Judge one round of evidence: the first, or one beside causes that were found already."""
+def judge(comparison: Comparison, *, first: bool = True) -> Step:
+    """Judge a comparison: the first, or one beside effects that were found already."""
     enough = ENOUGH if first else ENOUGH_NEXT
-    effect, smooth = weighed.leader(smooth=False), weighed.leader(smooth=True)
+    effect, smooth = comparison.leader(smooth=False), comparison.leader(smooth=True)
     strongest = max((c.log_bf for c in (effect, smooth) if c is not None), default=-np.inf)
     if strongest < enough:
         return Step("adequate", (), effect)
-    depends = channels_behind(weighed)
-    if smooth is not None and (effect is None or _is_unexplained(weighed, effect, smooth)):
+    depends = channels_behind(comparison)
+    if smooth is not None and (effect is None or _is_unexplained(comparison, effect, smooth)):
         return Step("unexplained", (), smooth, depends or (smooth.id,))
     if effect is None or effect.log_bf < enough:
         return Step("unexplained", (), smooth, depends)
-    share = share_removed(weighed, effect)
-    group = alias_group(weighed, effect)
+    share = share_removed(comparison, effect)
+    group = alias_group(comparison, effect)
     if len(group) == 1 and first and share < LEAST_SHARE:
         return Step("ambiguous", group, effect, depends, share)
     return Step("missing" if len(group) == 1 else "ambiguous", group, effect, depends, share)
 
 
-def _is_unexplained(weighed: Comparison, effect: Candidate, smooth: Candidate) -> bool:
+def _is_unexplained(comparison: Comparison, effect: Candidate, smooth: Candidate) -> bool:
     if smooth.log_bf <= effect.log_bf + LEAD:
         return False
     limit = EXPLAINED_TIME if smooth.id in TIMES else EXPLAINED
-    return overlap(weighed, smooth, effect) < limit
+    return overlap(comparison, smooth, effect) < limit
 
 
-def alias_group(weighed: Comparison, leader: Candidate) -> tuple[str, ...]:
-    """Return the leader and the effects that the data cannot tell from it, best first."""
+def alias_group(comparison: Comparison, leader: Candidate) -> tuple[str, ...]:
+    """Return the leader and the effects that the data cannot distinguish from it, best first."""
     near = []
-    for rival in weighed.candidates:
+    for rival in comparison.candidates:
         if rival.smooth or rival.id == leader.id:
             continue
         close = rival.log_bf > leader.log_bf - LEAD
-        if close or (rival.log_bf > 0 and _is_untold(weighed, leader, rival)):
+        if close or (rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival)):
             near.append(rival)
     exact = [r for r in near if abs(r.log_bf - leader.log_bf) < SAME]
     others = [r for r in near if r not in exact][:MOST]
     return (leader.id, *(r.id for r in exact), *(r.id for r in others))
 
 
-def _is_untold(weighed: Comparison, leader: Candidate, rival: Candidate) -> bool:
-    """Whether a rival would leave hardly anything of the leader's signal, without having bought that dearly.
+def _is_indistinguishable(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
+    """Return whether a rival reproduces the leader's signal, without the evidence deciding against it.
 
-    A rival with more coefficients follows anything; far less evidence counts against it, and it only stays while little
-    does.
+    A rival with more coefficients can follow any signal: it only counts while its evidence is not far behind.
     """
-    share = overlap(weighed, leader, rival)
-    if share > ALIKE and _directions(weighed, rival) <= _directions(weighed, leader):
+    share = overlap(comparison, leader, rival)
+    if share > ALIKE and _directions(comparison, rival) <= _directions(comparison, leader):
         return True
-    return rival.log_bf > leader.log_bf - FAR and (1.0 - share) * leader.gain < UNTOLD_CHI2
+    return rival.log_bf > leader.log_bf - FAR and (1.0 - share) * leader.gain < INDISTINGUISHABLE_CHI2
 
 
-def _directions(weighed: Comparison, candidate: Candidate) -> int:
-    return sum(int(weighed.axes[axis].dimensions[option]) for axis, option in candidate.option.items())
+def _directions(comparison: Comparison, candidate: Candidate) -> int:
+    return sum(int(comparison.axes[axis].dimensions[option]) for axis, option in candidate.option.items())
 
 
-def overlap(weighed: Comparison, leader: Candidate, rival: Candidate) -> float:
+def overlap(comparison: Comparison, leader: Candidate, rival: Candidate) -> float:
     """Return which share of the leader's fitted signal the rival's best shape on each axis reproduces, 0 to 1."""
     part = whole = 0.0
     for axis, option in leader.option.items():
-        left, slices = weighed.axes[axis].best, weighed.axes[axis].slices
+        left, slices = comparison.axes[axis].best, comparison.axes[axis].slices
         shared, size = (
-            reproduced(left, slices[option], slices[rival.option[axis]])
+            reproduced_and_size(left, slices[option], slices[rival.option[axis]])
             if axis in rival.option
-            else (0.0, reproduced(left, slices[option], slices[option])[1])
+            else (0.0, reproduced_and_size(left, slices[option], slices[option])[1])
         )
         part, whole = part + shared, whole + size
     return part / whole if whole > 0 else 0.0
 
 
-def share_removed(weighed: Comparison, candidate: Candidate) -> float:
-    """Return the share of the excess chi2, over all axes, that a candidate takes off."""
+def share_removed(comparison: Comparison, candidate: Candidate) -> float:
+    """Return the share of the excess chi2, over all axes, that a candidate removes, 0 to 1."""
     removed, excess = 0.0, 0.0
-    for axis, found in weighed.axes.items():
+    for axis, found in comparison.axes.items():
         freedom = found.rows - found.base_columns
         excess += max(found.best.chi2 - freedom, 0.0)
         if axis in candidate.option:
@@ -156,19 +159,19 @@ def share_removed(weighed: Comparison, candidate: Candidate) -> float:
     return removed / max(excess, removed, 1e-12)
 
 
-def channels_behind(weighed: Comparison) -> tuple[str, ...]:
-    """Return the channels that the residual hangs on, strongest first."""
-    found = [c for c in weighed.candidates if c.smooth and c.log_bf >= ENOUGH]
+def channels_behind(comparison: Comparison) -> tuple[str, ...]:
+    """Return the channels on which the residual depends, strongest first."""
+    found = [c for c in comparison.candidates if c.smooth and c.log_bf >= ENOUGH]
     temperature = next((c for c in found if c.id == "temperature_c"), None)
     # on one rising leg time and the chamber's temperature are the same variable as the gyro's temperature
     same = temperature is not None and found[0].id in SAME_AS_TEMPERATURE
-    if temperature is not None and same and overlap(weighed, found[0], temperature) > EXPLAINED_TIME:
+    if temperature is not None and same and overlap(comparison, found[0], temperature) > EXPLAINED_TIME:
         found = [temperature, *(c for c in found if c is not temperature)]
     return tuple(c.id for c in found)
 
 
 def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
-    """Return how probable each effect is, one of them or nothing being missing, nothing as likely as all together."""
+    """Return effect id -> probability that it is the one missing; prior: nothing as likely as all effects together."""
     effects = [c for c in candidates if not c.smooth]
     log_bf = np.array([c.log_bf for c in effects]) - np.log(max(len(effects), 1))
     top = max(float(log_bf.max(initial=0.0)), 0.0)
@@ -177,12 +180,12 @@ def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
     return {c.id: float(w / total) for c, w in zip(effects, weights, strict=True)}
 
 
-def coefficients_of(weighed: Comparison, candidate: Candidate) -> dict[str, dict[str, dict[str, float | str]]]:
+def coefficients_of(comparison: Comparison, candidate: Candidate) -> dict[str, dict[str, dict[str, float | str]]]:
     """Return axis -> name -> value, standard uncertainty and unit of a candidate's best shape beside the base."""
     found: dict[str, dict[str, dict[str, float | str]]] = {}
     for axis, index in candidate.option.items():
-        option = weighed.designs[axis].options[index]
-        values, covariance = solve_option(weighed.axes[axis].best, weighed.axes[axis].slices[index])
+        option = comparison.designs[axis].options[index]
+        values, covariance = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
         u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         found[axis] = {
             name: {"value": float(value), "u": float(error), "unit": unit}

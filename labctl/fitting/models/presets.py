@@ -150,6 +150,21 @@ def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ..
     return Preset(name, build, isinstance(model.temperature, LagrangeTable))
 
 
+def unchanged(model: ErrorModel) -> Preset:
+    """Return how to fit a model again exactly as it is, to all data sets."""
+    return Preset(model.name, lambda data: (model, _all(data)))
+
+
+def usual_model(data: FitData) -> ErrorModel:
+    """Return the published model that fits a recording's axes, in its forward form.
+
+    Raises NotEnoughData where the data sets cannot determine it.
+    """
+    name = "yang2018" if len(data.info.axes) > 1 and data.levels is not None else "ojeda2000"
+    model, _ = preset_for(name, []).build(data)
+    return changed(model).build(data)[0]
+
+
 def _custom(terms: tuple[Term, ...], data: FitData) -> ErrorModel:
     return ErrorModel("custom", terms, "rate", reference=_centre(data))
 

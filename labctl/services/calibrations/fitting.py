@@ -11,7 +11,7 @@ from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
 from labctl.services.commands.protocol import CertifyRequest, FitRequest
-from labctl.services.recordings.transfer import newest_recording, points_of
+from labctl.services.recordings.transfer import newest_row, points_of
 from labctl.services.schemas.answers import CalibrationRow, CertificationResponse, FitResponse, VersionResponse
 from labctl.store import CertificationRow, NewCalibration, Store
 
@@ -30,10 +30,10 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
 
     Raises NotFound, BadInput for an unknown model or effect, NotEnoughData.
     """
-    recording = newest_recording(store, serial, request.recording)
-    source = points_of(store, recording)
+    row = newest_row(store, serial, request.recording)
+    recording, campaign = row.id, row.campaign
+    source = points_of(store, row)
     result = fit(source, request.model, request.effects)
-    campaign = store.recordings.get(recording).campaign
     made = {
         "recording": recording,
         "campaign": campaign,

@@ -14,22 +14,20 @@ from pydantic import Field
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
 from labctl.fitting import FitResult
-from labctl.fitting.criticism import criticise
-from labctl.fitting.criticism.model_comparison import compare_models, with_noise_of
-from labctl.fitting.criticism.residuals import residuals_of
+from labctl.fitting.criticism import best_shapes, criticise, residuals_beside_missing
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formula
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
-from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.recording import Recording
 from labctl.services.cache import cached
 from labctl.services.commands.protocol import ImproveRequest
 from labctl.services.criticism.criticise import version_of
-from labctl.services.criticism.evaluation import load_reduced_readings, model_of
+from labctl.services.criticism.evaluation import model_of
+from labctl.services.criticism.measurements import Measurements, load_reduced_readings
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.recordings.transfer import newest_recording, points_of
+from labctl.services.recordings.transfer import newest_row
 from labctl.services.schemas.answers import (
     ErrorFigures,
     FitResponse,
@@ -38,7 +36,7 @@ from labctl.services.schemas.answers import (
     ResponseModel,
     Validity,
 )
-from labctl.store import CalibrationRecord, NewCalibration, Store
+from labctl.store import CalibrationRecord, NewCalibration, RecordingRow, Store
 
 
 class PreviewResponse(ResponseModel):
@@ -67,7 +65,7 @@ class _Change:
     """A changed model beside the one that it was made from, both fitted in the forward form."""
 
     row: CalibrationRecord
-    recording: int
+    recording: RecordingRow
     points: Recording
     before: FitResult
     after: FitResult
@@ -77,7 +75,7 @@ class _Change:
         """What is said of the change, whether it is kept or not."""
         technology = self.points.info.technology or ""
         return {
-            **self.after.to_json(), "recording": self.recording, "improved_from": self.row.version,
+            **self.after.to_json(), "recording": self.recording.id, "improved_from": self.row.version,
             "before": self.before.error.to_dict(), "plausible": plausible(self.after, technology),
         }  # fmt: skip
 
@@ -93,7 +91,7 @@ def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewR
     Raises NotFound, BadInput, NotEnoughData.
     """
     row = version_of(store, serial, request.version)
-    number = newest_recording(store, serial, request.recording)
+    measured = newest_row(store, serial, request.recording)
 
     def work() -> PreviewResponse:
         change = _change(store, serial, request)
@@ -102,41 +100,33 @@ def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewR
             serial=serial, **change.figures, left_out=left_out, residuals=_residuals(store, change)
         )  # fmt: skip
 
-    return cached(PreviewResponse, _question(store, row, number, request), work)
+    return cached(PreviewResponse, _question(store, row, measured, request), work)
 
 
-def _question(store: Store, row: CalibrationRecord, recording: int, request: ImproveRequest) -> dict[str, Any]:
+def _question(store: Store, row: CalibrationRecord, recording: RecordingRow, request: ImproveRequest) -> dict[str, Any]:
     """Return all that a change depends on."""
     return {
-        "serial": row.serial, "version": row.version, "hash": row.hash, "recording": recording,
-        "readings": store.recordings.fingerprint(recording),
+        "serial": row.serial, "version": row.version, "hash": row.hash, "recording": recording.id,
+        "readings": store.recordings.fingerprint(recording.id, head=recording),
         "change": request.model_dump(include={"add", "remove", "formula"}),
     }  # fmt: skip
 
 
-@single_threaded
 def _residuals(store: Store, change: _Change) -> ResidualColumns:
     """Return what a criticism of the changed model would leave, without all else that it says."""
     model = change.after.fitted.model
-    found = criticise(
-        load_reduced_readings(store, change.recording), model, CATALOGUE, points=change.points, full=False
-    )
-    seen = found.weighed
-    if seen is None:
-        return residual_columns(found.data, {}, change.points, change.after)
-    if found.verdict.terms:  # the floor is the noise beside all that is still missing
-        missing = tuple(replace(term, steady=True) for term in found.verdict.terms.values())
-        whole = seen.model.with_terms((*seen.model.terms, *missing))
-        seen = with_noise_of(seen, compare_models(found.data, whole, CATALOGUE))
-    return residual_columns(found.data, residuals_of(seen), change.points)
+    readings = load_reduced_readings(store, change.recording, change.points)
+    found = criticise(readings, model, CATALOGUE, points=change.points, full=False)
+    left = residuals_beside_missing(found)
+    return residual_columns(found.data, left, change.points, change.after)
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
     """Fit a changed model, or take the fit of a moment ago: who has looked at a preview often keeps it next."""
     row = version_of(store, serial, request.version)
-    number = newest_recording(store, serial, request.recording)
-    asked = json.dumps(_question(store, row, number, request), sort_keys=True)
-    change = _RECENT.get(asked) or _fitted(store, row, number, request)
+    measured = newest_row(store, serial, request.recording)
+    asked = json.dumps(_question(store, row, measured, request), sort_keys=True)
+    change = _RECENT.get(asked) or _fitted(row, Measurements(store, measured), request)
     _RECENT[asked] = change
     for old in list(_RECENT)[:-MOST_RECENT]:
         _RECENT.pop(old, None)
@@ -155,10 +145,9 @@ def _refuse_what_changes_nothing(
             raise BadInput(f"effect {term.effect!r} is in version {version} already ({', '.join(model.effect_ids)})")
 
 
-def _fitted(store: Store, row: CalibrationRecord, number: int, request: ImproveRequest) -> _Change:
+def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequest) -> _Change:
     model = model_of(row)
-    points = points_of(store, number)
-    context = fit_data_of(points)
+    context = fit_data_of(measured.points)
     for effect_id in request.remove:
         if effect_id not in model.effect_ids:
             raise BadInput(f"effect {effect_id!r} is not in version {row.version} ({', '.join(model.effect_ids)})")
@@ -168,25 +157,24 @@ def _fitted(store: Store, row: CalibrationRecord, number: int, request: ImproveR
         raise BadInput("say what to change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
     _refuse_what_changes_nothing(wanted, model, request, row.version)
     base, _ = changed(model, (), tuple(request.remove)).build(context)
-    add = tuple(_shaped(store, number, points, base, term) for term in wanted)
+    add = tuple(_shaped(measured, base, term) for term in wanted)
     before = fit_preset(context, changed(model))
     after = fit_preset(context, changed(model, add, tuple(request.remove)))
-    return _Change(row, number, points, before, after)
+    return _Change(row, measured.row, measured.points, before, after)
 
 
-def _shaped(store: Store, recording: int, points: Recording, base: ErrorModel, term: Term) -> Term:
+def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
     """Return a term with the order and the nonlinear parameters that fit the recording best."""
     kind = kind_of(term)
     if term.order is not None or not (kind.parameters or kind.max_order):
         return term
-    found = criticise(load_reduced_readings(store, recording), base, {kind.id: kind}, points=points, shape_only=True)
-    shape = found.verdict.terms.get(kind.id)
+    shape = best_shapes(measured.readings, base, {kind.id: kind}, points=measured.points).get(kind.id)
     return replace(shape, steady=True) if shape is not None else term
 
 
 def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitResponse:
     parent, after = change.row.version, change.after
-    made = {"recording": change.recording, "improved_from": parent}
+    made = {"recording": change.recording.id, "improved_from": parent}
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
@@ -197,7 +185,7 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitRespon
             "left_out": list(calibration.document["left_out"]), "hash": calibration.hash,
         }  # fmt: skip
         return NewCalibration(
-            parent, change.recording, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
+            parent, change.recording.id, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
         )
 
     return FitResponse.model_validate(dict(store.calibrations.add(serial, at, build).answer))

@@ -18,7 +18,7 @@ from labctl.services.campaigns.resume import as_it_was, leave_safe, prepare_resu
 from labctl.services.campaigns.status import ENDED, answer_of, campaign_status
 from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.schemas.answers import CampaignResponse
-from labctl.services.simulation.recordings import with_hidden_effects
+from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.store import CampaignRow, Store
 from procedures.contracts.control import Control
 from procedures.contracts.errors import StalePrompt

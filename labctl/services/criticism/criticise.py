@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from labctl.errors import BadInput
 from labctl.services.cache import cached_group
-from labctl.services.recordings.transfer import newest_recording
+from labctl.services.recordings.transfer import newest_row
 from labctl.services.schemas.answers import (
     CriticismResponse,
     LadderResponse,
@@ -42,16 +42,17 @@ def _cached_criticism(
 ) -> A:
     """Return one of the answers of a criticism; whichever is asked first, all are kept."""
     row = version_of(store, serial, version)
-    number = newest_recording(store, serial, recording)
+    measured = newest_row(store, serial, recording)
 
     def work() -> Sequence[ResponseModel]:
         from labctl.services.criticism.evaluation import evaluate  # noqa: PLC0415  half a second that a kept answer does not need
 
-        return evaluate(store, row, number, competing)
+        return evaluate(store, row, measured, competing)
 
     question = {
-        "serial": serial, "version": row.version, "model": row.answer["model"], "recording": number,
-        "readings": store.recordings.fingerprint(number), "formulas": [[each.id, each.text] for each in competing],
+        "serial": serial, "version": row.version, "model": row.answer["model"], "recording": measured.id,
+        "readings": store.recordings.fingerprint(measured.id, head=measured),
+        "formulas": [[each.id, each.text] for each in competing],
     }  # fmt: skip
     return cached_group(kind, question, work)
 

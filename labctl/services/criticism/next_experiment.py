@@ -1,4 +1,4 @@
-"""The next experiment: which changed recipe would tell two suspects apart, for its hours."""
+"""The next experiment: which changed recipe would separate the effects that a criticism could not, per hour."""
 
 from __future__ import annotations
 
@@ -7,71 +7,86 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from scipy.special import ndtr
 
 from instruments.bench_config import BenchFile
 from labctl.errors import LabctlError
-from labctl.fitting.criticism import Criticism
-from labctl.fitting.criticism.evidence import reproduced_of, solve_option
-from labctl.fitting.criticism.verdict import LEAD
-from labctl.fitting.effects import Term
+from labctl.fitting.criticism import (
+    SEPARATED_CHI2,
+    Criticism,
+    LeadingSignal,
+    leading_signal,
+    separation,
+    separation_power,
+)
+from labctl.fitting.models.error_model import ErrorModel
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, recipe_document
-from labctl.services.simulation.walk import Schedule, walk
+from labctl.services.simulation.visibility import planned_schedule
 from labctl.store import Store
 from procedures.contracts.errors import ProcedureError
 from procedures.planning.plan import make_plan
 from procedures.recipe.recipe import Recipe
 
-#: At most this many rivals are held against the leader, and this many experiments shown.
+#: At most this many rivals are separated from the leader, and this many experiments are shown.
 PAIRS, SHOWN = 6, 4
-#: More separation (chi2) than this makes an answer no surer.
-SURE = 40.0
+#: More separation (chi2) than this does not count: the answer is as good as certain.
+MOST_CHI2 = 40.0
 
 
-def experiments_for(store: Store, recording: int, found: Criticism) -> list[dict[str, Any]]:
-    """Return changed recipes that would separate what a verdict could not.
+def experiments_for(store: Store, campaign: int | None, found: Criticism) -> list[dict[str, Any]]:
+    """Return changed recipes that would separate what a verdict could not distinguish, best first.
 
-    First come those that tell the leader from most rivals, among them those that do so best per hour.
+    `campaign` is the recording's, if it has one. First come the recipes that separate the leader from most rivals,
+    among them those with the largest separation per hour.
     """
-    if found.weighed is None or not found.verdict.untold:
+    if found.comparison is None or not found.verdict.indistinguishable:
         return []
-    base = _recipe_of(store, recording, found)
+    base = _recipe_of(store, campaign, found)
     if base is None:
         return []
     recipe, bench = base
-    signal = _signal(found)
-    rivals = [name for name in found.verdict.untold[1 : 1 + PAIRS] if name in signal.others]
-    ranked: list[dict[str, Any]] = []
-    for text, changes in menu(recipe):
-        try:
-            changed = Recipe.model_validate({**recipe.model_dump(), **changes})
-            plan = make_plan(changed, limits_of(bench), clip=True)
-            schedule = walk(plan, bench, found.weighed.model)
-        except (LabctlError, ProcedureError, ValueError):
-            continue
-        deltas = {rival: separation(schedule, signal.leader, signal.coefficients, rival) for rival in rivals}
-        told = [rival for rival, delta in deltas.items() if delta > LEAD]
-        if not told:
-            continue
-        delta = min(deltas[rival] for rival in told)
-        hours = plan.expected_s / 3600
-        document = recipe_document(changed) | {"name": f"{recipe.name}-next"}
-        ranked.append(
-            {
-                "separates": [signal.leader.effect, *told],
-                "do": text,
-                "recipe": document,
-                "toml": tomli_w.dumps(document),
-                "power": float(ndtr((delta / 2 - LEAD) / np.sqrt(delta))),
-                "hours": hours,
-                "per_hour": min(delta, SURE) / hours,
-            }
-        )
+    effects = {c.id for c in found.comparison.candidates if not c.smooth}
+    leader, *others = found.verdict.indistinguishable
+    signal = leading_signal(found.comparison, leader)
+    rivals = [name for name in others[:PAIRS] if name in effects]
+    tried = (
+        _experiment(text, changes, recipe, bench, signal, rivals, found.comparison.model)
+        for text, changes in menu(recipe)
+    )
+    ranked = [experiment for experiment in tried if experiment is not None]
     return sorted(ranked, key=lambda e: (-len(e["separates"]), -e["per_hour"]))[:SHOWN]
 
 
+def _experiment(
+    text: str, changes: Mapping[str, Any], recipe: Recipe, bench: BenchFile, signal: LeadingSignal, rivals: list[str],
+    model: ErrorModel,
+) -> dict[str, Any] | None:  # fmt: skip
+    """Return a changed recipe with what it separates; None where it cannot be run on the bench or separates nothing."""
+    try:
+        changed = Recipe.model_validate({**recipe.model_dump(), **changes})
+        plan = make_plan(changed, limits_of(bench), clip=True)
+        schedule = planned_schedule(plan, bench, model)
+    except (LabctlError, ProcedureError, ValueError):
+        return None
+    chi2 = {rival: separation(schedule, signal, rival) for rival in rivals}
+    separated = [rival for rival, value in chi2.items() if value > SEPARATED_CHI2]
+    if not separated:
+        return None
+    least = min(chi2[rival] for rival in separated)
+    hours = plan.expected_s / 3600
+    document = recipe_document(changed) | {"name": f"{recipe.name}-next"}
+    return {
+        "separates": [signal.term.effect, *separated],
+        "do": text,
+        "recipe": document,
+        "toml": tomli_w.dumps(document),
+        "power": separation_power(least),
+        "hours": hours,
+        "per_hour": min(least, MOST_CHI2) / hours,
+    }
+
+
 def menu(recipe: Recipe) -> list[tuple[str, dict[str, Any]]]:
-    """Return the changes that may tell effects apart, each with what a person would say."""
+    """Return the changes of a recipe that may separate effects, each with its description."""
     temperatures = sorted(recipe.temperatures_c)
     middle = temperatures[len(temperatures) // 2]
     few = sorted({0.0, *(s * abs(r) for r in _spread(recipe.rates_dps) for s in (1, -1))})
@@ -101,72 +116,20 @@ def _top(rates: tuple[float, ...]) -> list[float]:
     return [0.0, *(sign * size for size in sizes for sign in (1, -1))]
 
 
-class _Signal:
-    """What the leading suspect was found to do."""
-
-    def __init__(self, leader: Term, coefficients: Mapping[str, np.ndarray], others: set[str]) -> None:
-        self.leader, self.coefficients, self.others = leader, coefficients, others
-
-
-def _signal(found: Criticism) -> _Signal:
-    weighed = found.weighed
-    assert weighed is not None
-    leader = next(c for c in weighed.candidates if c.id == found.verdict.untold[0] and not c.smooth)
-    assert leader.term is not None
-    values = {}
-    for axis, index in leader.option.items():
-        values[axis] = solve_option(weighed.axes[axis].best, weighed.axes[axis].slices[index])[0]
-    return _Signal(leader.term, values, {c.id for c in weighed.candidates if not c.smooth})
-
-
-def separation(schedule: Schedule, leader: Term, coefficients: Mapping[str, np.ndarray], rival: str) -> float:
-    """Return the chi2 by which a rival would fail to explain the leader's signal on another schedule."""
-    total = 0.0
-    for axis, values in coefficients.items():
-        if axis not in schedule.designs:
-            continue
-        options = schedule.options(axis)
-        own = [
-            (_apart(option.term, leader), where)
-            for option, where in options
-            if option.candidate == leader.effect and where.stop - where.start == len(values)
-        ]
-        if not own:
-            continue
-        _, signal = min(own, key=lambda pair: pair[0])
-        left = schedule.left[axis]
-        size = float(values @ left.gram[signal, signal] @ values)
-        shared = max(
-            (reproduced_of(left, signal, values, where) for o, where in options if o.candidate == rival), default=0.0
-        )
-        total += max(size - shared, 0.0)
-    return total
-
-
-def _apart(term: Term | None, leader: Term) -> float:
-    """Return how far a shape of the grid is from the refined one that was found."""
-    if term is None or term.order != leader.order or set(term.parameters) != set(leader.parameters):
-        return np.inf
-    return sum(
-        abs(float(np.log((term.parameters[name] + 1e-9) / (leader.parameters[name] + 1e-9))))
-        for name in leader.parameters
-    )
-
-
-def _recipe_of(store: Store, recording: int, found: Criticism) -> tuple[Recipe, BenchFile] | None:
-    """Return the recipe that a recording was made by, or one like it, and a bench to walk through changed ones."""
-    campaign = store.recordings.get(recording).campaign
+def _recipe_of(store: Store, campaign: int | None, found: Criticism) -> tuple[Recipe, BenchFile] | None:
+    """Return the recipe of the recording's campaign, or one like the recording, and its bench; None without either."""
     try:
         if campaign is not None:
             row = store.campaigns.get(campaign)
             return Recipe.model_validate(dict(row.recipe)), BenchFile.model_validate(dict(row.bench))
-        recipe = _like(found)
+        recipe = _recipe_like(found)
         return recipe, load_bench(bench_for(recipe))
     except (LabctlError, ProcedureError, ValueError):
         return None
 
 
-def _like(found: Criticism) -> Recipe:
+def _recipe_like(found: Criticism) -> Recipe:
+    """Return a recipe with the temperatures, rates, positions and durations of a recording."""
     data = found.data
     warm = data.nodes["chamber_setpoint_c"] if "chamber_setpoint_c" in data.nodes else data.nodes.temperature_c("")
     levels = np.unique(np.round(data.at_sets(np.asarray(warm, dtype=np.float64))))

@@ -1,4 +1,4 @@
-"""A criticism as the answer that leaves the house: figures under the contract's keys, and sentences for people."""
+"""The answer of a criticism: figures under the contract's keys, and the verdict in words."""
 
 from __future__ import annotations
 
@@ -7,9 +7,15 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
-from labctl.fitting.criticism import Criticism
-from labctl.fitting.criticism.criticise import LARGE_DRIFT, Suspect, failing, pictures, worst
-from labctl.fitting.criticism.verdict import Verdict
+from labctl.fitting.criticism import (
+    LARGE_DRIFT,
+    Criticism,
+    Suspect,
+    Verdict,
+    residual_maps,
+    where_it_fails,
+    worst_data_sets,
+)
 from labctl.fitting.effects import CATALOGUE, kind_of
 from labctl.services.schemas.answers import CriticismResponse
 
@@ -35,14 +41,14 @@ def answer_of(
         },
         noise=_noise(found),
         lack_of_fit=_lack_of_fit(found),
-        where=failing(found) if found.weighed else [],
+        where=where_it_fails(found.data, found.residuals) if found.comparison else [],
         suspects=[_suspect(suspect, found) for suspect in found.suspects],
         named=list(verdict.named),
         depends_on=list(verdict.depends_on),
         not_testable=[dict(line) for line in found.not_testable],
         experiments=experiments,
-        worst=worst(found) if found.weighed else [],
-        maps=pictures(found) if found.weighed else [],
+        worst=worst_data_sets(found.data, found.residuals) if found.comparison else [],
+        maps=residual_maps(found.data, found.residuals) if found.comparison else [],
         readings_left_out=found.data.left_out,
         views=dict(found.views),
     )
@@ -110,7 +116,7 @@ def sentences(found: Criticism) -> list[str]:
     verdict = found.verdict
     said = [_first(found)]
     if verdict.form == "ambiguous":
-        wanted = dict.fromkeys(CATALOGUE[e].experiment for e in verdict.untold[:3] if e in CATALOGUE)
+        wanted = dict.fromkeys(CATALOGUE[e].experiment for e in verdict.indistinguishable[:3] if e in CATALOGUE)
         said += [f"To tell: {experiment}." for experiment in wanted]
     factor = found.drift_over_datasheet
     if verdict.form == "adequate" and factor is not None and factor >= LARGE_DRIFT:
@@ -140,9 +146,9 @@ def _first(found: Criticism) -> str:
 def _ambiguous(verdict: Verdict, words: list[str]) -> str:
     if len(words) > 1:
         return f"Missing: {'; and '.join(words)}; this recording cannot tell which of those joined by or."
-    if not verdict.untold:
+    if not verdict.indistinguishable:
         return f"Something like {words[0]} is missing, but it explains only a part of what is left."
-    names = "; ".join(map(_word, verdict.untold))
+    names = "; ".join(map(_word, verdict.indistinguishable))
     return f"Missing is one of these, and this recording cannot tell which: {names}."
 
 

@@ -1,4 +1,4 @@
-"""What a model leaves, data set by data set: the rows behind the map, with what was measured and what was modelled."""
+"""Residuals of a model, data set by data set, with the measured and the modelled error."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from labctl.fitting import FitResult
-from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.criticism.residuals import Residuals
+from labctl.fitting.criticism import ReducedRecording, Residuals
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.numeric.arrays import Array
@@ -20,9 +19,9 @@ from labctl.services.schemas.answers import ResidualColumns
 def residual_columns(
     data: ReducedRecording, left: Mapping[str, Residuals], points: Recording, base: FitResult | None = None
 ) -> ResidualColumns:
-    """Return the rows of what a criticism left, axis by axis.
+    """Return the residuals of a criticism as columns, axis by axis.
 
-    Where there was too little for a verdict nothing was weighed: then `base`, a fit to the points, says what is left.
+    Where there was too little for a verdict (`left` is empty) they are those of `base`, a fit to the points.
     """
     if not left:
         return _of_fit(points, base) if base is not None else ResidualColumns()

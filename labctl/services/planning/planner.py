@@ -20,7 +20,7 @@ from labctl.services.planning.loading import (
     recipe_document,
 )
 from labctl.services.schemas.answers import PlanResponse, ResponseModel
-from labctl.services.simulation.walk import visibility
+from labctl.services.simulation.visibility import visibility
 from labctl.store import StepRow, Store
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.plan import make_plan

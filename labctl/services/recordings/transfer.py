@@ -73,15 +73,20 @@ def export_recording(
     return write_recording(taken, folder, file_format)
 
 
-def points_of(store: Store, recording: int) -> Recording:
+def points_of(store: Store, row: RecordingRow) -> Recording:
     """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces."""
-    points = store.recordings.points(recording)
-    if store.recordings.get(recording).kind != "samples":
+    points = store.recordings.points(row.id, head=row)
+    if row.kind != "samples":
         return points
-    return with_pieces(points, lambda dataset: store.recordings.dataset(recording, dataset))
+    return with_pieces(points, lambda dataset: store.recordings.dataset(row.id, dataset))
 
 
 def newest_recording(store: Store, serial: str, recording: int | None) -> int:
+    """Return the number of `newest_row`. Raises NotFound, NotEnoughData."""
+    return newest_row(store, serial, recording).id
+
+
+def newest_row(store: Store, serial: str, recording: int | None) -> RecordingRow:
     """Return the recording asked for, checked to be the unit's, or the newest in which something was measured.
 
     Raises NotFound, NotEnoughData where no data set is complete yet.
@@ -97,7 +102,7 @@ def newest_recording(store: Store, serial: str, recording: int | None) -> int:
         raise NotEnoughData(
             f"recording {row.id} of unit {serial!r} holds no complete data set yet; wait for its first, or name another"
         )
-    return row.id
+    return row
 
 
 def _measured(row: RecordingRow) -> bool:

@@ -1,103 +1,153 @@
-"""What a schedule can show before anything is measured: which effects, from which size on, and which look alike."""
+"""Walk through a plan in the simulated world without its wires: the same physics, hours of bench time in seconds.
+
+The instruments' bytes are left out, so a reading keeps the value that the unit would have sent, unquantised.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.bench_config import BenchFile
-from labctl.fitting.criticism.candidates import Option, untestable_channels
-from labctl.fitting.criticism.criticise import LEAST_VISIBLE
-from labctl.fitting.criticism.evidence import Design, EliminatedBase, eliminate_base, slices_of, visible_share
-from labctl.fitting.criticism.model_comparison import design_of
-from labctl.fitting.criticism.noise_grid import USUAL_DPS, Noise
-from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
-from labctl.fitting.effects import CATALOGUE
-from labctl.fitting.models.error_model import ErrorModel
-from labctl.services.schemas.answers import Visibility
-from labctl.services.simulation.sizing import hidden_recording, usual_model
+from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
+from instruments.clock import VirtualClock
+from instruments.protocols.arrick_c4_moves import plan_move
+from instruments.simulation import open_simulation
+from labctl.errors import BadInput
+from labctl.recording import Recording, RecordingInfo
+from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn
 from procedures.planning.plan import Plan
 
-#: Readings per second at which a schedule is walked through: its channels are slow.
-WALK_HZ = 1.0
-#: What is just detectable, in noise units.
-DETECTABLE_Z = 5.0
-SEED = 1
+#: Interval of the environment log, s.
+ENVIRONMENT_S = 10.0
 
 
-@dataclass(frozen=True)
-class Schedule:
-    """A plan walked through in the simulated world, beside a model: everything but the output."""
-
-    data: ReducedRecording
-    designs: dict[str, Design]
-    left: dict[str, EliminatedBase]
-    slices: dict[str, list[slice]]
-
-    def options(self, axis: str) -> list[tuple[Option, slice]]:
-        """Return every shape of every effect on one axis, with its place in the Gram matrix."""
-        return list(zip(self.designs[axis].options, self.slices[axis], strict=True))
+def simulate(plan: Plan, bench: BenchFile, gyro: GyroSettings) -> Recording:
+    """Return the recording that a plan gives in the simulated world, one row per reading. Raises BadInput."""
+    try:
+        walk = _Walk(plan, bench, gyro)
+    except ValueError as error:
+        raise BadInput(f"bench {bench.name}: {error}") from error
+    walk.run()
+    return walk.recording()
 
 
-def walk(plan: Plan, bench: BenchFile, model: ErrorModel | None = None) -> Schedule:
-    """Walk through a plan; `model` (default: the published one for such a recording) is what effects stand beside."""
-    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": WALK_HZ})
-    recording = hidden_recording(plan, bench, gyro, SEED, {})
-    data = reduce_recording(recording, outliers=False)
-    beside = model or usual_model(recording)
-    stability = data.info.datasheet.get("bias_stability_dps")
-    drift = Noise(stability / 2 if stability else USUAL_DPS.get(data.info.technology or "", 0.002), 0.0, 0.0)
-    designs, left, slices = {}, {}, {}
-    for axis in map(str, data.info.axes):
-        design = design_of(data, beside, axis)
-        assert data.white_var is not None
-        white = data.white_var[axis]
-        scale = np.repeat(np.sqrt(white)[None, :], len(data.present), axis=0)
-        nothing: NDArray[np.float64] = np.zeros(data.present.shape)
-        designs[axis] = design
-        left[axis] = eliminate_base(design, nothing, white, scale, [drift])[0]
-        slices[axis] = slices_of(design.options)
-    return Schedule(data, designs, left, slices)
+class _Walk:
+    """State of a walk through a plan."""
+
+    def __init__(self, plan: Plan, bench: BenchFile, gyro: GyroSettings) -> None:
+        self._plan, self._bench, self._settings = plan, bench, gyro
+        self._clock = VirtualClock()
+        self._world = open_simulation(bench, self._clock).world
+        self._unit = self._world.gyro(gyro.name)
+        self._period = 1.0 / self._unit.sample_rate_hz
+        self._t = 0.0
+        self._power_on_s: float | None = None
+        self._run, self._setpoint = 0, bench.chamber.safe_c
+        self._parts: list[dict[str, NDArray[Any]]] = []
+        self._environment: list[tuple[float, int, float, float, float]] = []
+
+    def run(self) -> None:
+        """Take every step of the plan."""
+        for step in self._plan.steps:
+            begun = self._t
+            match step:
+                case PowerOn():
+                    self._world.power(self._t, True)
+                    self._power_on_s, self._run = self._t, step.run
+                case PowerOff():
+                    self._world.power(self._t, False)
+                case Mount():
+                    self._world.mount(self._t, step.position)
+                case MoveChamber():
+                    self._world.heat.set(self._t, step.temperature_c)
+                    self._setpoint = step.temperature_c
+                case Acquire():
+                    self._acquire(step)
+                case _:
+                    pass
+            self._t = max(self._t, begun + step.expected_s)
+            self._log(begun, self._t)
+
+    def _log(self, from_s: float, until_s: float) -> None:
+        if self._power_on_s is None:
+            return
+        times = np.arange(np.ceil(from_s / ENVIRONMENT_S), np.floor(until_s / ENVIRONMENT_S) + 1) * ENVIRONMENT_S
+        times = times[(times > from_s) & (times <= until_s)]
+        if len(times):
+            warm = self._world.heat.sensor_c(self._settings.name, times)
+            air = self._world.heat.airs_c(times)
+            rows = zip(times.tolist(), warm.tolist(), air.tolist(), strict=True)
+            self._environment += [(t, self._run, sensor, there, self._setpoint) for t, sensor, there in rows]
+
+    def _acquire(self, step: Acquire) -> None:
+        table, step_deg = self._world.table, self._world.table.step_deg
+        achieved, steady_from = 0.0, self._t
+        if step.rate_dps:
+            run = plan_move(self._bench.table, step.rate_dps, step.settle_s + step.duration_s + 1.0)
+            achieved = float(np.copysign(run.step_hz * step_deg, step.rate_dps))
+            end_s = table.start(self._t, run.steps, run.step_hz, self._bench.table.acceleration_dps2)
+            steady_from += run.ramp_s
+        else:
+            end_s = self._t + step.settle_s + step.duration_s
+        first = steady_from + step.settle_s + self._period
+        times = first + np.arange(round(step.duration_s / self._period), dtype=np.float64) * self._period
+        sample = self._unit.sample(times)
+        n = len(times)
+        part: dict[str, NDArray[Any]] = {
+            "dataset": np.full(n, step.dataset, dtype=np.int64),
+            "t_s": times,
+            "position": np.full(n, step.position),
+            "run": np.full(n, step.run, dtype=np.int64),
+            "mounting": np.full(n, step.mounting, dtype=np.int64),
+            "power_s": times - (self._power_on_s or 0.0),
+            "table_rate_dps": np.full(n, achieved),
+            "table_angle_deg": table.commanded_deg(
+                times - self._period / 2
+            ),  # at the middle of the interval that a reading averages
+            "temperature_c": sample.temperature_c.mean(axis=1),
+            "chamber_c": self._world.heat.airs_c(times),
+            "chamber_setpoint_c": np.full(n, self._setpoint),
+            "supply_v": sample.supply_v,
+            "humidity_pct": self._world.humidity_pct(times),
+        }
+        part |= {f"gyro_{axis}": sample.rate_dps[:, i] for i, axis in enumerate(self._settings.axes)}
+        self._parts.append(part)
+        self._t = max(end_s, float(times[-1]))
+
+    def recording(self) -> Recording:
+        """Return everything that was acquired."""
+        settings = self._settings
+        info = RecordingInfo(
+            serial=settings.serial,
+            model=settings.model,
+            axes=settings.axes,
+            kind="samples",
+            started_at=self._clock.utc(),
+            latitude_deg=self._bench.latitude_deg,
+            sample_rate_hz=self._unit.sample_rate_hz,
+            max_rate_dps=settings.max_rate_dps,
+            technology=settings.technology or None,
+            datasheet=settings.datasheet,
+            notes=f"simulated: recipe {self._plan.recipe.name}, seed {self._seed()}",
+        )
+        columns = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
+        names = ("t_s", "run", "temperature_c", "chamber_c", "chamber_setpoint_c")
+        rows = list(zip(*self._environment, strict=True))
+        environment: Mapping[str, NDArray[Any]] = {
+            name: np.asarray(values) for name, values in zip(names, rows, strict=True)
+        }
+        return Recording(info, columns, environment)
+
+    def _seed(self) -> int:
+        return self._bench.simulation.seed if self._bench.simulation else 1
 
 
-def visibility(plan: Plan, bench: BenchFile) -> list[Visibility]:
-    """Return what a plan could find and could not, each effect with its visible share and smallest detectable size."""
-    schedule = walk(plan, bench)
-    absent = untestable_channels(schedule.data)
-    found = [_of_effect(schedule, effect_id, absent.get(effect_id)) for effect_id in CATALOGUE]
-    return sorted((v for v in found if v is not None), key=lambda v: -v.share)
-
-
-def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> Visibility | None:
-    if effect_id == "rate_temperature_surface":
-        return None
-    kind = CATALOGUE[effect_id]
-    if absent:
-        return Visibility(effect=effect_id, visible=False, share=0.0, why="channel", needs=absent)
-    share = 0.0
-    sizes: dict[str, float] = {}
-    for axis in schedule.designs:
-        for option, where in schedule.options(axis):
-            if option.candidate != effect_id:
-                continue
-            here = visible_share(schedule.left[axis], where)
-            share = max(share, here)
-            if here < LEAST_VISIBLE:
-                continue
-            norms = np.sqrt(np.maximum(np.diag(schedule.left[axis].gram)[where], 0.0))
-            best = int(np.argmax(norms))
-            size = DETECTABLE_Z / max(float(norms[best]), 1e-300)
-            sizes[option.units[best]] = min(size, sizes.get(option.units[best], np.inf))
-    visible = share >= LEAST_VISIBLE
-    unit = next(iter(sizes), "")  # of the lowest order that shows
-    return Visibility(
-        effect=effect_id,
-        visible=visible,
-        share=share,
-        smallest_size=sizes.get(unit),
-        unit=unit,
-        why=None if visible else "schedule",
-        experiment="" if visible else kind.experiment,
-    )
+def hidden_recording(
+    plan: Plan, bench: BenchFile, gyro: GyroSettings, seed: int, hidden: Mapping[str, float]
+) -> Recording:
+    """Return a simulated recording with effects hidden in its unit, effect id -> size in its coefficient unit."""
+    settings = (bench.simulation or SimulationSettings()).model_copy(update={"seed": seed, "hidden": dict(hidden)})
+    return simulate(plan, bench.model_copy(update={"gyros": (gyro,), "simulation": settings}), gyro)

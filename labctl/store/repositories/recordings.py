@@ -107,12 +107,13 @@ class Recordings:
         with self._database.reading() as connection:
             return [RecordingRow(*row[:7], int(row[7] or 0), int(row[8] or 0)) for row in connection.execute(query)]
 
-    def fingerprint(self, recording: int, *, complete: bool = False) -> str:
+    def fingerprint(self, recording: int, *, complete: bool = False, head: RecordingRow | None = None) -> str:
         """Return a digest of all that a recording holds now: equal only where every answer about it is.
 
-        With `complete` of its complete data sets alone, so that it stays while the next one is measured.
+        With `complete` of its complete data sets alone, so that it stays while the next one is measured. `head` is the
+        recording's head where it was read already.
         """
-        head = self.get(recording)
+        head = head or self.get(recording)
         d, b, e = tables.data_sets.c, tables.sample_blocks.c, tables.environment.c
         sets = sa.select(d.number, d.state, d.n).where(d.recording_id == recording).order_by(d.number)
         packed = sa.select(b.number, b.seq, b.n, b.crc32).where(b.recording_id == recording)
@@ -129,9 +130,12 @@ class Recordings:
         said = json.dumps([head.serial, head.campaign, head.kind, dict(head.info), rows], sort_keys=True)
         return hashlib.sha256(said.encode()).hexdigest()
 
-    def points(self, recording: int) -> Recording:
-        """Return one row per complete data set, from the statistics alone (kind "points"), or the table imported."""
-        head = self.get(recording)
+    def points(self, recording: int, *, head: RecordingRow | None = None) -> Recording:
+        """Return one row per complete data set, from the statistics alone (kind "points"), or the table imported.
+
+        `head` is the recording's head where it was read already.
+        """
+        head = head or self.get(recording)
         info = RecordingInfo.model_validate(head.info)
         with self._database.reading() as connection:
             environment = _environment(connection, recording)

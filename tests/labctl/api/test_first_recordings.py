@@ -16,7 +16,7 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import prepare
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.examples import examples
-from labctl.services.simulation.recordings import with_hidden_effects
+from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.labctl.api.test_page_requests import client  # noqa: F401  a fixture

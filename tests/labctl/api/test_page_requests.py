@@ -17,7 +17,7 @@ from labctl.compensator import Compensator
 from labctl.recording import Recording
 from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.criticism import evaluation
+from labctl.services.criticism import measurements
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
@@ -95,7 +95,7 @@ def test_residuals_are_the_rows_behind_the_map(
     rows = answer["columns"]
     assert {len(values) for values in rows.values()} == {3 * 630}
     with monkeypatch.context() as patched:  # one work gives both
-        patched.setattr(evaluation, "load_reduced_readings", None)
+        patched.setattr(measurements, "load_reduced_readings", None)
         maps = client.get(f"{path}/1/criticism").json()["maps"]
     cells = by_cell(rows, "residual_dps", "over_floor", "table_rate_dps", "temperature_c", "position")
     for part in maps:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from labctl.fitting.criticism.criticise import criticise
-from labctl.fitting.criticism.noise_grid import expected_drift_dps, noise_grid
+from labctl.fitting.criticism.evidence.noise_grid import expected_drift_dps, noise_grid
 from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.static_record import LONG_S, longest_stretch, static_record
@@ -185,7 +185,7 @@ def test_criticism_weighs_with_the_static_record() -> None:
     model, _ = preset_for(None, ["bias", "scale_factor"]).build(fit_data_of(recording))
     found = criticise(recording, model, full=False)
     assert found.data.static is not None
-    assert found.weighed is not None
-    smallest = min(noise.size_dps for noise in found.weighed.axes["z"].noises)
+    assert found.comparison is not None
+    smallest = min(noise.size_dps for noise in found.comparison.axes["z"].noises)
     assert smallest > 1e-4  # around 1.35 B, not around half of the data sheet's 1e-5
     assert reduce_recording(recording).static is None

@@ -89,10 +89,10 @@ def test_the_map_has_each_data_set_where_it_was_measured_and_dims_what_means_not
 
 
 def test_all_maps_share_one_scale() -> None:
-    found = three_axes(4)
-    from labctl.fitting.criticism.criticise import pictures as maps_of
+    criticism = held(three_axes(4), "yang2018", full=True)
+    from labctl.fitting.criticism import residual_maps
 
-    shown = maps({"maps": maps_of(held(found, "yang2018", full=True))})
+    shown = maps({"maps": residual_maps(criticism.data, criticism.residuals)})
     assert shown is not None
     heat = [t for t in shown.data if t.showscale is None]
     assert len(heat) == 9
@@ -119,8 +119,8 @@ def test_lines_and_bands_are_those_of_the_views() -> None:
 def test_legs_and_repeats_are_drawn_where_there_are_any() -> None:
     shown = {"views": views(cycled(0.01), None, ("bias", "scale_factor"))}
     found = named(pictures_of(shown))
-    legs = shown["views"]["legs"][0]
-    assert list(trace(found["legs"], "z").y) == legs["mean_dps"]
+    hysteresis_lines = shown["views"]["legs"][0]
+    assert list(trace(found["legs"], "z").y) == hysteresis_lines["mean_dps"]
     assert list(trace(found["repeats"], "z").y) == shown["views"]["repeats"][0]["difference_dps"]
     assert "thermal_hysteresis" in found["legs"].effects
 

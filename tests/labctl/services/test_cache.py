@@ -11,7 +11,7 @@ import pytest
 
 from labctl.services import cache as keeping
 from labctl.services.cache import cached, cached_group
-from labctl.services.criticism import evaluation
+from labctl.services.criticism import measurements
 from labctl.services.schemas.answers import CertificationResponse, LadderResponse, ResponseModel
 from labctl.store import open_store
 from tests.labctl.cli.test_cli import Lab
@@ -128,7 +128,7 @@ def test_criticise_looks_at_the_readings_once(tmp_path: Path, monkeypatch: pytes
     def never(*_: object) -> None:
         raise AssertionError("read again")
 
-    monkeypatch.setattr(evaluation, "load_reduced_readings", never)
+    monkeypatch.setattr(measurements, "load_reduced_readings", never)
     assert lab.json("criticise", "FOG-0001") == first
     with pytest.raises(AssertionError, match="read again"):
         lab.run("criticise", "FOG-0001", "--formula", "wet: supply_v - 5")

@@ -13,7 +13,7 @@ from labctl.fitting.criticism.diagnostics.angle_spectra import angle_lines, freq
 from labctl.fitting.criticism.diagnostics.axis import AxisView, axis_view
 from labctl.fitting.criticism.diagnostics.channels import channel_lines, data_sets, previous_rate, time_line
 from labctl.fitting.criticism.diagnostics.periodogram import between_sets
-from labctl.fitting.criticism.diagnostics.repeatability import legs, repeats
+from labctl.fitting.criticism.diagnostics.repeatability import hysteresis_lines, repeats
 from labctl.fitting.criticism.diagnostics.within_dataset import within_of
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.residuals import Residuals
@@ -27,17 +27,17 @@ __all__ = ["VIEWS", "draws_of", "views_of"]
 
 
 def views_of(
-    weighed: Comparison, left: Mapping[str, Residuals], recording: Recording, catalogue: Mapping[str, Effect]
+    comparison: Comparison, left: Mapping[str, Residuals], recording: Recording, catalogue: Mapping[str, Effect]
 ) -> dict[str, Any]:
     """Return all views of a criticism: lists of records, one or more for each axis, of plain numbers without NaN."""
-    axes = [axis_view(weighed, axis, residuals) for axis, residuals in left.items()]
+    axes = [axis_view(comparison, axis, residuals) for axis, residuals in left.items()]
     channels = [line for view in axes for line in channel_lines(view)]
     found: dict[str, Any] = {
-        "sets": data_sets(weighed.data, axes),
+        "sets": data_sets(comparison.data, axes),
         "channels": channels,
         "time": [time_line(view) for view in axes],
         "frequency": [line for view in axes if (line := between_sets(view)) is not None],
-        "legs": [line for view in axes for line in legs(view)],
+        "legs": [line for view in axes for line in hysteresis_lines(view)],
         "previous_rate": [line for view in axes if (line := previous_rate(view)) is not None],
         "repeats": [line for view in axes if (line := repeats(view)) is not None],
         **_within(axes, recording),

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.evidence.noise_grid import correlation, factors, whiten
 from labctl.fitting.criticism.model_comparison import Comparison
-from labctl.fitting.criticism.noise_grid import correlation, factors, whiten
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.numeric.arrays import Array
@@ -50,15 +50,15 @@ class AxisView:
         return np.asarray(self.data.nodes["position"]).reshape(len(self), -1)[:, 0].astype(np.str_)
 
 
-def axis_view(weighed: Comparison, axis: str, residuals: Residuals) -> AxisView:
+def axis_view(comparison: Comparison, axis: str, residuals: Residuals) -> AxisView:
     """Return one axis at the noise that its base finds likeliest."""
-    design, noise = weighed.designs[axis], weighed.axes[axis].best.noise
-    white = weighed.white_var[axis]
+    design, noise = comparison.designs[axis], comparison.axes[axis].best.noise
+    white = comparison.white_var[axis]
     together = design.run[:, None] == design.run[None, :]
     covariance = noise.size_dps**2 * correlation(design.t_s, noise.tau_s) * together
     covariance[np.diag_indices(len(white))] += white
     blocks, _ = factors(noise, white, design.t_s, design.run)
     return AxisView(
-        axis, weighed.data, residuals.means, residuals.floor_dps, covariance, whiten(blocks, residuals.means),
+        axis, comparison.data, residuals.means, residuals.floor_dps, covariance, whiten(blocks, residuals.means),
         design.t_s, design.run,
     )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from labctl.fitting.criticism.candidates import smooth_channels
+from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.numeric.arrays import Array

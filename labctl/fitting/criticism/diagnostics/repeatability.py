@@ -21,7 +21,7 @@ SAME_TEMPERATURE_K = 2.0
 MOST_PAIRS = 200
 
 
-def legs_of(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
+def hysteresis_states(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return from where the temperature came to each data set, (m,): 1 from below, -1 from above, 0 not known."""
     leg = np.zeros(len(temperature_c), dtype=np.int64)
     state, low, high = 0, 0.0, 0.0
@@ -37,10 +37,10 @@ def legs_of(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
     return leg
 
 
-def legs(view: AxisView) -> Iterator[dict[str, Any]]:
+def hysteresis_lines(view: AxisView) -> Iterator[dict[str, Any]]:
     """Yield the up leg minus the down leg at equal rate and temperature, by temperature and by rate."""
     warm, rate = view.temperature_c(), view.channel("table_rate_dps")
-    leg = legs_of(warm, view.run)
+    leg = hysteresis_states(warm, view.run)
     ups, downs = _matched(view, leg, warm, rate)
     if not len(ups):
         return

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.reduction import APART, OUTLIER, STEP_LINES, thin
+from labctl.fitting.criticism.reduction import LEAST_INDEPENDENT_SHARE, OUTLIER, STEP_LINES, decimate
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.points import dataset_starts
@@ -88,7 +88,7 @@ def within_of(recording: Recording) -> Within | None:
     """Return the readings within data sets; None for a recording of means, or of hardly any readings."""
     if recording.info.kind != "samples":
         return None
-    thinned = thin(recording)
+    thinned = decimate(recording)
     dataset = np.asarray(thinned.columns["dataset"], dtype=np.int64)
     starts = dataset_starts(dataset)
     counts = np.minimum(np.diff(np.append(starts, len(dataset))), MOST_READINGS)
@@ -129,6 +129,6 @@ def _basis(
             inner = np.einsum("rmn,mn->rm", found[:k], values)
             values = values - np.einsum("rm,rmn->mn", inner, found[:k])
         left = np.sqrt(np.einsum("mn,mn->m", values, values))
-        apart = left > np.maximum(APART * size, 1e-9)
-        found[k] = np.where(apart[:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
+        independent = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
+        found[k] = np.where(independent[:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
     return found

@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +13,14 @@ import numpy as np
 import pytest
 
 from labctl.errors import BadInput
-from labctl.fitting.criticism import Criticism, criticise
+from labctl.fitting.criticism import Criticism, criticise, visibility
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, formulas
 from labctl.fitting.effects.formula import Formula
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording, write_recording
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.simulation.sizing import hidden_recording
+from labctl.services.simulation.walk import hidden_recording
 from procedures.planning.plan import make_plan
 from tests.labctl.cli.test_cli import Lab
 
@@ -138,8 +137,7 @@ def test_a_channel_that_was_not_kept_silences_its_effects(channel: str, silenced
 
 
 def test_what_is_suspected_is_not_called_beyond_what_the_recording_can_say(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = import_module("labctl.fitting.criticism.criticise")  # the package has the function under this name
-    monkeypatch.setattr(module, "LEAST_VISIBLE", 1.1)  # as if the schedule hid everything
+    monkeypatch.setattr(visibility, "LEAST_VISIBLE", 1.1)  # as if the schedule hid everything
     found = held(single_axis(1, **HELD), full=True)
     hidden = {line["effect"] for line in found.not_testable}
     assert found.verdict.named
@@ -175,9 +173,9 @@ def test_order_of_columns_units_and_names_of_axes_do_not_matter() -> None:
     for other in (turned, radians, renamed):
         found = held(other)
         assert (found.verdict.form, found.verdict.named) == (plain.verdict.form, plain.verdict.named)
-        assert found.weighed is not None
-        assert plain.weighed is not None
-        assert found.weighed.candidates[0].log_bf == pytest.approx(plain.weighed.candidates[0].log_bf, rel=1e-6)
+        assert found.comparison is not None
+        assert plain.comparison is not None
+        assert found.comparison.candidates[0].log_bf == pytest.approx(plain.comparison.candidates[0].log_bf, rel=1e-6)
 
 
 def test_outliers_and_missing_data_sets_raise_no_alarm() -> None:

@@ -13,7 +13,7 @@ import pytest
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.diagnostics import VIEWS, draws_of, views_of
 from labctl.fitting.criticism.diagnostics.channels import groups_of, runs_test
-from labctl.fitting.criticism.diagnostics.repeatability import legs_of
+from labctl.fitting.criticism.diagnostics.repeatability import hysteresis_states
 from labctl.fitting.criticism.model_comparison import compare_models
 from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.criticism.residuals import residuals_of
@@ -31,8 +31,8 @@ def views(recording: Recording, model: str | None = "ojeda2000", effects: tuple[
     context = fit_data_of(recording)
     fitted, _ = preset_for(model, list(effects)).build(context)
     forward, _ = changed(fitted).build(context)
-    weighed = compare_models(reduce_recording(recording), forward, {"bias_drift": CATALOGUE["bias_drift"]})
-    return views_of(weighed, residuals_of(weighed), recording, CATALOGUE)
+    comparison = compare_models(reduce_recording(recording), forward, {"bias_drift": CATALOGUE["bias_drift"]})
+    return views_of(comparison, residuals_of(comparison), recording, CATALOGUE)
 
 
 @lru_cache(maxsize=1)
@@ -137,7 +137,7 @@ def test_repeats_scatter_as_the_floor_says() -> None:
 def test_legs_turn_where_the_temperature_does_and_begin_anew_with_power() -> None:
     warm = np.array([20, 20.5, 25, 30, 29.5, 26, 20, 21, 25, 40, 38])
     run = np.array([1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2])
-    assert legs_of(warm, run).tolist() == [0, 0, 1, 1, 1, -1, -1, -1, 1, 0, 0]
+    assert hysteresis_states(warm, run).tolist() == [0, 0, 1, 1, 1, -1, -1, -1, 1, 0, 0]
 
 
 def test_few_levels_are_averaged_one_by_one_and_the_rest_in_windows() -> None:

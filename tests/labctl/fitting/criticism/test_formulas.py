@@ -17,7 +17,7 @@ from labctl.fitting.effects import CATALOGUE, Reference, Term, formulas
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording
-from labctl.services.simulation.sizing import hidden_recording
+from labctl.services.simulation.walk import hidden_recording
 from tests.labctl.fitting.criticism.test_criticism import _plan, held, single_axis, three_axes
 
 SUPPLY = "supply_scale: supply_v * table_rate_dps"

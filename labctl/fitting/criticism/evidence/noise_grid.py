@@ -1,4 +1,7 @@
-"""What the noise between data sets may be: a small grid, with a prior from the data sheet, weighed by the data."""
+"""Noise between data sets: a small grid of drifts with a prior from the data sheet, to be weighted by the data.
+
+The drift is an Ornstein-Uhlenbeck process inside each powered run, independent between runs.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,10 @@ from scipy.linalg import cholesky, solve_triangular
 
 from labctl.fitting.numeric.arrays import Array
 
-#: Drift time constants, s; 0 stands for three of them in equal parts, as bias instability has.
+#: Drift time constants, s; 0 stands for equal parts of `MIXTURE_S`, close to the flicker of bias instability.
 TAUS_S = (0.0, 120.0, 900.0, 4000.0)
 #: Drift sizes, over half the data sheet's bias stability.
 SIZES = (0.2, 0.45, 0.7, 1.0, 1.5, 2.3, 3.6, 6.0, 12.0)
-WHITE_FACTORS = (1.0,)
 #: Width of the prior, a factor.
 PRIOR_FACTOR = 2.5
 MIXTURE_S = (120.0, 700.0, 3600.0)
@@ -27,7 +29,7 @@ USUAL_DPS = {"fog": 0.001, "mems": 0.0015, "piezo": 0.01, "": 0.002}
 
 @dataclass(frozen=True)
 class Noise:
-    """One point of the grid."""
+    """One point of the grid: size and time constant of the drift."""
 
     size_dps: float
     tau_s: float
@@ -35,7 +37,7 @@ class Noise:
 
 
 def expected_drift_dps(technology: str, stability_dps: float | None, instability_dps: float | None = None) -> float:
-    """Return the size that drift is expected to have: measured at rest, else by the data sheet, else as usual.
+    """Return the expected size of the drift, deg/s: measured at rest, else by the data sheet, else by the technology.
 
     `stability_dps` is the data sheet's bias stability, `instability_dps` the bias instability B of a static record.
     """
@@ -47,7 +49,7 @@ def expected_drift_dps(technology: str, stability_dps: float | None, instability
 def noise_grid(
     technology: str, stability_dps: float | None, white_dps: float, instability_dps: float | None = None
 ) -> list[Noise]:
-    """Return the noise to weigh, for a white noise of a mean."""
+    """Return the drifts to average over; those far below `white_dps`, the white noise of a mean, are left out."""
     centre = expected_drift_dps(technology, stability_dps, instability_dps)
     width = np.log(PRIOR_FACTOR)
     points = []
@@ -66,7 +68,7 @@ def correlation(t_s: Array, tau_s: float) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=32)
 def _correlation(times: bytes, tau_s: float) -> NDArray[np.float64]:
-    """The same at the same times: axes and sizes of drift share it."""
+    """Cached by the bytes of the times: axes and sizes of drift share it."""
     t_s = np.frombuffer(times, dtype=np.float64)
     lag = np.abs(t_s[:, None] - t_s[None, :])
     taus = (tau_s,) if tau_s > 0 else MIXTURE_S
@@ -93,7 +95,7 @@ def factors(
 def whiten(
     blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return values (m,) or (m, k) with the correlation taken out whose factors these are."""
+    """Return values (m,) or (m, k) with the correlation taken out whose Cholesky factors these are."""
     found = np.empty_like(values)
     for rows, factor in blocks:
         found[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)

@@ -1,0 +1,57 @@
+"""Bayes factors of the options on one axis against the base, averaged over the noise.
+
+The evidence has a unit-information g-prior on the coefficients (g = number of data sets).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
+from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
+from labctl.fitting.criticism.evidence.noise_grid import Noise
+from labctl.fitting.criticism.option import slices_of
+from labctl.fitting.numeric.arrays import Array
+
+
+@dataclass(frozen=True)
+class AxisEvidence:
+    """Evidence for the options on one axis."""
+
+    log_bf: Array  #: (options,) log Bayes factor against the base, averaged over the noise
+    best: EliminatedBase  #: at the noise that the base finds likeliest
+    gain: Array  #: (options,) chi2 that each option removes, at that noise
+    dimensions: NDArray[np.int64]  #: (options,) directions that each has beside the base
+    slices: list[slice]  #: the place of each option's columns
+    weights: Array  #: (noises,) posterior probability of each noise
+    noises: list[Noise]
+    rows: int  #: number of coordinates
+    base_columns: int
+
+
+def evidence(
+    design: Design, y: NDArray[np.float64], white_var: Array, scale: NDArray[np.float64], noises: list[Noise], rows: int
+) -> AxisEvidence:
+    """Return the evidence for every option, averaged over the noises.
+
+    `y` (R, m) deg/s are the data, `white_var` (m,) the white variance of the means in (deg/s)^2, `scale` (R, m) the
+    standard deviation of the other coordinates in deg/s, `rows` the number of coordinates that exist.
+    """
+    slices = slices_of(design.options)
+    everything = np.concatenate([*(o.rows for o in design.options), y[:, :, None]], axis=2)
+    others = non_mean_products(design, everything, scale)
+    bases = (WhitenedBase(design, white_var, noise) for noise in noises)
+    log_ps, gains, dimensions = zip(*(base.gains(everything[0], others, slices) for base in bases), strict=True)
+    log_p, gain, k, g = np.array(log_ps), np.array(gains), np.array(dimensions), float(len(design.t_s))
+    log_bf = 0.5 * gain * g / (1 + g) - 0.5 * k * np.log1p(g)
+    total = logsumexp(log_p[:, None] + log_bf, axis=0) - logsumexp(log_p)
+    best = int(np.argmax(log_p))
+    return AxisEvidence(
+        np.where(k[best] > 0, total, -np.inf),
+        WhitenedBase(design, white_var, noises[best]).eliminate_from(everything[0], others),
+        gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows, design.base.shape[2],
+    )  # fmt: skip

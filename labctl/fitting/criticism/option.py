@@ -1,0 +1,34 @@
+"""One shape of one candidate on one axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.effects import Term
+
+
+@dataclass(frozen=True)
+class Option:
+    """One shape of one candidate on one axis: its coordinates and the names and units of its k coefficients."""
+
+    candidate: str  #: effect id, or a channel's name with `smooth`
+    term: Term | None
+    rows: NDArray[np.float64]  #: (R, m, k)
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+    @property
+    def smooth(self) -> bool:
+        """Whether this is a smooth function of a channel."""
+        return self.term is None
+
+
+def slices_of(options: Sequence[Option]) -> list[slice]:
+    """Return the place of each option's columns when all options stand side by side."""
+    ends = np.cumsum([0, *(option.rows.shape[2] for option in options)])
+    return [slice(int(begin), int(end)) for begin, end in pairwise(ends)]

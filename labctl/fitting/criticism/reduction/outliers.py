@@ -1,0 +1,37 @@
+"""Outliers of a data set, and the white noise of a single reading."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: A reading further than this many robust standard deviations from its data set's median is left out ...
+OUTLIER = 6.0
+#: ... and further than this many times what nine tenths of them keep within: a line of the table's steps takes few
+#: values only; ...
+BEYOND = 3.0
+#: ... unless there are more of them than this share: then the data set is like that.
+FEW = 0.05
+
+
+def inlier_mask(values: NDArray[np.float64], there: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return 1 where a reading is no outlier of its data set, (m, n)."""
+    masked = np.where(there > 0, values, np.nan)
+    middle = np.nanmedian(masked, axis=1, keepdims=True)
+    spread = 1.4826 * np.nanmedian(np.abs(masked - middle), axis=1, keepdims=True)
+    most = np.nanquantile(np.abs(masked - middle), 1.0 - 2 * FEW, axis=1, keepdims=True)
+    far = (np.abs(values - middle) > np.maximum(OUTLIER * spread, BEYOND * most)) & (there > 0)
+    few = far.sum(axis=1, keepdims=True) <= FEW * there.sum(axis=1, keepdims=True)
+    return np.where(far & few, 0.0, 1.0)
+
+
+def white_level_dps(values: NDArray[np.float64], there: NDArray[np.float64]) -> float:
+    """Return the white standard deviation of one reading, deg/s: the median over data sets and frequencies."""
+    full = there.all(axis=1) if there.all(axis=1).sum() >= max(8, len(there) // 10) else np.ones(len(there), dtype=bool)
+    chosen, mask = values[full], there[full]
+    middle = (chosen * mask).sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1.0)
+    window = np.hanning(chosen.shape[1])[None, :]
+    residual = np.where(mask > 0, chosen - middle, 0.0) * window
+    power = np.abs(np.fft.rfft(residual, axis=1)[:, 2:-1]) ** 2 / np.sum(window**2)
+    per_set = np.median(power, axis=1) / np.log(2.0)
+    return float(np.sqrt(np.median(per_set)))

@@ -1,0 +1,141 @@
+"""Visibility: which effects a schedule can show beside a model, and from which size on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.criticism.candidates import untestable_channels
+from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
+from labctl.fitting.criticism.evidence.elimination import eliminate_base
+from labctl.fitting.criticism.evidence.gains import visible_share
+from labctl.fitting.criticism.evidence.noise_grid import Noise, expected_drift_dps
+from labctl.fitting.criticism.model_comparison import Comparison, design_of
+from labctl.fitting.criticism.option import Option, slices_of
+from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.effects import CATALOGUE, Effect
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.presets import usual_model
+from labctl.recording import Recording
+
+#: An effect of which less than this share is visible beside the model cannot be shown by the schedule.
+LEAST_VISIBLE = 0.15
+#: Size of a just detectable effect, in noise units.
+DETECTABLE_Z = 5.0
+#: Contains several other effects, and so is never what is missing.
+NEVER_MISSING = "rate_temperature_surface"
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """A schedule beside a model: everything but the output, with the base eliminated."""
+
+    data: ReducedRecording
+    designs: Mapping[str, Design]  #: by axis
+    left: Mapping[str, EliminatedBase]  #: by axis
+    slices: Mapping[str, list[slice]]  #: by axis
+
+    def options(self, axis: str) -> list[tuple[Option, slice]]:
+        """Return every shape of every effect on one axis, with its place in the Gram matrix."""
+        return list(zip(self.designs[axis].options, self.slices[axis], strict=True))
+
+
+@dataclass(frozen=True)
+class EffectVisibility:
+    """Whether a schedule can show an effect, and from which size on."""
+
+    effect: str
+    visible: bool
+    share: float  #: of the effect, that the model beside it does not absorb, 0 to 1
+    smallest_size: float | None = None  #: just detectable, in `unit`
+    unit: str = ""
+    why: Literal["channel", "schedule"] | None = None  #: what hides it
+    needs: tuple[str, ...] = ()  #: channels that are not logged
+    experiment: str = ""  #: what would show it
+
+
+def schedule_of(recording: Recording, model: ErrorModel | None = None) -> Schedule:
+    """Return the schedule of a recording, whose output is not used.
+
+    `model` (default: the published one for such a recording) is the base beside which effects stand. Raises
+    NotEnoughData where the recording cannot determine it.
+    """
+    data = reduce_recording(recording, outliers=False)
+    model = model or usual_model(fit_data_of(recording))
+    info = data.info
+    drift = Noise(expected_drift_dps(info.technology or "", info.datasheet.get("bias_stability_dps")), 0.0, 0.0)
+    designs, left, slices = {}, {}, {}
+    for axis in map(str, info.axes):
+        design = design_of(data, model, axis)
+        assert data.white_var is not None
+        white = data.white_var[axis]
+        scale = np.repeat(np.sqrt(white)[None, :], len(data.present), axis=0)
+        no_output: NDArray[np.float64] = np.zeros(data.present.shape)
+        designs[axis] = design
+        left[axis] = eliminate_base(design, no_output, white, scale, [drift])[0]
+        slices[axis] = slices_of(design.options)
+    return Schedule(data, designs, left, slices)
+
+
+def effect_visibilities(schedule: Schedule) -> list[EffectVisibility]:
+    """Return every effect of the catalogue with its visible share and smallest detectable size, most visible first."""
+    absent = untestable_channels(schedule.data)
+    found = [
+        _of_effect(schedule, effect_id, absent.get(effect_id)) for effect_id in CATALOGUE if effect_id != NEVER_MISSING
+    ]
+    return sorted(found, key=lambda v: -v.share)
+
+
+def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> EffectVisibility:
+    if absent:
+        return EffectVisibility(effect_id, False, 0.0, why="channel", needs=tuple(absent))
+    share = 0.0
+    sizes: dict[str, float] = {}
+    for axis in schedule.designs:
+        for option, where in schedule.options(axis):
+            if option.candidate != effect_id:
+                continue
+            here = visible_share(schedule.left[axis], where)
+            share = max(share, here)
+            if here < LEAST_VISIBLE:
+                continue
+            norms = np.sqrt(np.maximum(np.diag(schedule.left[axis].gram)[where], 0.0))
+            best = int(np.argmax(norms))
+            size = DETECTABLE_Z / max(float(norms[best]), 1e-300)
+            sizes[option.units[best]] = min(size, sizes.get(option.units[best], np.inf))
+    if share < LEAST_VISIBLE:
+        return EffectVisibility(effect_id, False, share, why="schedule", experiment=CATALOGUE[effect_id].experiment)
+    unit = next(iter(sizes), "")  # of the lowest order that is visible
+    return EffectVisibility(effect_id, True, share, sizes.get(unit), unit)
+
+
+def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> list[Mapping[str, Any]]:
+    """Return the effects that a recording cannot show, as JSON: a channel is missing, or the schedule hides them."""
+    absent = untestable_channels(comparison.data, catalogue)
+    found: list[Mapping[str, Any]] = [
+        {"effect": effect_id, "why": "channel", "needs": needs} for effect_id, needs in absent.items()
+    ]
+    shares = visible_shares(comparison)
+    for kind in catalogue.values():
+        if kind.id in absent or kind.id in comparison.model.effect_ids or kind.id == NEVER_MISSING:
+            continue
+        if shares.get(kind.id, 0.0) < LEAST_VISIBLE:
+            found.append({"effect": kind.id, "why": "schedule", "needs": [], "visible": shares.get(kind.id, 0.0)})
+    return found
+
+
+def visible_shares(comparison: Comparison) -> dict[str, float]:
+    """Return effect id -> the share that is visible beside the base, 0 to 1, in its most visible shape."""
+    shares: dict[str, float] = {}
+    for axis, design in comparison.designs.items():
+        found = comparison.axes[axis]
+        for option, where in zip(design.options, found.slices, strict=True):
+            if not option.smooth:
+                share = visible_share(found.best, where)
+                shares[option.candidate] = max(shares.get(option.candidate, 0.0), share)
+    return shares

@@ -1,0 +1,47 @@
+"""Measurements of one recording, as criticism uses them: each part is read from the store at most once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from labctl.errors import BadInput
+from labctl.fitting.criticism import decimate
+from labctl.recording import Recording
+from labctl.services.recordings.transfer import points_of
+from labctl.store import RecordingRow, Store
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """One recording of the store; its means and its readings are read when they are first used."""
+
+    store: Store
+    row: RecordingRow
+
+    @cached_property
+    def points(self) -> Recording:
+        """The means as a fit takes them, one row per data set or piece of a long one."""
+        return points_of(self.store, self.row)
+
+    @cached_property
+    def readings(self) -> Recording:
+        """The readings at no more than criticism needs; the means where there are no readings. Raises BadInput."""
+        return load_reduced_readings(self.store, self.row, self.points)
+
+
+def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) -> Recording:
+    """Return a recording's readings, decimated data set by data set; `points`, its means, where it has none.
+
+    Raises BadInput for a table of coefficients, which holds no measurement.
+    """
+    if row.kind == "coefficients":
+        raise BadInput(f"recording {row.id} is a table of coefficients: a model is held against readings or means")
+    if row.kind != "samples":
+        return points
+    info = points.info.model_copy(update={"kind": "samples"})
+    parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return Recording(info, columns, points.environment)

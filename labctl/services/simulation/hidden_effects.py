@@ -1,0 +1,48 @@
+"""Effects hidden in simulated units: read from `EFFECT` or `EFFECT=SIZE`."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from instruments.bench_config import BenchFile, SimulationSettings
+from instruments.simulation import hidden_defaults
+from labctl.errors import BadInput
+
+
+def is_in_noise_units(text: str) -> bool:
+    """Return whether a size is given in noise units: `EFFECT=z10`."""
+    return re.fullmatch(r"[^=]+=z\d+(\.\d+)?", text) is not None
+
+
+def hidden_sizes(texts: list[str]) -> dict[str, float]:
+    """Return effect id -> size in its coefficient unit; without a size, the simulator's default. Raises BadInput."""
+    known = hidden_defaults()
+    sizes: dict[str, float] = {}
+    for text in texts:
+        name, _, size = text.partition("=")
+        if name not in known:
+            raise BadInput(f"effect {name!r} cannot be hidden (there are {', '.join(sorted(known))})")
+        try:
+            sizes[name] = float(size) if size else known[name]
+            if not math.isfinite(sizes[name]):
+                raise ValueError(size)
+        except ValueError:
+            raise BadInput(
+                f"hide {text}: size {size!r} is not a finite number (in the effect's coefficient unit)"
+            ) from None
+    return sizes
+
+
+def with_hidden_effects(bench: BenchFile, texts: list[str]) -> BenchFile:
+    """Return a simulated bench with effects hidden in its units, `EFFECT` or `EFFECT=SIZE`. Raises BadInput."""
+    if not texts:
+        return bench
+    if not bench.is_simulated:
+        raise BadInput(
+            f"hide {', '.join(texts)}: bench {bench.name} is not simulated here; effects can be hidden in simulated "
+            "units only, leave the key out"
+        )
+    simulation = bench.simulation or SimulationSettings()
+    hidden = {**simulation.hidden, **hidden_sizes(texts)}
+    return bench.model_copy(update={"simulation": simulation.model_copy(update={"hidden": hidden})})

@@ -1,0 +1,28 @@
+"""Visibility of the effects on a plan before anything is measured, by a walk through it in the simulated world."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from instruments.bench_config import BenchFile
+from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.services.schemas.answers import Visibility
+from labctl.services.simulation.walk import hidden_recording
+from procedures.planning.plan import Plan
+
+#: Readings per second at which a plan is walked through: its channels are slow.
+WALK_HZ = 1.0
+SEED = 1
+
+
+def planned_schedule(plan: Plan, bench: BenchFile, model: ErrorModel | None = None) -> Schedule:
+    """Return the schedule of a plan beside a model; default: the published model for such a recording."""
+    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": WALK_HZ})
+    return schedule_of(hidden_recording(plan, bench, gyro, SEED, {}), model)
+
+
+def visibility(plan: Plan, bench: BenchFile) -> list[Visibility]:
+    """Return every effect with its visible share and smallest detectable size on a plan, most visible first."""
+    found = effect_visibilities(planned_schedule(plan, bench))
+    return [Visibility(**{**asdict(one), "needs": list(one.needs)}) for one in found]
