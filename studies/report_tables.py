@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from labctl.fitting.criticism.criticise import LARGE_DRIFT
+from labctl.fitting.criticism.criticism import LARGE_DRIFT
 from labctl.fitting.effects import CATALOGUE
 from studies.campaigns import OUTSIDE, PROTOCOLS
 

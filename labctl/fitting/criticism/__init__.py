@@ -3,21 +3,21 @@
 This is the public face: other packages import from here only, never from a submodule.
 """
 
-from labctl.fitting.criticism.criticise import (
+from labctl.fitting.criticism.criticism import (
     LARGE_DRIFT,
     Criticism,
     best_shapes,
     criticise,
     residuals_beside_missing,
 )
-from labctl.fitting.criticism.effect_size import SizeReference, effect_size, size_for_z, size_reference
+from labctl.fitting.criticism.effect_size import SizeReference, size_for_z, size_in_noise_units, size_reference
 from labctl.fitting.criticism.reduction import ReducedRecording, decimate
 from labctl.fitting.criticism.residuals import Residuals, residual_maps, where_it_fails, worst_data_sets
 from labctl.fitting.criticism.separation import (
     SEPARATED_CHI2,
     LeadingSignal,
     leading_signal,
-    separation,
+    separation_chi2,
     separation_power,
 )
 from labctl.fitting.criticism.suspects import Suspect
@@ -39,15 +39,15 @@ __all__ = [
     "best_shapes",
     "criticise",
     "decimate",
-    "effect_size",
     "effect_visibilities",
     "leading_signal",
     "residual_maps",
     "residuals_beside_missing",
     "schedule_of",
-    "separation",
+    "separation_chi2",
     "separation_power",
     "size_for_z",
+    "size_in_noise_units",
     "size_reference",
     "where_it_fails",
     "worst_data_sets",

@@ -46,7 +46,7 @@ def size_reference(recording: Recording) -> SizeReference:
     )
 
 
-def effect_size(reference: SizeReference, recording: Recording) -> tuple[float, float]:
+def size_in_noise_units(reference: SizeReference, recording: Recording) -> tuple[float, float]:
     """Return z and the share that the model cannot absorb, 0 to 1, of what a recording has beside the reference.
 
     The recording has the same schedule and noise as the reference, and the effect. Both figures are those of the axis

@@ -40,7 +40,7 @@ def leading_signal(comparison: Comparison, effect_id: str) -> LeadingSignal:
     )
 
 
-def separation(schedule: Schedule, signal: LeadingSignal, rival: str) -> float:
+def separation_chi2(schedule: Schedule, signal: LeadingSignal, rival: str) -> float:
     """Return the chi2, summed over the axes, that a rival effect leaves of a signal on a schedule."""
     total = 0.0
     for axis, values in signal.coefficients.items():

@@ -99,12 +99,12 @@ class Reference:
 class Effect(ABC):
     """One physical cause of a gyro's error."""
 
-    id: ClassVar[str]
+    id: str
     term: ClassVar[str]  #: the standard's word (IEEE Std 528 / 952)
-    sentence: ClassVar[str]  #: what it is, for a person
+    sentence: str  #: what it is, for a person
     origin: ClassVar[Origin]
     rows: ClassVar[Rows] = "own"
-    needs: ClassVar[tuple[str, ...]] = ()  #: channels beyond rate and temperature
+    needs: tuple[str, ...] = ()  #: channels beyond rate and temperature
     default_order: ClassVar[int | None] = None  #: of a polynomial; None where there is no order to choose
     min_order: ClassVar[int] = 1
     max_order: ClassVar[int | None] = None
@@ -112,7 +112,7 @@ class Effect(ABC):
     ranges: ClassVar[Mapping[str, tuple[float, float]]] = {}  #: technology -> plausible size of the first coefficient
     aliases: ClassVar[tuple[str, ...]] = ()  #: ids whose columns are the same whatever the schedule
     experiment: ClassVar[str] = ""  #: what would tell it from its likes
-    draws: ClassVar[tuple[str, ...]] = ()  #: views of a criticism, or channels, whose picture it would draw
+    draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 
     @abstractmethod

@@ -47,12 +47,12 @@ class Formula(Effect):
 
     def __init__(self, name: str, text: str, sentence: str = "") -> None:
         self.name, self.text = name, text
-        self.id = name  # type: ignore[misc]  # of this one, not of the class
-        self.sentence = sentence or f"The error follows {text}."  # type: ignore[misc]
+        self.id = name
+        self.sentence = sentence or f"The error follows {text}."
         self._tree = _parsed(name, text)
-        self.needs = tuple(sorted(_names(self._tree) - {OWN_RATE, "table_rate_dps", "temperature_c"}))  # type: ignore[misc]
+        self.needs = tuple(sorted(_names(self._tree) - {OWN_RATE, "table_rate_dps", "temperature_c"}))
         names = {"table_rate_dps" if name == OWN_RATE else name for name in _names(self._tree)}
-        self.draws = tuple("time" if name == "t_s" else name for name in sorted(names))  # type: ignore[misc]
+        self.draws = tuple("time" if name == "t_s" else name for name in sorted(names))
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the formula's value; raises BadInput when it is not finite everywhere."""

@@ -15,7 +15,7 @@ from labctl.fitting.criticism import (
     Criticism,
     LeadingSignal,
     leading_signal,
-    separation,
+    separation_chi2,
     separation_power,
 )
 from labctl.fitting.models.error_model import ErrorModel
@@ -67,7 +67,7 @@ def _experiment(
         schedule = planned_schedule(plan, bench, model)
     except (LabctlError, ProcedureError, ValueError):
         return None
-    chi2 = {rival: separation(schedule, signal, rival) for rival in rivals}
+    chi2 = {rival: separation_chi2(schedule, signal, rival) for rival in rivals}
     separated = [rival for rival, value in chi2.items() if value > SEPARATED_CHI2]
     if not separated:
         return None

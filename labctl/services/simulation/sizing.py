@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from instruments.bench_config import BenchFile, GyroSettings
 from labctl.errors import BadInput
-from labctl.fitting.criticism import effect_size, size_for_z, size_reference
+from labctl.fitting.criticism import size_for_z, size_in_noise_units, size_reference
 from labctl.services.simulation.walk import hidden_recording
 from procedures.planning.plan import Plan
 
@@ -22,7 +22,7 @@ class Sizing:
     def z_of(self, effect: str, size: float) -> tuple[float, float]:
         """Return z and the share that the model cannot absorb, 0 to 1, of a hidden effect of this size."""
         recording = hidden_recording(self._plan, self._bench, self._gyro, SEED, {effect: size})
-        return effect_size(self._reference, recording)
+        return size_in_noise_units(self._reference, recording)
 
     def size_of(self, effect: str, z: float, start: float) -> float:
         """Return the size that gives z, in the effect's coefficient unit, searched from `start`.

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from labctl.fitting.criticism.criticise import criticise
+from labctl.fitting.criticism.criticism import criticise
 from labctl.fitting.criticism.evidence.noise_grid import expected_drift_dps, noise_grid
 from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.data.fit_data import fit_data_of

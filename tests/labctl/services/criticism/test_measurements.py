@@ -1,0 +1,48 @@
+"""A criticism reads its recording once: its row, its means and its readings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.commands.protocol import FitRequest
+from labctl.services.criticism.criticise import criticise_unit
+from labctl.store import open_store
+from labctl.store.repositories.recordings import Recordings
+from tests.labctl.fitting.criticism.test_criticism import single_axis
+
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+#: `_heads` is the query behind every way of reading a recording's row.
+READS = ("_heads", "points", "samples", "iter_datasets")
+
+
+def counted(name: str, calls: Counter[str]) -> Callable[..., Any]:
+    function = getattr(Recordings, name)
+
+    def count(*args: Any, **kwargs: Any) -> Any:
+        calls[name] += 1
+        return function(*args, **kwargs)
+
+    return count
+
+
+@pytest.mark.parametrize("number", [None, 1])
+def test_a_criticism_reads_its_recording_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int | None
+) -> None:
+    """With experiments for what cannot be distinguished, which need the recording's campaign too."""
+    calls: Counter[str] = Counter()
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        store.recordings.add_import(single_axis(5, earth_rate_tilt=0.0012), AT)
+        fit_unit(store, "FOG-0001", FitRequest(model="ojeda2000"), AT)
+        for name in READS:
+            monkeypatch.setattr(Recordings, name, counted(name, calls))
+        answer = criticise_unit(store, "FOG-0001", 1, number)
+    assert answer.verdict == "ambiguous"
+    assert calls == {"_heads": 1, "points": 1, "iter_datasets": 1}
