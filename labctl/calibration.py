@@ -32,7 +32,7 @@ def hash_of(document: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration as it leaves the house."""
+    """A calibration as it is exported: the document, and the fitted model in it."""
 
     document: Mapping[str, Any]
 

@@ -1,4 +1,4 @@
-"""What common tools name on the same campaigns: each is given exactly the columns that labctl weighs.
+"""What common tools name on the same campaigns: each is given exactly the columns that labctl compares.
 
 Every tool sees the base's columns, which it always keeps, and every column of every effect in every shape. "means" are
 the data-set means alone, unweighted, as in the papers; "rows" are all coordinates over their white standard deviation.

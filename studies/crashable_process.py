@@ -24,7 +24,7 @@ from labctl.store.schema import tables
 
 
 class Killed(BaseException):
-    """The process is gone. Nothing in the house may catch this."""
+    """The process is gone. Nothing in labctl may catch this."""
 
 
 @dataclass

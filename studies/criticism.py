@@ -33,7 +33,7 @@ ROOT = Path(__file__).resolve().parent.parent
 #: Sizes of hidden effects, in noise units.
 Z_LEVELS = (5.0, 10.0, 30.0, 100.0)
 TWO_AT_Z = 20.0
-#: Where the fall of the held-out error is looked at.
+#: Size at which the fall of the held-out error is computed.
 HELD_OUT_AT_Z = 30.0
 PER_CELL = int(os.environ.get("LABCTL_STUDY_CAMPAIGNS", "100"))
 #: Campaigns of a cell beside the main ones: fewer.

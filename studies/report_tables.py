@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
-from labctl.fitting.criticism.criticism import LARGE_DRIFT
-from labctl.fitting.effects import CATALOGUE
-from studies.campaigns import OUTSIDE, PROTOCOLS
+from studies.campaigns import PROTOCOLS
+from studies.scores import (
+    Answer,
+    Said,
+    alarm,
+    another_named,
+    both_alone,
+    both_named,
+    one_too_many,
+    right_alone,
+    right_cause,
+    right_channel,
+    right_first,
+    right_or_group,
+    says_large_drift,
+    wrong_claim,
+    wrong_first,
+    wrong_single,
+)
 
-Answer = dict[str, Any]
-#: The same on a schedule: one gives all but this of the other's signal.
-SAME = 0.999
 Z95 = 1.959963984540054
 
 
@@ -40,93 +52,6 @@ def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def truth(answer: Answer) -> str:
-    """Return the one effect that is hidden."""
-    return str(next(iter(answer["hidden"])))
-
-
-def names(effect: str) -> set[str]:
-    """Return an effect with those that have the same columns on every schedule."""
-    return {effect, *CATALOGUE[effect].aliases} if effect in CATALOGUE else {effect}
-
-
-def right_or_group(answer: Answer) -> bool:
-    """Whether what is hidden was named, alone or among those that it cannot be told from."""
-    return truth(answer) in answer["named"]
-
-
-def single(answer: Answer) -> bool:
-    """Whether one thing was named: by one name, or by several of which the catalogue says that they are one."""
-    return bool(answer["named"]) and (answer["nodes"] == 1 or set(answer["named"]) <= names(answer["named"][0]))
-
-
-def right_first(answer: Answer) -> bool:
-    """Whether what is hidden, or its exact like, is what was named first, as the other tools' claims are counted."""
-    return bool(answer["named"]) and answer["named"][0] in names(truth(answer))
-
-
-def wrong_first(answer: Answer) -> bool:
-    """Whether something else was named first, be it in a group that says that it cannot be told."""
-    return bool(answer["named"]) and not right_first(answer)
-
-
-def right_alone(answer: Answer) -> bool:
-    """Whether what is hidden was named, and nothing else but its exact likes."""
-    return right_or_group(answer) and single(answer)
-
-
-def right_cause(answer: Answer) -> bool:
-    """Whether what is hidden was named, and nothing that this schedule does not make the same."""
-    return right_or_group(answer) and (single(answer) or answer["alike"] > SAME)
-
-
-def wrong_claim(answer: Answer) -> bool:
-    """Whether something was named, and what is hidden was not among it."""
-    return bool(answer["named"]) and not right_or_group(answer)
-
-
-def wrong_single(answer: Answer) -> bool:
-    """Whether one thing was named, and it was another."""
-    return single(answer) and not right_or_group(answer)
-
-
-def one_too_many(answer: Answer) -> bool:
-    """Whether another effect was called missing beside the hidden one, that is not its exact like."""
-    return answer["verdict"] == "missing" and not set(answer["named"]) <= names(truth(answer))
-
-
-def alarm(answer: Answer) -> bool:
-    """Whether anything was said to be missing where nothing is."""
-    return bool(answer["verdict"] not in {"adequate", "insufficient_data"})
-
-
-class Said:
-    """How a tool's answer counts: what it names first is what it claims."""
-
-    def __init__(self, tool: str) -> None:
-        self.tool = tool
-
-    def named(self, answer: Answer) -> list[str]:
-        """Return everything that the tool names, first things first."""
-        return list(answer["peers"][self.tool]["named"])
-
-    def alarm(self, answer: Answer) -> bool:
-        """Whether it names anything."""
-        return bool(self.named(answer))
-
-    def right(self, answer: Answer) -> bool:
-        """Whether it names the hidden effect, or its exact like, first."""
-        return self.alarm(answer) and self.named(answer)[0] in names(truth(answer))
-
-    def wrong(self, answer: Answer) -> bool:
-        """Whether it names another effect first."""
-        return self.alarm(answer) and not self.right(answer)
-
-    def among(self, answer: Answer) -> bool:
-        """Whether the hidden effect is anywhere among those it names."""
-        return bool(names(truth(answer)) & set(self.named(answer)))
 
 
 class Cells:
@@ -207,11 +132,6 @@ def own(cells: Cells) -> str:
     return markdown(["%", "protocol", *(f"z = {z:g}" for z in cells.z_levels)], rows)
 
 
-def right_channel(answer: Answer) -> bool:
-    """Whether an effect outside the catalogue is said to be so, with what it hangs on first."""
-    return answer["verdict"] == "unexplained" and answer["depends_on"][:1] == [OUTSIDE[truth(answer)]]
-
-
 def _names(answer: Answer) -> bool:
     return bool(answer["named"])
 
@@ -233,26 +153,6 @@ def extras(cells: Cells) -> str:
     rows.append(["held-out RMS over floor once improved, z = 30: median (90 %)",
                  *(_spread(cells.answers, place) for place in places)])  # fmt: skip
     return markdown(["%", *(place or "all" for place in places)], rows)
-
-
-def says_large_drift(answer: Answer) -> bool:
-    """Whether labctl says that the drift is larger than specified."""
-    return (answer.get("drift") or 0.0) > LARGE_DRIFT
-
-
-def both_named(answer: Answer) -> bool:
-    """Whether both hidden effects are named: each, its exact like, or a group that it cannot be told from."""
-    return all(names(effect) & set(answer["named"]) for effect in answer["hidden"])
-
-
-def both_alone(answer: Answer) -> bool:
-    """Whether both hidden effects are named, and neither with others that it could not be told from."""
-    return both_named(answer) and answer["verdict"] == "missing"
-
-
-def another_named(answer: Answer) -> bool:
-    """Whether something is named that is not hidden."""
-    return not set(answer["named"]) <= set().union(*(names(effect) for effect in answer["hidden"]))
 
 
 def _spread(answers: Sequence[Answer], protocol: str | None) -> str:

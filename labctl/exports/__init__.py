@@ -1,4 +1,4 @@
-"""One file per format that leaves the house."""
+"""Exports of a calibration, one module per format."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Pictures of a criticism, from its numbers: Plotly figures for pages and for the report, and the report itself.
 
-Everything here takes the answers as JSON, so it draws the same whoever asks: the command line, a page, a saved file.
+Everything here takes the answers as JSON, so the command line, a page and a saved file show the same plots.
 """
 
 from labctl.plots.registry import Picture, pictures_of

@@ -122,7 +122,7 @@ def previous_rate(answer: Mapping[str, Any]) -> go.Figure | None:
 
 
 def legs(answer: Mapping[str, Any]) -> go.Figure | None:
-    """Return the up leg minus the down leg by temperature and by rate; None where there are not both."""
+    """Return the residual reached from below minus that from above, by temperature and rate; None without both."""
     lines = (answer.get("views") or {}).get("legs") or []
     if not lines:
         return None

@@ -26,7 +26,7 @@ def dataset_starts(dataset: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def temperature_of(columns: Columns) -> NDArray[np.float64] | None:
-    """Return how warm the unit was, (n,) deg C, or None where nobody knows.
+    """Return how warm the unit was, (n,) deg C, or None where no column gives it.
 
     The one place that decides: the unit's own thermometer, and where it has none the chamber's stands in for it.
     """
@@ -64,8 +64,8 @@ def _minutes(since_s: NDArray[np.float64], temperature_c: NDArray[np.float64]) -
 def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Recording:
     """Return points in which each data set that is taken in pieces has a row for each of them, under its own number.
 
-    For means that are kept without their readings: `readings_of` returns those of a data set, and is asked for the long
-    ones only. What the readings do not say, such as the set point, a piece has from its data set.
+    For means that are kept without their readings: `readings_of` returns those of a data set; only the long ones are
+    read. What the readings do not say, such as the set point, a piece has from its data set.
     """
     columns = {name: np.asarray(values) for name, values in points.columns.items()}
     if not np.any(columns.get("duration_s", np.zeros(1)) > LONG_S):

@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 from scipy.stats import binomtest
 
-from studies import report_tables
-from studies.report_tables import Cells, Said, wilson
+from studies import report_tables, scores
+from studies.report_tables import Cells, wilson
+from studies.scores import Said
 
 TOOL = "a tool, means"
 
@@ -37,59 +38,59 @@ def test_a_share_says_per_cent_and_interval() -> None:
 
 def test_a_group_with_the_truth_is_right_and_not_alone() -> None:
     group = answer(verdict="ambiguous", named=["thermal_lag", "bias_drift"], nodes=2)
-    assert report_tables.right_or_group(group)
-    assert not report_tables.right_alone(group)
-    assert not report_tables.wrong_claim(group)
+    assert scores.right_or_group(group)
+    assert not scores.right_alone(group)
+    assert not scores.wrong_claim(group)
 
 
 def test_likes_by_the_catalogue_are_one_name() -> None:
     turning = answer(truth="earth_rate_tilt", named=["earth_rate_tilt", "magnetic_sensitivity", "table_tilt"], nodes=2)
-    assert report_tables.right_alone(turning)
-    assert report_tables.wrong_single({**turning, "hidden": {"warm_up": 1.0}})
+    assert scores.right_alone(turning)
+    assert scores.wrong_single({**turning, "hidden": {"warm_up": 1.0}})
 
 
 def test_another_name_is_wrong_alone_and_in_a_group() -> None:
     single = answer(named=["thermal_lag"])
     group = answer(verdict="ambiguous", named=["thermal_lag", "warm_up"], nodes=2)
-    assert (report_tables.wrong_single(single), report_tables.wrong_claim(single)) == (True, True)
-    assert (report_tables.wrong_single(group), report_tables.wrong_claim(group)) == (False, True)
+    assert (scores.wrong_single(single), scores.wrong_claim(single)) == (True, True)
+    assert (scores.wrong_single(group), scores.wrong_claim(group)) == (False, True)
 
 
 def test_silence_is_neither_right_nor_wrong() -> None:
     silent = answer(verdict="adequate", named=[], nodes=0)
-    assert not report_tables.right_or_group(silent)
-    assert not report_tables.wrong_claim(silent)
+    assert not scores.right_or_group(silent)
+    assert not scores.wrong_claim(silent)
 
 
 def test_what_is_named_first_counts_as_the_other_tools_claims_do() -> None:
     group = answer(verdict="ambiguous", truth="bias_drift", named=["warm_up", "bias_drift"], nodes=2)
-    assert report_tables.right_or_group(group)
-    assert report_tables.wrong_first(group)
+    assert scores.right_or_group(group)
+    assert scores.wrong_first(group)
     like = answer(verdict="ambiguous", truth="misalignment", named=["non_orthogonality", "misalignment"])
-    assert report_tables.right_first(like)
+    assert scores.right_first(like)
 
 
 def test_a_second_name_beside_the_truth_is_one_too_many_but_its_like_is_not() -> None:
-    assert report_tables.one_too_many(answer(named=["bias_drift", "warm_up"], nodes=2))
+    assert scores.one_too_many(answer(named=["bias_drift", "warm_up"], nodes=2))
     like = answer(verdict="ambiguous", truth="misalignment", named=["misalignment", "non_orthogonality"])
-    assert not report_tables.one_too_many(like)
+    assert not scores.one_too_many(like)
 
 
 def test_two_hidden_effects_want_both_names_and_no_other() -> None:
     two = answer("two", hidden={"bias_drift": 1.0, "misalignment": 1.0}, named=["non_orthogonality", "bias_drift"])
-    assert report_tables.both_named(two)
-    assert report_tables.both_alone({**two, "verdict": "missing"})
-    assert not report_tables.both_alone({**two, "verdict": "ambiguous"})
-    assert not report_tables.another_named(two)
-    assert report_tables.another_named({**two, "named": ["bias_drift", "warm_up"]})
-    assert not report_tables.both_named({**two, "named": ["bias_drift", "warm_up"]})
+    assert scores.both_named(two)
+    assert scores.both_alone({**two, "verdict": "missing"})
+    assert not scores.both_alone({**two, "verdict": "ambiguous"})
+    assert not scores.another_named(two)
+    assert scores.another_named({**two, "named": ["bias_drift", "warm_up"]})
+    assert not scores.both_named({**two, "named": ["bias_drift", "warm_up"]})
 
 
 def test_outside_the_catalogue_the_right_channel_must_come_first() -> None:
     outside = answer("outside", truth="outside_etalon", verdict="unexplained", depends_on=["temperature_c", "t_s"])
-    assert report_tables.right_channel(outside)
-    assert not report_tables.right_channel({**outside, "depends_on": ["t_s", "temperature_c"]})
-    assert not report_tables.right_channel({**outside, "verdict": "missing"})
+    assert scores.right_channel(outside)
+    assert not scores.right_channel({**outside, "depends_on": ["t_s", "temperature_c"]})
+    assert not scores.right_channel({**outside, "verdict": "missing"})
 
 
 def test_another_tool_claims_what_it_names_first() -> None:

@@ -19,16 +19,16 @@ def play(stage: DemoRunner, real_serial: str) -> None:
     stage.title("(e) What is missing? A gyro with something hidden in it")
     campaign = stage.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
     stage.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])
-    answer = _walk(stage, SERIAL)
+    answer = _criticise_and_improve(stage, SERIAL)
     stage.say(f"(hidden in it was: {', '.join(HIDDEN)})")
     stage.figures["hidden"] = {"hidden": list(HIDDEN), "named": answer.named, "verdict": answer.verdict}
     stage.title("The same walk through the real gyro's recording, from a plain model")
     stage.fit(real_serial, "bias_scale", stage.store.recordings.of_unit(real_serial)[0].id)
-    answer = _walk(stage, real_serial)
+    answer = _criticise_and_improve(stage, real_serial)
     stage.figures["real_walk"] = {"named": answer.named, "verdict": answer.verdict}
 
 
-def _walk(stage: DemoRunner, serial: str) -> CriticismResponse:
+def _criticise_and_improve(stage: DemoRunner, serial: str) -> CriticismResponse:
     answer = criticise_unit(stage.store, serial, None, None, [])
     for sentence in answer.text:
         stage.say(sentence)

@@ -1,4 +1,4 @@
-"""What every part of the demo needs: a database, a folder, and a voice."""
+"""Context of the demo: database, folder and console, and the campaigns and fits that its parts share."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from procedures.monitoring.progress import Progress
 
 @dataclass
 class DemoRunner:
-    """Where the demo plays, and what it has found so far."""
+    """Context of the demo, and the figures that its parts have found so far."""
 
     store: Store
     folder: Path
@@ -35,11 +35,11 @@ class DemoRunner:
     figures: dict[str, Any] = field(default_factory=dict)
 
     def title(self, text: str) -> None:
-        """Begin a part."""
+        """Print the title of a part."""
         self.console.print(f"\n[bold]{text}[/]")
 
     def say(self, text: str) -> None:
-        """Tell something."""
+        """Print a line."""
         self.console.print(text, markup=False)
 
     def campaign(

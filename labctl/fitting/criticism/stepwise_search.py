@@ -35,7 +35,7 @@ LEADERS = 4
 #: The next effect is only named when its evidence, where it does most, is at least this share of the evidence for the
 #: one before: less is the residue of a wrong shape of the one before.
 NEXT_SHARE = 0.04
-#: The same after effects that could not be told apart: one of the others may fit better than the one that was added.
+#: The same after effects that could not be distinguished: one of the others may fit better than the one that was added.
 NEXT_SHARE_AMBIGUOUS = 0.08
 #: Least share of an effect that is assumed within data sets, and between them.
 LEAST_PART = 0.05

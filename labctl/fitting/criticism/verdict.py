@@ -163,7 +163,7 @@ def channels_behind(comparison: Comparison) -> tuple[str, ...]:
     """Return the channels on which the residual depends, strongest first."""
     found = [c for c in comparison.candidates if c.smooth and c.log_bf >= ENOUGH]
     temperature = next((c for c in found if c.id == "temperature_c"), None)
-    # on one rising leg time and the chamber's temperature are the same variable as the gyro's temperature
+    # while the temperature only rises, time and chamber temperature are the same variable as the gyro's temperature
     same = temperature is not None and found[0].id in SAME_AS_TEMPERATURE
     if temperature is not None and same and overlap(comparison, found[0], temperature) > EXPLAINED_TIME:
         found = [temperature, *(c for c in found if c is not temperature)]

@@ -21,7 +21,7 @@ ONE_TEMPERATURE_K = 1.0
 GAP = 1.5
 #: From this length on a static record knows the drift better than a data sheet does.
 LONG_S = 1200.0
-#: Temperatures are looked at in this many pieces of a stretch.
+#: A stretch is divided into this many pieces, whose mean temperatures are compared.
 PIECES = 2000
 
 
@@ -103,7 +103,7 @@ def longest_stretch(recording: Recording) -> slice | None:
     begins = np.flatnonzero(still & np.concatenate([[True], ~(together & still[:-1])]))
     ends = np.flatnonzero(still & np.concatenate([~(together & still[1:]), [True]])) + 1
     warm = temperature_of(columns)
-    if warm is None:  # noise can be looked at all the same
+    if warm is None:  # the noise does not depend on a known temperature
         warm = np.zeros(len(recording))
     best = slice(0, 0)
     for begin, end in sorted(zip(begins, ends, strict=True), key=lambda pair: pair[0] - pair[1]):

@@ -1,4 +1,4 @@
-"""What one physical effect is: who it is in words, and which columns it adds to the error of a gyro.
+"""One physical effect: its name and explanation, and the regressors that it adds to the error of a gyro.
 
 An effect is written as one small frozen class; it is added to the catalogue by listing it in its family's module.
 """
@@ -101,7 +101,7 @@ class Effect(ABC):
 
     id: str
     term: ClassVar[str]  #: the standard's word (IEEE Std 528 / 952)
-    sentence: str  #: what it is, for a person
+    sentence: str  #: one sentence that explains it to a reader
     origin: ClassVar[Origin]
     rows: ClassVar[Rows] = "own"
     needs: tuple[str, ...] = ()  #: channels beyond rate and temperature
@@ -111,7 +111,7 @@ class Effect(ABC):
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     ranges: ClassVar[Mapping[str, tuple[float, float]]] = {}  #: technology -> plausible size of the first coefficient
     aliases: ClassVar[tuple[str, ...]] = ()  #: ids whose columns are the same whatever the schedule
-    experiment: ClassVar[str] = ""  #: what would tell it from its likes
+    experiment: ClassVar[str] = ""  #: what would distinguish it from similar effects
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 

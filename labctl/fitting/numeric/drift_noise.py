@@ -1,7 +1,7 @@
-"""What data sets scatter by: white noise of a mean, drift between means, and a part that grows with rate.
+"""Noise of data-set means: white noise, drift between means, and a part that grows with rate.
 
 The drift is an Ornstein-Uhlenbeck process inside each powered run, independent between runs. It is not plugged in as
-one estimate: a grid of drifts is weighed by the restricted likelihood of the data, and the fit is averaged over it.
+one estimate: a grid of drifts is weighted by the restricted likelihood of the data, and the fit is averaged over it.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def whitened(
 
 
 def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:
-    """Return the drifts to weigh, around the scatter that white noise leaves unexplained."""
+    """Return the drifts to average over, around the scatter that white noise leaves unexplained."""
     spacing = float(np.median(np.diff(np.sort(scatter.t_s)))) if len(scatter.t_s) > 1 else 1.0
     spacing = max(spacing, 1e-3)
     points = [Drift(0.0, spacing, per_rate)]

@@ -18,13 +18,13 @@ from labctl.fitting.numeric import drift_noise
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Drift, Scatter
 
-#: Scaled columns closer to dependence than this cannot be told apart by the data.
+#: Scaled columns are taken as linearly dependent below this ratio of singular values.
 RANK_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Coefficients (k,), their covariance (k, k), residuals (m,) and what noise they were weighed with."""
+    """Coefficients (k,), their covariance (k, k), residuals (m,) and the noise that weighted the data."""
 
     values: Array
     covariance: NDArray[np.float64]
@@ -54,9 +54,9 @@ def rank_of(design: NDArray[np.float64]) -> int:
 
 
 def solve(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift | None = None) -> Solution:
-    """Fit y (m,) by design (m, k), weighed by what the scatter says; `drift` fixes the noise instead of a grid.
+    """Fit y (m,) by design (m, k), weighted by the inverse of its noise; `drift` fixes the noise instead of a grid.
 
-    Raises NotEnoughData when the columns cannot be told apart or there are fewer rows than columns.
+    Raises NotEnoughData when the columns are linearly dependent or there are fewer rows than columns.
     """
     m, k = design.shape
     if m < k or rank_of(design) < k:

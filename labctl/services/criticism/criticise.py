@@ -40,7 +40,7 @@ def residuals_unit(store: Store, serial: str, version: int | None, recording: in
 def _cached_criticism(
     kind: type[A], store: Store, serial: str, version: int | None, recording: int | None, competing: Sequence[Formula]
 ) -> A:
-    """Return one of the answers of a criticism; whichever is asked first, all are kept."""
+    """Return one of the answers of a criticism; the first request computes and caches all of them."""
     row = version_of(store, serial, version)
     measured = newest_row(store, serial, recording)
 

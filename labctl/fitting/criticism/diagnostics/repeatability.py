@@ -16,14 +16,14 @@ from labctl.fitting.numeric.json_numbers import plain, plain_list
 
 #: A temperature that went back by this much has turned.
 TURN_K = 2.0
-#: An up leg and a down leg meet at temperatures as close as this.
+#: Data sets reached from below and from above are compared at temperatures as close as this.
 SAME_TEMPERATURE_K = 2.0
 MOST_PAIRS = 200
 
 
 def hysteresis_states(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return from where the temperature came to each data set, (m,): 1 from below, -1 from above, 0 not known."""
-    leg = np.zeros(len(temperature_c), dtype=np.int64)
+    """Return from which side the temperature of each data set was reached, (m,): 1 below, -1 above, 0 unknown."""
+    side = np.zeros(len(temperature_c), dtype=np.int64)
     state, low, high = 0, 0.0, 0.0
     for i, now in enumerate(temperature_c.tolist()):
         if i == 0 or run[i] != run[i - 1]:
@@ -33,15 +33,15 @@ def hysteresis_states(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[n
             state, low = -1, now
         elif state <= 0 and now - low > TURN_K:
             state, high = 1, now
-        leg[i] = state
-    return leg
+        side[i] = state
+    return side
 
 
 def hysteresis_lines(view: AxisView) -> Iterator[dict[str, Any]]:
-    """Yield the up leg minus the down leg at equal rate and temperature, by temperature and by rate."""
+    """Yield the residual reached from below minus that from above at equal rate and temperature, deg/s, by channel."""
     warm, rate = view.temperature_c(), view.channel("table_rate_dps")
-    leg = hysteresis_states(warm, view.run)
-    ups, downs = _matched(view, leg, warm, rate)
+    side = hysteresis_states(warm, view.run)
+    ups, downs = _matched(view, side, warm, rate)
     if not len(ups):
         return
     for name, values in (("temperature_c", (warm[ups] + warm[downs]) / 2), ("table_rate_dps", rate[ups])):
@@ -64,13 +64,13 @@ def hysteresis_lines(view: AxisView) -> Iterator[dict[str, Any]]:
 
 
 def _matched(
-    view: AxisView, leg: NDArray[np.int64], warm: Array, rate: Array
+    view: AxisView, side: NDArray[np.int64], warm: Array, rate: Array
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return data sets of the up leg, each with the one of the down leg that is nearest at its rate and position."""
+    """Return data sets reached from below, each with the one from above that is nearest at its rate and position."""
     position, near = view.position(), REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
     ups, downs = [], []
-    down = np.flatnonzero(leg < 0)
-    for i in np.flatnonzero(leg > 0) if len(down) else ():
+    down = np.flatnonzero(side < 0)
+    for i in np.flatnonzero(side > 0) if len(down) else ():
         same = down[(position[down] == position[i]) & (np.abs(rate[down] - rate[i]) <= near)]
         if len(same):
             nearest = same[np.argmin(np.abs(warm[same] - warm[i]))]

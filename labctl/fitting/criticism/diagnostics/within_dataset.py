@@ -1,4 +1,4 @@
-"""The readings inside data sets, at no more than 10 Hz, without what is not looked for there.
+"""The readings inside data sets, at no more than 10 Hz, without mean, slope and the lines of the stepper.
 
 Each data set loses its mean, its slope and the stepper's own lines; readings that are far off are left out.
 """
@@ -15,7 +15,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.points import dataset_starts
 
-#: Readings of a data set that are looked at, from its begin.
+#: At most this many readings of a data set are used, from its beginning.
 MOST_READINGS = 1200
 LEAST_READINGS = 32
 
