@@ -14,35 +14,35 @@ SERIAL = "FOG-0002"
 HIDDEN = {"scale_factor_asymmetry": 2e-4}
 
 
-def play(stage: DemoRunner, real_serial: str) -> None:
+def play(demo: DemoRunner, real_serial: str) -> None:
     """Tell both walks; what is said comes from the criticism alone."""
-    stage.title("(e) What is missing? A gyro with something hidden in it")
-    campaign = stage.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
-    stage.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])
-    answer = _criticise_and_improve(stage, SERIAL)
-    stage.say(f"(hidden in it was: {', '.join(HIDDEN)})")
-    stage.figures["hidden"] = {"hidden": list(HIDDEN), "named": answer.named, "verdict": answer.verdict}
-    stage.title("The same walk through the real gyro's recording, from a plain model")
-    stage.fit(real_serial, "bias_scale", stage.store.recordings.of_unit(real_serial)[0].id)
-    answer = _criticise_and_improve(stage, real_serial)
-    stage.figures["real_walk"] = {"named": answer.named, "verdict": answer.verdict}
+    demo.title("(e) What is missing? A gyro with something hidden in it")
+    campaign = demo.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
+    demo.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])
+    answer = _criticise_and_improve(demo, SERIAL)
+    demo.say(f"(hidden in it was: {', '.join(HIDDEN)})")
+    demo.figures["hidden"] = {"hidden": list(HIDDEN), "named": answer.named, "verdict": answer.verdict}
+    demo.title("The same walk through the real gyro's recording, from a plain model")
+    demo.fit(real_serial, "bias_scale", demo.store.recordings.of_unit(real_serial)[0].id)
+    answer = _criticise_and_improve(demo, real_serial)
+    demo.figures["real_walk"] = {"named": answer.named, "verdict": answer.verdict}
 
 
-def _criticise_and_improve(stage: DemoRunner, serial: str) -> CriticismResponse:
-    answer = criticise_unit(stage.store, serial, None, None, [])
+def _criticise_and_improve(demo: DemoRunner, serial: str) -> CriticismResponse:
+    answer = criticise_unit(demo.store, serial, None, None, [])
     for sentence in answer.text:
-        stage.say(sentence)
+        demo.say(sentence)
     if answer.named:
         added = answer.named[0]
-        better = improve_unit(stage.store, serial, ImproveRequest(add=[added]), VirtualClock().utc())
+        better = improve_unit(demo.store, serial, ImproveRequest(add=[added]), VirtualClock().utc())
         before, after = (better.model_extra or {})["before"], better.error
         if answer.verdict == "ambiguous":
-            stage.say(f"adding the first of them, to see how far it leads (not that it is the cause): {added}")
-        stage.say(
+            demo.say(f"adding the first of them, to see how far it leads (not that it is the cause): {added}")
+        demo.say(
             f"added {added}: RMS {before['rms_dps']:.4f} -> {after.rms_dps:.4f} deg/s, held-out temperatures "
             f"{before['heldout_rms_dps']:.4f} -> {after.heldout_rms_dps:.4f}, noise floor {after.noise_floor_dps:.4f}"
         )
-        stage.say(f"and then: {criticise_unit(stage.store, serial, None, None, []).text[0]}")
-    for line in ladder_lines(ladder(stage.store, serial)):
-        stage.say(line)
+        demo.say(f"and then: {criticise_unit(demo.store, serial, None, None, []).text[0]}")
+    for line in ladder_lines(ladder(demo.store, serial)):
+        demo.say(line)
     return answer

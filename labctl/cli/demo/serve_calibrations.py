@@ -14,11 +14,11 @@ from labctl.compensator import Compensator
 READY_S = 60.0
 
 
-def play(stage: DemoRunner, serials: list[str]) -> None:
+def play(demo: DemoRunner, serials: list[str]) -> None:
     """Serve the demo's database on a free loopback port and load from it what a robot would load."""
-    stage.title("Served over HTTP, fetched back and applied")
-    command = [sys.executable, "-m", "labctl", "serve", "--port", "0", "--json", "--database", stage.store.location]
-    stage.store.close()
+    demo.title("Served over HTTP, fetched back and applied")
+    command = [sys.executable, "-m", "labctl", "serve", "--port", "0", "--json", "--database", demo.store.location]
+    demo.store.close()
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service:  # noqa: S603  our own command
         try:
             url = _address(service)
@@ -32,7 +32,7 @@ def play(stage: DemoRunner, serials: list[str]) -> None:
                     shown = ", ".join(
                         f"{axis} {rate:.4f}" for axis, rate in zip(compensator.axes, corrected, strict=True)
                     )
-                    stage.say(
+                    demo.say(
                         f"GET /api/units/{serial}/calibration: version {compensator.calibration.version}, "
                         f"{len(answer.content)} bytes; an output of 50 deg/s at {middle:.0f} deg C is {shown} deg/s"
                     )

@@ -12,13 +12,13 @@ from labctl.turn_error import LEAST_RATE_DPS, error_per_turn
 SERIAL = "FOG-0001"
 
 
-def play(stage: DemoRunner) -> None:
+def play(demo: DemoRunner) -> None:
     """Measure, fit, and show what is left per rate and per turn of 360 deg."""
-    stage.title("(b) Fibre-optic gyro: 21 rates x 11 temperatures on a single-axis table")
-    answer = stage.campaign("ojeda2000", "single-axis-sim")
+    demo.title("(b) Fibre-optic gyro: 21 rates x 11 temperatures on a single-axis table")
+    answer = demo.campaign("ojeda2000", "single-axis-sim")
     recording = answer.recordings[SERIAL]
-    fitted = stage.fit(SERIAL, "ojeda2000", recording)
-    points = stage.store.recordings.points(recording)
+    fitted = demo.fit(SERIAL, "ojeda2000", recording)
+    points = demo.store.recordings.points(recording)
     context, result = fit_data_of(points), fit(points, "ojeda2000")
     rate = np.asarray(points.columns["table_rate_dps"])
     raw = context.outputs["z"] - context.true_rate_dps("z")
@@ -33,12 +33,12 @@ def play(stage: DemoRunner) -> None:
         before, after = raw[here], result.residual_dps["z"][here]
         turns = (_rms(error_per_turn(errors, rate[here])) for errors in (before - bias, after))
         rows.add_row(f"{asked:+.0f}", f"{_rms(before):.3f}", f"{_rms(after):.4f}", *(f"{t:.4f}" for t in turns))
-    stage.console.print(rows)
+    demo.console.print(rows)
     held = fitted.error.heldout_rms_dps
     assert held is not None
     assert fitted.error.raw_rms_dps is not None
-    stage.figures["single_axis"] = {"raw_over_held_out": fitted.error.raw_rms_dps / held}
-    stage.say(f"raw over held-out compensated error: {fitted.error.raw_rms_dps / held:.0f}")
+    demo.figures["single_axis"] = {"raw_over_held_out": fitted.error.raw_rms_dps / held}
+    demo.say(f"raw over held-out compensated error: {fitted.error.raw_rms_dps / held:.0f}")
 
 
 def _rms(values: np.ndarray) -> float:

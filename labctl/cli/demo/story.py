@@ -21,21 +21,21 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
     """Play the whole story into `folder`; returns its figures, each computed in this run."""
     location = database or str(_fresh(folder) / DATABASE)
     with maybe_silent(quiet) as console, open_store(location, write=True) as store:
-        stage = DemoRunner(store, folder, console, quiet)
-        triaxial.play(stage, quick=quick)
-        single_axis.play(stage)
-        example_data.play(stage)
-        find_missing_effect.play(stage, "OSU-FOG-2024")
+        demo = DemoRunner(store, folder, console, quiet)
+        triaxial.play(demo, quick=quick)
+        single_axis.play(demo)
+        example_data.play(demo)
+        find_missing_effect.play(demo, "OSU-FOG-2024")
         serials = [triaxial.SERIAL, single_axis.SERIAL, "WEISS-ENV05S", "OSU-FOG-2024"]
         for serial in serials:
             request = CertifyRequest(by="the demo", reason="computed and checked in this run")
             newest = max(row.version for row in store.calibrations.of_unit(serial))
             certify(store, serial, newest, "certify", request, VirtualClock().utc())
-        serve_calibrations.play(stage, serials)
-        stage.title("Where to look")
-        stage.say(f"labctl serve --simulate --database {location}     then http://127.0.0.1:8420/api-docs")
-        stage.say(f"labctl campaign list --database {location};  labctl calibration FOG-0001 --database {location}")
-    return stage.figures
+        serve_calibrations.play(demo, serials)
+        demo.title("Where to look")
+        demo.say(f"labctl serve --simulate --database {location}     then http://127.0.0.1:8420/api-docs")
+        demo.say(f"labctl campaign list --database {location};  labctl calibration FOG-0001 --database {location}")
+    return demo.figures
 
 
 def _fresh(folder: Path) -> Path:

@@ -12,34 +12,33 @@ from labctl.fitting import FitData, Spread, by_turning_axis, fit_turning, residu
 SERIAL = "STIM-0001"
 
 
-def play(stage: DemoRunner, *, quick: bool) -> None:
+def play(demo: DemoRunner, *, quick: bool) -> None:
     """Measure, fit two models, measure again, and compare."""
     size = "a small campaign, 20 min soaks" if quick else "10 temperatures x 21 rates x 3 positions, 1 h soaks"
-    stage.title(f"(a) Tri-axial MEMS gyro: {size}")
+    demo.title(f"(a) Tri-axial MEMS gyro: {size}")
     recipe = "quick-triaxial" if quick else "table1-x-table2"
-    first = stage.campaign(recipe, "triaxial-sim")
+    first = demo.campaign(recipe, "triaxial-sim")
     versions = {
-        model: stage.fit(SERIAL, model, first.recordings[SERIAL]).version
-        for model in ("yang2018", "single_temperature")
+        model: demo.fit(SERIAL, model, first.recordings[SERIAL]).version for model in ("yang2018", "single_temperature")
     }
-    stage.say("the same unit on another day, which no fit has seen:")
-    second = stage.campaign(recipe, "triaxial-sim", noise_seed=1)
-    context = stage.context(second.recordings[SERIAL])
+    demo.say("the same unit on another day, which no fit has seen:")
+    second = demo.campaign(recipe, "triaxial-sim", noise_seed=1)
+    context = demo.context(second.recordings[SERIAL])
     errors = {"raw": {axis: context.outputs[axis] - context.true_rate_dps(axis) for axis in context.outputs}}
     for model, version in versions.items():
-        document, _ = stage.store.calibrations.document(SERIAL, version)
+        document, _ = demo.store.calibrations.document(SERIAL, version)
         fitted = read_calibration(document).fitted
         errors[model] = residuals(fitted, context, fit_turning(fitted, context))
-    print_tables(stage, context, errors)
-    floor = stage.store.calibrations.get(SERIAL, versions["yang2018"]).answer["error"]["noise_floor_dps"]
-    stage.figures["triaxial"] = {
+    print_tables(demo, context, errors)
+    floor = demo.store.calibrations.get(SERIAL, versions["yang2018"]).answer["error"]["noise_floor_dps"]
+    demo.figures["triaxial"] = {
         "held_out_rms_over_floor": {
             axis: float(np.sqrt(np.mean(values**2))) / floor for axis, values in errors["yang2018"].items()
         },
         "raw_over_compensated": _gains(context, errors),
     }
-    ratios = ", ".join(f"{axis} {r:.2f}" for axis, r in stage.figures["triaxial"]["held_out_rms_over_floor"].items())
-    stage.say(f"yang2018 on the unseen campaign, RMS over noise floor: {ratios}  (1 is perfect)")
+    ratios = ", ".join(f"{axis} {r:.2f}" for axis, r in demo.figures["triaxial"]["held_out_rms_over_floor"].items())
+    demo.say(f"yang2018 on the unseen campaign, RMS over noise floor: {ratios}  (1 is perfect)")
 
 
 def _gains(context: FitData, errors: dict[str, dict[str, np.ndarray]]) -> dict[str, float]:
@@ -48,7 +47,7 @@ def _gains(context: FitData, errors: dict[str, dict[str, np.ndarray]]) -> dict[s
     return {f"{a}->{b}": raw[a][b].rms_dps / left[a][b].rms_dps for a, b in (("x", "y"), ("y", "x"))}
 
 
-def print_tables(stage: DemoRunner, context: FitData, errors: dict[str, dict[str, np.ndarray]]) -> None:
+def print_tables(demo: DemoRunner, context: FitData, errors: dict[str, dict[str, np.ndarray]]) -> None:
     """Print what is shaped like the paper's Tables 3 and 4: by turning axis and output axis."""
     split = {name: by_turning_axis(context, values) for name, values in errors.items()}
     third = table(
@@ -65,5 +64,5 @@ def print_tables(stage: DemoRunner, context: FitData, errors: dict[str, dict[str
                 turning, output, *(f"{v:.4f}" for v in (before.mean_dps, before.rms_dps, after.mean_dps, after.rms_dps))
             )
             fourth.add_row(turning, output, *(f"{s.rms_dps:.4f}" for s in (before, single, after)))
-    stage.console.print(third)
-    stage.console.print(fourth)
+    demo.console.print(third)
+    demo.console.print(fourth)
