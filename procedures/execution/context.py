@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
-from procedures.contracts.active_bench import ActiveBench
+from procedures.execution.active_bench import ActiveBench
 from procedures.contracts.bench import Bench
 from procedures.contracts.control import Control
 from procedures.contracts.errors import Aborted, Interrupted, StepFailed, Unanswered

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from instruments.clock import Clock
 from instruments.errors import InstrumentError, LinkError
-from procedures.contracts.active_bench import ActiveBench
+from procedures.execution.active_bench import ActiveBench
 from procedures.contracts.bench import Bench
 from procedures.contracts.control import Control
 from procedures.contracts.errors import Aborted, GuardTripped, Interrupted, ProcedureError, StepFailed, Unanswered
