@@ -15,7 +15,7 @@ from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
 from procedures.execution.step_handlers import open_streams
 from procedures.planning.plan import Plan
-from procedures.recipe.recipe import ResumeRules
+from procedures.recipe.rules import ResumeRules
 
 #: Between two tries to make the bench safe: instruments may still be starting up after a power cut.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 2.0, 30.0

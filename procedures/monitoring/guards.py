@@ -9,7 +9,7 @@ from procedures.contracts.errors import GuardTripped
 from procedures.contracts.journal import Event
 from procedures.monitoring.bench_snapshot import BenchSnapshot
 from procedures.planning.limits import BenchLimits
-from procedures.recipe.recipe import Action, GuardKind, GuardRules
+from procedures.recipe.rules import Action, GuardKind, GuardRules
 
 
 @dataclass(frozen=True)

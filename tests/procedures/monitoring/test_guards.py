@@ -11,7 +11,7 @@ from procedures.contracts.journal import CampaignState
 from procedures.monitoring.bench_snapshot import BenchSnapshot, ReadingCounts
 from procedures.monitoring.guards import CHECKS, Guards
 from procedures.planning.limits import BenchLimits
-from procedures.recipe.recipe import GuardRules
+from procedures.recipe.rules import GuardRules
 
 WELL = BenchSnapshot(
     t_s=100.0,
