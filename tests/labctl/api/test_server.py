@@ -42,7 +42,7 @@ def test_a_service_hears_of_signals_until_it_is_closed(tmp_path: Path, monkeypat
     for number in ENDING:
         signal.signal(number, lambda *_: None)
     before = handlers()
-    with open_store(str(tmp_path / "lab.sqlite")) as store:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         service = LabService(store, WallClock())
         service.start()
         signal.raise_signal(signal.SIGTERM)
