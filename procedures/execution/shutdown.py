@@ -33,13 +33,10 @@ class Shutdown:
         """
         while True:
             try:
-                with ignore_signals(self._show_notice):
+                with ignore_signals():
                     return self._end(state, reason, bench_is_safe=bench_is_safe)
             except KeyboardInterrupt:
                 continue
-
-    def _show_notice(self, _signal: int) -> None:
-        self._context.recorder.tracker.update(last_event="the bench is being made safe; this ends by itself")
 
     def _end(self, state: CampaignState, reason: str, *, bench_is_safe: bool) -> Outcome:
         recorder = self._context.recorder

@@ -1,4 +1,4 @@
-"""Where a campaign is, readable from any thread: step, fraction, expected end, temperatures, rate, last event."""
+"""Where a campaign is, readable from any thread: step, fraction, expected end, temperatures, rate."""
 
 from __future__ import annotations
 
@@ -36,7 +36,6 @@ class Progress:
     prompt: Prompt | None = None  #: the question that waits for a person
     links: Mapping[str, str] = field(default_factory=dict)  #: devices that are not well: degraded or lost
     dropped: Mapping[str, str] = field(default_factory=dict)  #: units that take no further part, and why
-    last_event: str = ""
     last_error: str = ""
     live: LiveOutput = field(default_factory=LiveOutput, compare=False, repr=False)  #: newer than the other fields
 

@@ -33,7 +33,6 @@ class CampaignRecorder:
 
     def event(self, event: Event) -> None:
         """Record something worth telling a person."""
-        self.tracker.update(last_event=event.message)
         if event.level == "error":
             self.tracker.update(last_error=event.message)
         self.journal.event(event, self.t_s(), self.clock.utc())

@@ -162,7 +162,7 @@ class BenchRunner:
                 text = f"not taken up: campaign {taken_up} goes on here; then `labctl campaign resume {row.id}`"
                 self._store.campaigns.close_unfinished(row.id, text, self._make_clock().utc())
                 continue
-            why_not = too_often(self._store.interruptions.standing(row.id))
+            why_not = too_often(self._store.resume_points.of_campaign(row.id))
             try:
                 if why_not is None:
                     self.resume(row.id, ResumeRequest(by="the service"))

@@ -81,7 +81,7 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignResponse:
         gyro_c=there.get("temperature_c"),
         rate_dps=None if current is None else current.body.get("rate_dps", 0.0),
         last_error=faults[-1].message if faults else None,
-        dropped=store.interruptions.standing(row.id).dropped,
+        dropped=store.resume_points.of_campaign(row.id).dropped,
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
