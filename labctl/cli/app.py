@@ -10,6 +10,7 @@ import typer
 
 from labctl.actor import Actor, acting
 from labctl.cli import admin, bench, calibrations, campaign, campaign_control, criticism, recordings, server
+from labctl.cli.error_reporting import process_of_one_command
 from labctl.config import os_user
 
 app = typer.Typer(
@@ -67,5 +68,6 @@ def everywhere(
 
 
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line, as the process that it is."""
+    with process_of_one_command():
+        app()

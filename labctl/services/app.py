@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from labctl.services.schedule import queue
 from labctl.services.schedule.scheduler import Scheduler
 from labctl.services.schemas.answers import CampaignResponse, EventResponse, ScheduledResponse
 from labctl.store import Store
-from procedures.execution.signals import add_shutdown_hook
+from procedures.execution.signals import shutdown_hook
 
 NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`"
 
@@ -94,6 +95,7 @@ class LabService:
         self._event_stream = CampaignEventStream(store, self.status, None if runner is None else runner.listen)
         self._opened_at = clock.utc()
         self._stops = self._closed = False
+        self._hooks = ExitStack()
         self.left = ""  #: once it is closed: how the bench was left
 
     @property
@@ -107,7 +109,7 @@ class LabService:
         Then the schedule runs: what is due waits for that campaign. A signal to end is heard here first: an HTTP server
         waits for its requests before it closes the house, and a listener may stay for hours.
         """
-        add_shutdown_hook(self.end_soon)
+        self._hooks.enter_context(shutdown_hook(self.end_soon))
         with acting(ITSELF):  # nobody asked for it
             if self._runner is not None:
                 self._runner.take_up_left()
@@ -127,12 +129,13 @@ class LabService:
         if self._closed:
             return
         self._closed = True
-        if self.scheduler is not None:
-            self.scheduler.close()
-        if self._runner is not None:
-            self._runner.close()
-            self.left = self._how_left(self._runner)
-        self.store.close()
+        with self._hooks:
+            if self.scheduler is not None:
+                self.scheduler.close()
+            if self._runner is not None:
+                self._runner.close()
+                self.left = self._how_left(self._runner)
+            self.store.close()
 
     def _how_left(self, runner: BenchRunner) -> str:
         bench = runner.bench.name

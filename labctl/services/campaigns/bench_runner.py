@@ -136,7 +136,7 @@ class BenchRunner:
         with self._guard:
             job = self._job
             if job is not None and job.row.id == campaign:
-                if not job.control.wish.pause:
+                if not job.control.request.pause:
                     raise Conflict(f"campaign {campaign} runs and is not paused")
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:
@@ -162,7 +162,7 @@ class BenchRunner:
                 text = f"not taken up: campaign {taken_up} goes on here; then `labctl campaign resume {row.id}`"
                 self._store.campaigns.close_unfinished(row.id, text, self._make_clock().utc())
                 continue
-            why_not = too_often(self._store.interruptions.standing(row.id))
+            why_not = too_often(self._store.resume_points.of_campaign(row.id))
             try:
                 if why_not is None:
                     self.resume(row.id, ResumeRequest(by="the service"))
@@ -262,7 +262,7 @@ class BenchRunner:
         job = self._job
         if job is None or job.row.id != campaign or job.progress is None:
             return None
-        return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.wish)
+        return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.request)
 
     def abort(self, campaign: int, reason: str) -> CampaignResponse:
         """End the running campaign in the safe state; returns once it is there."""

@@ -24,7 +24,7 @@ from labctl.services.commands.protocol import Request
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schemas.answers import CampaignResponse
 from labctl.store import NewCampaign, NewUnit, Store
-from labctl.store.connection.database import note_campaign
+from labctl.store.connection.writer_lock import note_campaign
 from procedures.contracts.control import Control
 from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator
 from procedures.execution.engine import Engine
