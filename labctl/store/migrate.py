@@ -1,6 +1,6 @@
 """Upgrades a database by the revisions of `migrations`, which ship inside the package.
 
-Alembic takes 0.1 s to load, so it is loaded only for an upgrade: the revision of a database is one row of its table, and
+Alembic takes 0.1 s to load, so only an upgrade loads it: the revision of a database is one row of its table, and
 the known revisions are the names of their files.
 """
 

@@ -11,7 +11,7 @@ import pytest
 from instruments.clock import SystemClock
 from labctl.services.campaigns import execution
 from procedures.contracts.operator import HumanOperator
-from tests.web.conftest import Faults, Service
+from tests.helpers.browser import Faults, Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -31,7 +31,7 @@ def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service
 
 def start(service: Service) -> None:
     service.post("/api/campaigns", {"recipe": "short"})
-    service.until("/api/campaigns/1", lambda answer: answer["prompt"] is not None)  # type: ignore[index]
+    service.until("/api/campaigns/1", lambda answer: answer["prompt"] is not None)
 
 
 def answered(page: Page, name: str) -> None:
@@ -60,8 +60,8 @@ def test_mounted_paused_and_stopped_by_hand(service: Service, visit: Callable[..
     expect(page.locator(".toasts")).to_contain_text("safe state")
     expect(page.get_by_role("region", name="Nothing runs")).to_be_visible()
     ended = service.get("/api/campaigns/1")
-    assert ended["state"] == "aborted"  # type: ignore[index]
-    assert "smoke (Ann)" in ended["reason"]  # type: ignore[index]
+    assert ended["state"] == "aborted"
+    assert "smoke (Ann)" in ended["reason"]
 
     page.get_by_role("button", name="Resume where it was").click()
     page.get_by_role("dialog").get_by_role("button", name="Resume", exact=True).click()
@@ -79,7 +79,7 @@ def test_what_cannot_be_done_ends_the_campaign(service: Service, visit: Callable
     asked.get_by_label("Why").fill("no wrench")
     asked.get_by_role("button", name="It cannot be done").click()
     expect(page.get_by_role("region", name="Nothing runs")).to_be_visible()
-    assert "no wrench" in service.get("/api/campaigns/1")["reason"]  # type: ignore[index]
+    assert "no wrench" in service.get("/api/campaigns/1")["reason"]
 
 
 def test_says_that_it_is_stale_and_goes_on_where_it_was(
@@ -106,7 +106,7 @@ def test_a_service_without_a_bench_says_how_to_start_one(tmp_path: Path, chromiu
     (tmp_path / "none").mkdir()
     serving.start()
     try:
-        page = chromium.new_page()  # type: ignore[attr-defined]
+        page = chromium.new_page()
         page.goto(f"{serving.url}/bench")
         page.get_by_text("labctl serve --simulate").wait_for()
         page.close()

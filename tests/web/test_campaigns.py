@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.web.conftest import NARROW, Faults, Service
+from tests.helpers.browser import NARROW, Faults, Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -24,7 +24,7 @@ def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visi
     expect(page.get_by_role("spinbutton", name="Size")).not_to_have_value("")
     page.get_by_role("button", name="Start on").click()
     page.wait_for_url("**/bench")
-    service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")  # type: ignore[index]
+    service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")
 
     page.goto(f"{service.url}/campaigns")
     page.get_by_role("link", name="Campaign 1").click()

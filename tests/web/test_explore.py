@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.web.conftest import Service
+from tests.helpers.browser import Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -21,7 +21,7 @@ def explored(service: Service) -> str:
         "/api/recordings/simulated",
         {"recipe": "ojeda2000-121", "hide": ["scale_factor_asymmetry=0.0002"], "seed": 1},
     )
-    serial = made["serial"]  # type: ignore[index]
+    serial = made["serial"]
     service.post(f"/api/units/{serial}/calibrations", {"model": "ojeda2000"})
     return f"/explore?unit={serial}"
 

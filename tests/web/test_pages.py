@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.web.conftest import NARROW, WIDE, Faults, Service
+from tests.helpers.browser import NARROW, WIDE, Faults, Service, settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -20,7 +20,7 @@ SERIOUS = {"serious", "critical"}
 def furnished(service: Service) -> Service:
     """A house with a campaign that is done, a unit with two versions, one in force, and a table that was imported."""
     service.post("/api/campaigns", {"recipe": "short"})
-    service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")  # type: ignore[index]
+    service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")
     unit = "/api/units/FOG-0001/calibrations"
     service.post(unit, {"effects": ["bias", "scale_factor"]})
     service.post(f"{unit}/1/improve", {"add": ["scale_factor_odd"]})
@@ -43,12 +43,6 @@ PAGES = {
     "/effects": "Effects",
     "/effects/scale_factor_asymmetry": "Scale factor asymmetry",
 }
-
-
-def settled(page: Page) -> None:
-    """Wait until the page has what it asked for."""
-    page.wait_for_selector("main h1")
-    page.wait_for_function("() => !document.querySelector('main[aria-busy], .busy')")
 
 
 def test_every_page_opens_in_every_dress(furnished: Service, visit: Callable[..., Page]) -> None:
@@ -83,7 +77,7 @@ def test_an_empty_house_leads_to_a_first_calibration_in_one_press(visit: Callabl
     page.get_by_role("button", name="Open the real gyro").click()
     page.wait_for_url("**/explore?unit=OSU-FOG-2024**")
     expect(page.get_by_role("region", name="Verdict")).to_contain_text("Cannot tell which")
-    assert service.get("/api/units/OSU-FOG-2024/ladder")["steps"][0]["model"] == "bias_scale"  # type: ignore[index]
+    assert service.get("/api/units/OSU-FOG-2024/ladder")["steps"][0]["model"] == "bias_scale"
 
 
 def test_pages_that_do_not_exist_and_units_that_do_not(visit: Callable[..., Page], faults: Faults) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.web.conftest import NARROW, Faults, Service
+from tests.helpers.browser import NARROW, Faults, Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -92,7 +92,7 @@ def test_traces_are_looked_at_more_closely_down_to_the_readings(service: Service
     from playwright.sync_api import expect
 
     made = service.post("/api/recordings/simulated", {"recipe": RECIPE})
-    page = visit(f"/recordings/{made['recording']}")  # type: ignore[index]
+    page = visit(f"/recordings/{made['recording']}")
     trace = page.get_by_role("region", name="Trace")
     expect(trace).to_contain_text("readings")
     trace.get_by_role("button", name="Look closer").click()
@@ -114,5 +114,5 @@ def test_every_effect_has_a_page_of_its_own(service: Service, visit: Callable[..
     expect(page.locator("main")).to_contain_text("once per turn")
     expect(page.get_by_role("region", name="How large it is")).to_contain_text("deg/s")
     expect(page.get_by_role("region", name="What it is mistaken for")).to_contain_text("Earth rate")
-    known = [each["id"] for each in service.get("/api/effects")["effects"]]  # type: ignore[index]
+    known = [each["id"] for each in service.get("/api/effects")["effects"]]
     assert page.evaluate(UNDRAWN, known) == []

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.web.conftest import Service
+from tests.helpers.browser import Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -22,7 +22,7 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     service.post("/api/campaigns", {"recipe": "ojeda2000-121", "hide": ["scale_factor_asymmetry=0.0002"]})
     page = visit("/bench")
     expect(page.locator("main")).to_contain_text("ojeda2000-121")
-    service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")  # type: ignore[index]
+    service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")
 
     page.goto(f"{service.url}/explore")
     page.get_by_label("Model", exact=True).select_option("ojeda2000")
@@ -41,7 +41,7 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     expect(page.get_by_role("region", name="Verdict")).to_contain_text("Nothing is missing")
     expect(page.get_by_role("region", name="Watch the error fall")).to_contain_text("Version 1: what was left")
 
-    ladder = service.get("/api/units/FOG-0001/ladder")["steps"]  # type: ignore[index]
+    ladder = service.get("/api/units/FOG-0001/ladder")["steps"]
     assert ladder[1]["heldout_rms_dps"] < 0.75 * ladder[0]["heldout_rms_dps"]
 
     page.goto(f"{service.url}/units/FOG-0001")

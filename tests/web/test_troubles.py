@@ -10,9 +10,8 @@ import httpx
 import pytest
 
 from labctl.services.admin.api_keys import KeyRequest, Role
+from tests.helpers.browser import Faults, Service, settled
 from tests.helpers.paths import EXAMPLES
-from tests.web.conftest import Faults, Service
-from tests.web.test_pages import settled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -92,7 +91,7 @@ def test_two_people_at_once_make_two_versions(fog: Service, visit: Callable[...,
     for page in pages:
         page.get_by_role("button", name="Make version 2").click()
         expect(page.get_by_role("region", name="Watch the error fall")).to_contain_text("Version 1: what was left")
-    steps = fog.get("/api/units/OSU-FOG-2024/ladder")["steps"]  # type: ignore[index]
+    steps = fog.get("/api/units/OSU-FOG-2024/ladder")["steps"]
     assert [(step["version"], step["parent"]) for step in steps] == [(1, None), (2, 1), (3, 1)]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +17,6 @@ from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES
-
-
-@pytest.fixture
-def client(tmp_path: Path) -> Iterator[TestClient]:
-    store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
-    runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
-    with TestClient(create_app(LabService(store, SystemClock(), runner))) as opened:
-        yield opened
 
 
 def upload(client: TestClient, folder: Path, **changed: bytes) -> object:

@@ -19,12 +19,12 @@ from labctl.services.recordings.examples import examples
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.store import Store
 from labctl.store.connection.database import Database
-from tests.labctl.api.test_page_requests import client  # noqa: F401  a fixture
+from tests.helpers.service import service_of
 
 HIDE = ["scale_factor_asymmetry=0.02"]
 
 
-def test_examples_come_with_the_package(client: TestClient) -> None:  # noqa: F811
+def test_examples_come_with_the_package(client: TestClient) -> None:
     assert set(examples()) == {"osu-fog", "weiss-gyrostar"}
     assert all("labctl" in folder.parts[-3:] for folder in examples().values())
     fog = client.post("/api/recordings/example", json={"name": "osu-fog"})
@@ -41,7 +41,7 @@ def test_examples_come_with_the_package(client: TestClient) -> None:  # noqa: F8
     assert (refused.status_code, "there are osu-fog, weiss-gyrostar" in refused.json()["detail"]) == (400, True)
 
 
-def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClient) -> None:  # noqa: F811
+def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClient) -> None:
     asked = {"recipe": "short", "hide": HIDE, "seed": 7, "serial": "HIDDEN-7"}
     made = client.post("/api/recordings/simulated", json=asked)
     assert made.status_code == 201, made.text
@@ -51,7 +51,7 @@ def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClien
     (row,) = client.get("/api/recordings").json()
     assert (row["serial"], row["readings"], row["campaign"]) == ("HIDDEN-7", answer["readings"], None)
     assert "simulated: recipe short, seed 7" in row["notes"]
-    store: Store = client.app.state.service.store  # type: ignore[attr-defined]
+    store: Store = service_of(client).store
     (act,) = store.audit.rows()
     assert act.action == "simulate"
     assert act.detail.items() >= {"hidden": answer["hidden"], "seed": 7, "serial": "HIDDEN-7"}.items()
@@ -60,7 +60,7 @@ def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClien
     assert abs(with_it - without) == pytest.approx(0.04, rel=0.1)
 
 
-def asymmetry(client: TestClient, recording: int) -> float:  # noqa: F811
+def asymmetry(client: TestClient, recording: int) -> float:
     """How much a scale factor differs between the two ways of turning (twice the effect), from the fastest rates."""
     sets = client.get(f"/api/recordings/{recording}/datasets").json()
     rate, gyro = np.array(sets["table_rate_dps"]), np.array(sets["channels"]["gyro_z"]["mean"])
@@ -77,24 +77,24 @@ def asymmetry(client: TestClient, recording: int) -> float:  # noqa: F811
         ({"recipe": "/etc/passwd"}, "send its text, or one of"),
     ],
 )
-def test_what_cannot_be_simulated_says_why(client: TestClient, body: dict[str, Any], says: str) -> None:  # noqa: F811
+def test_what_cannot_be_simulated_says_why(client: TestClient, body: dict[str, Any], says: str) -> None:
     answer = client.post("/api/recordings/simulated", json=body)
     assert (answer.status_code, says in answer.json()["detail"]) == (400, True), answer.text
     assert client.get("/api/recordings").json() == []
     assert client.post("/api/recordings/simulated", json={"recipe": "short", "serial": "../x"}).status_code == 422
 
 
-def run(client: TestClient, **body: Any) -> int:  # noqa: F811
+def run(client: TestClient, **body: Any) -> int:
     """Run the short campaign to its end; returns its recording."""
     number = client.post("/api/campaigns", json={"recipe": "short", **body}).json()["id"]
     assert "campaign done" in client.get(f"/api/campaigns/{number}/events").text
     return int(client.get(f"/api/campaigns/{number}").json()["recordings"]["FOG-0001"])
 
 
-def test_a_simulated_campaign_can_hide_an_effect(client: TestClient) -> None:  # noqa: F811
+def test_a_simulated_campaign_can_hide_an_effect(client: TestClient) -> None:
     plain, hidden = run(client), run(client, hide=HIDE)
     assert asymmetry(client, hidden) - asymmetry(client, plain) == pytest.approx(0.04, rel=0.1)
-    store: Store = client.app.state.service.store  # type: ignore[attr-defined]
+    store: Store = service_of(client).store
     assert store.campaigns.get(1).bench["simulation"]["hidden"] == {}
     assert store.campaigns.get(2).bench["simulation"]["hidden"] == {"scale_factor_asymmetry": 0.02}
     starts = [row.detail for row in store.audit.rows() if row.action == "campaign start"]

@@ -3,35 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from instruments.clock import SystemClock, VirtualClock
-from labctl.api import create_app
 from labctl.compensator import Compensator
 from labctl.recording import Recording
-from labctl.services.app import LabService
-from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.criticism import measurements
-from labctl.services.planning.loading import load_bench
 from labctl.store import Store
-from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES
+from tests.helpers.service import add_recording, service_of
 
 FOG = "/api/units/OSU-FOG-2024"
-
-
-@pytest.fixture
-def client(tmp_path: Path) -> Iterator[TestClient]:
-    store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
-    runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
-    with TestClient(create_app(LabService(store, SystemClock(), runner))) as opened:
-        yield opened
 
 
 @pytest.fixture
@@ -74,12 +60,6 @@ def test_certifications_are_listed_newest_first(fog: TestClient) -> None:
     assert fog.get("/api/units/NOBODY/certifications").status_code == 404
 
 
-def taken_in(client: TestClient, recording: Recording) -> int:
-    """Take a recording in past the door; returns its number."""
-    store: Store = client.app.state.service.store  # type: ignore[attr-defined]
-    return store.recordings.add_import(recording, recording.info.started_at)
-
-
 def by_cell(columns: dict[str, list[Any]], *names: str) -> dict[tuple[str, int], tuple[Any, ...]]:
     keys = zip(columns["axis"], columns["dataset"], strict=True)
     return dict(zip(keys, zip(*(columns[name] for name in names), strict=True), strict=True))
@@ -88,7 +68,7 @@ def by_cell(columns: dict[str, list[Any]], *names: str) -> dict[tuple[str, int],
 def test_residuals_are_the_rows_behind_the_map(
     client: TestClient, triaxial: Callable[[int], Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    taken_in(client, triaxial(3).campaign(3))
+    add_recording(client, triaxial(3).campaign(3))
     path = "/api/units/SIM-3/calibrations"
     client.post(path, json={"model": "yang2018"})
     answer = client.get(f"{path}/1/residuals").json()
@@ -114,7 +94,7 @@ def test_residuals_are_the_rows_behind_the_map(
 
 def test_too_little_for_a_verdict_still_has_rows(client: TestClient, make_points: Callable[..., Recording]) -> None:
     rate = np.array([-20.0, -10.0, 0.0, 10.0, 20.0])
-    taken_in(client, make_points(rate, np.full(5, 25.0), 1.01 * rate + 0.1))
+    add_recording(client, make_points(rate, np.full(5, 25.0), 1.01 * rate + 0.1))
     client.post("/api/units/ONE/calibrations", json={"effects": ["bias", "scale_factor"]})
     assert client.get("/api/units/ONE/calibrations/1/criticism").json()["verdict"] == "insufficient_data"
     rows = client.get("/api/units/ONE/calibrations/1/residuals").json()["columns"]
@@ -128,11 +108,11 @@ def test_a_preview_is_what_improve_makes_and_changes_nothing(
 ) -> None:
     rate, warm = grid_11_by_11
     noise = np.random.default_rng(1).normal(0, 0.001, len(rate))
-    taken_in(client, make_points(rate, warm, 1.01 * rate + 0.002 * np.abs(rate) + 0.1 + noise))
+    add_recording(client, make_points(rate, warm, 1.01 * rate + 0.002 * np.abs(rate) + 0.1 + noise))
     unit = "/api/units/ONE/calibrations"
     client.post(unit, json={"effects": ["bias", "scale_factor"]})
     path, change = f"{unit}/1", {"add": ["scale_factor_asymmetry"]}
-    store: Store = client.app.state.service.store  # type: ignore[attr-defined]
+    store: Store = service_of(client).store
     before = store.audit.rows()
     preview = client.post(f"{path}/preview", json=change)
     assert preview.status_code == 200, preview.text
@@ -151,14 +131,6 @@ def test_a_preview_is_what_improve_makes_and_changes_nothing(
     for name in ("residual_dps", "floor_dps"):
         assert seen[name] == pytest.approx(kept[name], rel=0.02, abs=1e-6), name
     assert client.post(f"{path}/preview", json={"add": ["no_such"]}).json()["type"] == "urn:labctl:problem:bad-input"
-
-
-@pytest.fixture
-def ran(client: TestClient) -> TestClient:
-    """A service that has run a campaign: recording 1, 15 data sets of 10 s on one axis."""
-    number = client.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
-    assert "campaign done" in client.get(f"/api/campaigns/{number}/events").text
-    return client
 
 
 def test_recordings_and_their_data_sets(fog: TestClient) -> None:
@@ -187,7 +159,7 @@ def test_recordings_and_their_data_sets(fog: TestClient) -> None:
 
 
 def test_a_surface_is_what_the_calibration_takes_off(client: TestClient, triaxial: Callable[[int], Any]) -> None:
-    taken_in(client, triaxial(3).campaign(3))
+    add_recording(client, triaxial(3).campaign(3))
     path = "/api/units/SIM-3/calibrations"
     client.post(path, json={"model": "yang2018"})
     answer = client.get(f"{path}/1/surface", params={"rate_points": 9, "temperature_points": 5}).json()
@@ -224,7 +196,7 @@ def test_pictures_are_figures_with_how_to_read_them(
 ) -> None:
     rate, warm = grid_11_by_11
     noise = np.random.default_rng(1).normal(0, 0.001, len(rate))
-    taken_in(client, make_points(rate, warm, 1.01 * rate + 0.002 * np.abs(rate) + noise))
+    add_recording(client, make_points(rate, warm, 1.01 * rate + 0.002 * np.abs(rate) + noise))
     client.post("/api/units/ONE/calibrations", json={"effects": ["bias", "scale_factor"]})
     pictures = client.get("/api/units/ONE/calibrations/1/pictures").json()
     found = {picture["id"]: picture for picture in pictures}

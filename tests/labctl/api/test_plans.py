@@ -12,7 +12,7 @@ from labctl.services.campaigns.execution import prepare
 from labctl.services.planning.planner import _forecast
 from labctl.store import StepRow, Store
 from procedures.recipe.recipe import shipped_recipes
-from tests.labctl.api.test_page_requests import client, ran  # noqa: F401  fixtures
+from tests.helpers.service import service_of
 
 ENDLESS = """
 format = "labctl-recipe/1"
@@ -25,7 +25,7 @@ repeats = 1000000000
 LONG = ENDLESS.replace("1000000000", "2").replace("positions", "warm_up_s = 9e6\npositions")
 
 
-def test_recipes_say_what_they_take_here_or_why_not(client: TestClient) -> None:  # noqa: F811
+def test_recipes_say_what_they_take_here_or_why_not(client: TestClient) -> None:
     rows = {row["name"]: row for row in client.get("/api/recipes").json()}
     assert set(rows) == set(shipped_recipes())
     short = rows["short"]
@@ -39,7 +39,7 @@ def test_recipes_say_what_they_take_here_or_why_not(client: TestClient) -> None:
     assert "about x, y" in triaxial["remark"]
 
 
-def test_a_plan_can_be_drawn_before_anything_moves(client: TestClient) -> None:  # noqa: F811
+def test_a_plan_can_be_drawn_before_anything_moves(client: TestClient) -> None:
     plan = client.post("/api/plans", json={"recipe": "short"}).json()
     line = plan["timeline"]
     assert {len(values) for values in line.values()} == {plan["steps"]}
@@ -63,21 +63,21 @@ def test_a_plan_can_be_drawn_before_anything_moves(client: TestClient) -> None: 
         ({"recipe": LONG, "visibility": True}, "bad-input", "visibility: the plan takes 104 days"),
     ],
 )
-def test_what_cannot_be_planned_says_why(client: TestClient, body: dict[str, Any], slug: str, says: str) -> None:  # noqa: F811
+def test_what_cannot_be_planned_says_why(client: TestClient, body: dict[str, Any], slug: str, says: str) -> None:
     answer = client.post("/api/plans", json=body)
     assert answer.json()["type"] == f"urn:labctl:problem:{slug}"
     assert says in answer.json()["detail"]
 
 
-def test_a_campaigns_steps_tell_what_became_of_them(ran: TestClient) -> None:  # noqa: F811
+def test_a_campaigns_steps_tell_what_became_of_them(ran: TestClient) -> None:
     plan = ran.get("/api/campaigns/1/plan").json()
     line = plan["timeline"]
     assert {len(values) for values in line.values()} == {plan["steps"]}
     assert (plan["state"], set(line["state"]), plan["datasets"]) == ("done", {"done"}, 15)
     assert line["forecast_s"] == line["started_s"]
     assert line["started_s"] == sorted(line["started_s"])
-    store: Store = ran.app.state.service.store  # type: ignore[attr-defined]
-    bench = ran.app.state.service.bench  # type: ignore[attr-defined]
+    store: Store = service_of(ran).store
+    bench = service_of(ran).bench
     prepare(store, "short", bench, VirtualClock(), clip=False).bench.close()
     later = ran.get("/api/campaigns/2/plan").json()["timeline"]
     assert set(later["state"]) == {"to come"}

@@ -14,8 +14,8 @@ from fastapi.testclient import TestClient
 
 from labctl.recording import Recording, RecordingInfo, read_recording
 from labctl.services.recordings import envelopes
-from tests.labctl.api.test_page_requests import client, taken_in  # noqa: F401  a fixture
-from tests.labctl.conftest import STARTED
+from tests.helpers.recordings import STARTED
+from tests.helpers.service import add_recording
 
 SETS, EACH = 40, 1500
 TRACE = "/api/recordings/1/trace"
@@ -42,12 +42,12 @@ def samples() -> Recording:
 
 
 @pytest.fixture
-def fast(client: TestClient, samples: Recording) -> TestClient:  # noqa: F811
-    taken_in(client, samples)
+def fast(client: TestClient, samples: Recording) -> TestClient:
+    add_recording(client, samples)
     return client
 
 
-def ask(client: TestClient, **query: Any) -> dict[str, Any]:  # noqa: F811
+def ask(client: TestClient, **query: Any) -> dict[str, Any]:
     answer = client.get(TRACE, params={"channel": "gyro_z", **query})
     assert answer.status_code == 200, answer.text
     return dict(answer.json())
@@ -100,14 +100,14 @@ def test_what_is_no_trace_is_refused_by_name(fast: TestClient, query: dict[str, 
 
 
 def test_means_with_times_are_drawn_as_they_are(
-    client: TestClient,  # noqa: F811
+    client: TestClient,
     make_points: Callable[..., Recording],
 ) -> None:
     points = make_points(np.arange(5.0), np.full(5, 25.0), np.arange(5.0))
-    taken_in(client, points)
+    add_recording(client, points)
     assert ask(client)["mean"] == [0.0, 1.0, 2.0, 3.0, 4.0]
     columns = {name: values for name, values in points.columns.items() if name != "t_s"}
-    taken_in(client, Recording(points.info, columns))
+    add_recording(client, Recording(points.info, columns))
     refused = client.get("/api/recordings/2/trace", params={"channel": "gyro_z"})
     assert (refused.status_code, "without times" in refused.json()["detail"]) == (400, True)
 
@@ -133,9 +133,9 @@ def test_the_allan_deviation_of_a_data_set_and_at_rest(fast: TestClient) -> None
     assert fast.get("/api/recordings/1/allan", params={"dataset": 99}).status_code == 404
 
 
-def test_too_little_at_rest_says_what_it_takes(client: TestClient, samples: Recording) -> None:  # noqa: F811
+def test_too_little_at_rest_says_what_it_takes(client: TestClient, samples: Recording) -> None:
     first = {name: values[:200] for name, values in samples.columns.items()}
-    taken_in(client, Recording(samples.info, first))
+    add_recording(client, Recording(samples.info, first))
     for query in ({}, {"dataset": 1}):
         answer = client.get("/api/recordings/1/allan", params=query)
         assert (answer.status_code, "300" in answer.json()["detail"]) == (422, True)

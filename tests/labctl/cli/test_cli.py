@@ -2,41 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import sqlite3
 from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from labctl.cli.app import app
+from tests.helpers.lab import Lab
 from tests.helpers.paths import EXAMPLES
-
-runner = CliRunner()
-
-
-class Lab:
-    """labctl with its own database."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.database = folder / "lab.sqlite"
-
-    def run(self, *arguments: str, status: int = 0) -> Any:
-        result = runner.invoke(app, [*arguments, "--database", str(self.database)])
-        assert result.exit_code == status, result.output + result.stderr + repr(result.exception)
-        return result
-
-    def json(self, *arguments: str) -> Any:
-        return json.loads(self.run(*arguments, "--json").stdout)
-
-    def content(self) -> str:
-        with sqlite3.connect(self.database) as raw:
-            text = "\n".join(raw.iterdump())
-        raw.close()
-        return hashlib.sha256(text.encode()).hexdigest()
 
 
 @pytest.fixture

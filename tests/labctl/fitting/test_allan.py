@@ -16,22 +16,10 @@ from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.static_record import LONG_S, longest_stretch, static_record
 from labctl.fitting.models.presets import preset_for
 from labctl.fitting.numeric.allan import DEG_PER_HOUR, DEG_PER_ROOT_HOUR, Allan, allan, overlapping_variance
-from labctl.recording import Recording, RecordingInfo
+from tests.helpers.static_recordings import PERIOD_S, noise, resting, with_record_at_rest
 
-PERIOD_S = 0.1
 START = datetime(2026, 1, 1, tzinfo=UTC)
 K_UNIT = DEG_PER_HOUR * DEG_PER_ROOT_HOUR
-
-
-def noise(seed: int, n: int, n_walk: float = 0.0, instability: float = 0.0, rate_walk: float = 0.0) -> np.ndarray:
-    """Return rates in deg/s with noise of known N (deg/sqrt(s)), B (deg/s) and K (deg/s/sqrt(s))."""
-    rng = np.random.default_rng(seed)
-    rates = n_walk / math.sqrt(PERIOD_S) * rng.normal(size=n)
-    rates += rate_walk * math.sqrt(PERIOD_S) * np.cumsum(rng.normal(size=n))
-    frequency = np.fft.rfftfreq(2 * n)[1:]
-    phases = rng.normal(size=n) + 1j * rng.normal(size=n)
-    flicker = np.fft.irfft(np.concatenate([[0], phases / np.sqrt(2 * frequency)]))[:n] * math.sqrt(2 * n)
-    return rates + instability / math.sqrt(2 * math.pi) * flicker  # one-sided density B^2 / (pi f)
 
 
 def figures(rates: np.ndarray) -> Allan:
@@ -91,26 +79,6 @@ def test_too_few_readings_or_none_that_scatter_have_no_deviation() -> None:
     assert allan(noise(1, 200, n_walk=1e-3), PERIOD_S) is None
 
 
-def resting(rates: np.ndarray, **columns: np.ndarray) -> Recording:
-    n = len(rates)
-    info = RecordingInfo(
-        serial="S",
-        model="m",
-        axes=("z",),
-        kind="samples",
-        technology="fog",
-        started_at=datetime(2026, 1, 1, tzinfo=UTC),
-    )
-    plain = {
-        "dataset": np.ones(n, dtype=np.int64),
-        "t_s": PERIOD_S * np.arange(n),
-        "table_rate_dps": np.zeros(n),
-        "temperature_c": np.full(n, 25.0),
-        "gyro_z": rates,
-    }
-    return Recording(info, {**plain, **columns})
-
-
 def test_the_longest_stretch_ends_at_motion_gaps_and_other_temperatures() -> None:
     n = 4000
     rate, t_s, warm = np.zeros(n), PERIOD_S * np.arange(n), np.full(n, 25.0)
@@ -136,18 +104,6 @@ def test_a_slowly_warming_record_is_cut_to_one_temperature() -> None:
 def test_means_and_moving_tables_have_no_static_record() -> None:
     assert static_record(resting(noise(1, 1000, n_walk=1e-3), table_rate_dps=np.full(1000, 5.0))) is None
     assert static_record(resting(noise(1, 100, n_walk=1e-3))) is None
-
-
-def with_record_at_rest(minutes: float, instability: float) -> Recording:
-    """Return 20 short data sets at rest and at rates, and a long one at rest."""
-    n = round(60 * minutes / PERIOD_S)
-    parts = [20] * 40 + [n]
-    dataset = np.repeat(np.arange(1, 42), parts)
-    total = len(dataset)
-    rate = np.repeat([*np.tile([-20.0, -10.0, 10.0, 20.0], 10), 0.0], parts)
-    t_s = PERIOD_S * np.arange(total) + 30.0 * (dataset - 1)
-    rates = rate * 1.001 + noise(3, total, n_walk=5e-4, instability=instability)
-    return resting(rates, dataset=dataset, t_s=t_s, table_rate_dps=rate)
 
 
 def test_a_long_static_record_replaces_the_data_sheet_and_a_short_one_does_not() -> None:

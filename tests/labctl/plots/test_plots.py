@@ -17,10 +17,11 @@ from labctl.plots.noise import ladder
 from labctl.plots.residual_maps import maps
 from labctl.recording import write_recording
 from labctl.services.criticism.report_text import answer_of
-from tests.labctl.cli.test_cli import Lab
-from tests.labctl.fitting.criticism.test_criticism import held, single_axis, three_axes
-from tests.labctl.fitting.criticism.test_diagnostics import cycled, views
-from tests.labctl.fitting.test_allan import with_record_at_rest
+from tests.helpers.criticism import held, views
+from tests.helpers.lab import Lab
+from tests.helpers.recordings import cycled
+from tests.helpers.simulated_recordings import single_axis, three_axes
+from tests.helpers.static_recordings import with_record_at_rest
 
 LADDER = {
     "serial": "S",

@@ -14,8 +14,8 @@ from labctl.services.cache import cached, cached_group
 from labctl.services.criticism import measurements
 from labctl.services.schemas.answers import CertificationResponse, LadderResponse, ResponseModel
 from labctl.store import open_store
-from tests.labctl.cli.test_cli import Lab
-from tests.labctl.fitting.criticism.test_criticism import single_axis
+from tests.helpers.lab import Lab
+from tests.helpers.simulated_recordings import single_axis
 
 CERTIFIED = {"serial": "A", "version": 1, "act": "certify", "by": "B", "reason": "C", "at": "2026-01-05T08:00Z"}
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -13,39 +12,15 @@ import numpy as np
 import pytest
 
 from labctl.errors import BadInput
-from labctl.fitting.criticism import Criticism, criticise, visibility
-from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.criticism import visibility
 from labctl.fitting.effects import CATALOGUE, formulas
 from labctl.fitting.effects.formula import Formula
-from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording, write_recording
-from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.simulation.walk import hidden_recording
-from procedures.planning.plan import make_plan
-from tests.labctl.cli.test_cli import Lab
+from tests.helpers.criticism import held
+from tests.helpers.lab import Lab
+from tests.helpers.simulated_recordings import single_axis, three_axes
 
 HELD: dict[str, Any] = {"scale_factor_asymmetry": 2e-4}
-
-
-@lru_cache(maxsize=4)
-def _plan(recipe: str, bench_name: str) -> Any:
-    bench = load_bench(bench_name)
-    return make_plan(load_recipe(recipe), limits_of(bench)), bench
-
-
-def single_axis(seed: int = 1, **hidden: float) -> Recording:
-    plan, bench = _plan("ojeda2000-121", "single-axis-sim")
-    return hidden_recording(plan, bench, bench.gyros[0].model_copy(update={"sample_rate_hz": 5.0}), seed, hidden)
-
-
-def three_axes(seed: int = 1, **hidden: float) -> Recording:
-    plan, bench = _plan("table1-x-table2", "triaxial-sim")
-    return hidden_recording(plan, bench, bench.gyros[0].model_copy(update={"sample_rate_hz": 2.0}), seed, hidden)
-
-
-def held(recording: Recording, model: str = "ojeda2000", catalogue: Any = CATALOGUE, full: bool = False) -> Criticism:
-    fitted, _ = preset_for(model, []).build(fit_data_of(recording))
-    return criticise(recording, fitted, catalogue, full=full)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -11,28 +11,18 @@ import numpy as np
 import pytest
 
 from labctl.fitting.criticism import Criticism, criticise
-from labctl.fitting.criticism.diagnostics import VIEWS, draws_of, views_of
+from labctl.fitting.criticism.diagnostics import VIEWS, draws_of
 from labctl.fitting.criticism.diagnostics.channels import groups_of, runs_test
 from labctl.fitting.criticism.diagnostics.repeatability import hysteresis_states
-from labctl.fitting.criticism.model_comparison import compare_models
-from labctl.fitting.criticism.reduction import reduce_recording
-from labctl.fitting.criticism.residuals import residuals_of
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, formulas
-from labctl.fitting.models.presets import changed, preset_for
-from labctl.recording import Recording, read_recording
+from labctl.fitting.models.presets import preset_for
+from labctl.recording import read_recording
 from labctl.recording.columns import BY_NAME
+from tests.helpers.criticism import held, views
 from tests.helpers.paths import ROOT
-from tests.labctl.fitting.criticism.test_criticism import held, single_axis, three_axes
-
-
-def views(recording: Recording, model: str | None = "ojeda2000", effects: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the views alone: nothing competes but one effect."""
-    context = fit_data_of(recording)
-    fitted, _ = preset_for(model, list(effects)).build(context)
-    forward, _ = changed(fitted).build(context)
-    comparison = compare_models(reduce_recording(recording), forward, {"bias_drift": CATALOGUE["bias_drift"]})
-    return views_of(comparison, residuals_of(comparison), recording, CATALOGUE)
+from tests.helpers.recordings import cycled
+from tests.helpers.simulated_recordings import single_axis, three_axes
 
 
 @lru_cache(maxsize=1)
@@ -90,27 +80,6 @@ def test_asymmetry_bends_the_line_against_the_rate_with_the_sign_of_the_speed() 
     assert mean[rate > 70].min() > mean[rate < 20].max()
     assert np.all(np.array(line["low_dps"]) < mean)
     assert np.all(mean < np.array(line["high_dps"]))
-
-
-def cycled(hysteresis_dps: float) -> Recording:
-    """Return means of data sets up and down a temperature range at five rates, with points measured again."""
-    rng = np.random.default_rng(2)
-    warm = np.repeat([*range(20, 61, 5), *range(60, 19, -5)], 6).astype(float)
-    rate = np.tile([-50.0, -20.0, 0.0, 20.0, 50.0, 0.0], 18)
-    leg = np.repeat([1.0, -1.0], 54)
-    n = len(rate)
-    recording = single_axis(1)
-    info = recording.info.model_copy(update={"kind": "points"})
-    columns = {
-        "dataset": np.arange(1, n + 1),
-        "t_s": 60.0 * np.arange(n),
-        "table_rate_dps": rate,
-        "temperature_c": warm + rng.normal(0, 0.02, n),
-        "gyro_z": rate * 1.002 + 0.01 + hysteresis_dps * leg + rng.normal(0, 5e-4, n),
-        "gyro_z_std": np.full(n, 5e-3),
-        "n": np.full(n, 100),
-    }
-    return Recording(info, columns)
 
 
 def test_up_and_down_legs_differ_by_twice_the_hysteresis() -> None:

@@ -18,7 +18,8 @@ from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording
 from labctl.services.simulation.walk import hidden_recording
-from tests.labctl.fitting.criticism.test_criticism import _plan, held, single_axis, three_axes
+from tests.helpers.criticism import held
+from tests.helpers.simulated_recordings import plan_on, single_axis, three_axes
 
 SUPPLY = "supply_scale: supply_v * table_rate_dps"
 
@@ -90,7 +91,7 @@ def test_of_three_axes_it_is_refused_by_name() -> None:
 
 
 def test_without_a_table_angle_the_steps_are_no_effect() -> None:
-    plan, bench = _plan("ojeda2000", "single-axis-sim")
+    plan, bench = plan_on("ojeda2000", "single-axis-sim")
     recording = hidden_recording(plan, bench, bench.gyros[0], 7, {})
     columns = {name: values for name, values in recording.columns.items() if name != "table_angle_deg"}
     found = held(replace(recording, columns=columns))

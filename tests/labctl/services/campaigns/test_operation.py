@@ -6,7 +6,6 @@ import contextlib
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,8 @@ from labctl.services.planning.loading import load_bench
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.operator import HumanOperator
+from tests.helpers.service import service_of
+from tests.helpers.waiting import wait_until
 
 PATIENCE = 2000  #: looks at a campaign before a test gives up
 WAIT_S = 60.0  #: for the next sign of life
@@ -45,18 +46,8 @@ def client(runner: BenchRunner) -> Iterator[TestClient]:
 
 def until(client: TestClient, wanted: Any) -> Any:
     """Look at campaign 1, whenever its runner says that something happened, until it is as wanted."""
-    happened = threading.Event()
-    stop = client.app.state.service.bench_runner().listen(happened.set)  # type: ignore[attr-defined]
-    try:
-        for _ in range(PATIENCE):
-            happened.clear()
-            answer = client.get("/api/campaigns/1").json()
-            if wanted(answer):
-                return answer
-            assert happened.wait(WAIT_S), f"nothing happened any more: {answer}"
-    finally:
-        stop()
-    raise AssertionError(f"never so: {answer}")
+    runner = service_of(client).bench_runner()
+    return wait_until(runner.listen, lambda: client.get("/api/campaigns/1").json(), wanted)
 
 
 def post(client: TestClient, act: str, **body: Any) -> Any:

@@ -10,8 +10,8 @@ import pytest
 from labctl.recording import write_recording
 from labctl.services.planning.loading import load_recipe
 from procedures.recipe.recipe import Recipe
-from tests.labctl.cli.test_cli import Lab
-from tests.labctl.fitting.criticism.test_criticism import three_axes
+from tests.helpers.lab import Lab
+from tests.helpers.simulated_recordings import three_axes
 
 GRAVITY = {"g_sensitivity": 0.015}
 

@@ -1,0 +1,125 @@
+"""What the tests of the pages share: a service on a port, the sizes of a screen, what a page complains of."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import httpx
+import uvicorn
+
+from instruments.clock import SystemClock, VirtualClock
+from labctl.api import create_app
+from labctl.api.middleware import AccessPolicy
+from labctl.services.app import LabService
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.planning.loading import load_bench
+from labctl.store import Store
+from labctl.store.connection.database import Database
+from tests.helpers.waiting import wait_until
+
+if TYPE_CHECKING:
+    from playwright.sync_api import ConsoleMessage, Page
+
+WIDE, NARROW = {"width": 1280, "height": 860}, {"width": 390, "height": 844}
+#: How long a page may take before a test gives up: a busy machine is slow, not wrong.
+PATIENCE_MS = 45_000
+REQUEST_S = 120.0
+
+
+class Server(uvicorn.Server):
+    """An HTTP server that says when it answers."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self.ready = threading.Event()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Open the ports."""
+        await super().startup(sockets)
+        self.ready.set()
+
+    def serve_until_stopped(self, listener: socket.socket) -> None:
+        """Serve in this thread; `ready` is also set when nothing came of it."""
+        try:
+            self.run(sockets=[listener])
+        finally:
+            self.ready.set()
+            listener.close()
+
+
+@dataclass
+class Service:
+    """labctl as it is served, on a port of its own; it can be stopped and started again."""
+
+    folder: Path
+    bench: str | None = "single-axis-sim"
+    keys: bool = False
+    port: int = 0
+    url: str = ""
+    lab_service: LabService = field(init=False)
+
+    def start(self) -> None:
+        """Begin to answer."""
+        store = Store(Database(str(self.folder / "lab.sqlite"), write=True))
+        runner = BenchRunner(store, load_bench(self.bench), VirtualClock) if self.bench else None
+        self.lab_service = LabService(store, SystemClock(), runner)
+        listener = socket.socket()
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(("127.0.0.1", self.port))
+        self.port = listener.getsockname()[1]
+        self.url = f"http://127.0.0.1:{self.port}"
+        app = create_app(self.lab_service, AccessPolicy(keys=self.keys))
+        self._server = Server(uvicorn.Config(app, log_level="error", lifespan="on", timeout_graceful_shutdown=1))
+        self._thread = threading.Thread(target=self._server.serve_until_stopped, args=(listener,), name="test service")
+        self._thread.start()
+        assert self._server.ready.wait(REQUEST_S)
+        assert self._server.started
+
+    def stop(self) -> None:
+        """Answer no more; the bench is left safe."""
+        self._server.should_exit = True
+        self._thread.join(REQUEST_S)
+        assert not self._thread.is_alive()
+
+    def post(self, path: str, body: object) -> Any:
+        """Send a request beside the pages, to prepare what a test needs."""
+        answer = httpx.post(self.url + path, json=body, timeout=REQUEST_S)
+        answer.raise_for_status()
+        return answer.json()
+
+    def get(self, path: str) -> Any:
+        """Read an answer beside the pages."""
+        answer = httpx.get(self.url + path, timeout=REQUEST_S)
+        answer.raise_for_status()
+        return answer.json()
+
+    def until(self, path: str, holds: Callable[[Any], bool]) -> Any:
+        """Return the answer once it is as it should be; looked at again whenever the bench reports something."""
+        return wait_until(self.lab_service.bench_runner().listen, lambda: self.get(path), holds)
+
+
+class Faults(list[str]):
+    """What a page complained of; a test that expects a complaint clears it."""
+
+    def hear(self, path: str, told: ConsoleMessage) -> None:
+        """Take in what the browser writes to its console."""
+        where = str(told.location.get("url", ""))
+        # few recordings have a static record; the page says so
+        if told.type == "error" and not where.endswith("/allan"):
+            self.append(f"{path}: {told.text} {where}")
+
+    def check_request(self, url: str, service_url: str) -> None:
+        """Note a request to any other server than the service."""
+        if not url.startswith((service_url, "data:", "blob:")):
+            self.append(f"a page asked for something outside: {url}")
+
+
+def settled(page: Page) -> None:
+    """Wait until the page has what it asked for."""
+    page.wait_for_selector("main h1")
+    page.wait_for_function("() => !document.querySelector('main[aria-busy], .busy')")

@@ -1,0 +1,34 @@
+"""The HTTP application in process: with a simulated bench in virtual time, and what it holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+from fastapi import FastAPI
+from fastapi.testclient import TestClient
+
+from instruments.clock import SystemClock, VirtualClock
+from labctl.api import create_app
+from labctl.recording import Recording
+from labctl.services.app import LabService
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.planning.loading import load_bench
+from labctl.store import Store
+from labctl.store.connection.database import Database
+
+
+def open_client(database: Path, bench: str = "single-axis-sim") -> TestClient:
+    """Return a client of a service over `database`; entering it starts the service, leaving it closes it."""
+    store = Store(Database(str(database), write=True))
+    return TestClient(create_app(LabService(store, SystemClock(), BenchRunner(store, load_bench(bench), VirtualClock))))
+
+
+def service_of(client: TestClient) -> LabService:
+    """Return the service behind a client."""
+    return cast(LabService, cast(FastAPI, client.app).state.service)
+
+
+def add_recording(client: TestClient, recording: Recording) -> int:
+    """Store a recording without a request; returns its number."""
+    return service_of(client).store.recordings.add_import(recording, recording.info.started_at)

@@ -1,0 +1,29 @@
+"""Waiting for what another thread does: looked at again whenever it says that something happened."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+WAIT_S = 60.0  #: for the next event
+
+
+def wait_until(
+    listen: Callable[[Callable[[], None]], Callable[[], None]], look: Callable[[], Any], holds: Callable[[Any], Any]
+) -> Any:
+    """Return what `look` gives once it `holds`; `listen` calls back at each event and returns how to end that.
+
+    Raises AssertionError when no event comes for WAIT_S.
+    """
+    happened = threading.Event()
+    stop = listen(happened.set)
+    try:
+        while True:
+            happened.clear()
+            answer = look()
+            if holds(answer):
+                return answer
+            assert happened.wait(WAIT_S), f"no event in {WAIT_S:g} s: {answer}"
+    finally:
+        stop()
