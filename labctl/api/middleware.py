@@ -14,9 +14,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from labctl.actor import Actor, acting
 from labctl.api.problems import as_problem
 from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, TooLarge
-from labctl.services.admin.api_keys import Caller, Role, identify, require_role
+from labctl.services.admin.api_keys import identify, require_role
 from labctl.services.app import LabService
 from labctl.services.commands.remote import USER_HEADER
+from labctl.services.schemas.admin import Caller, Role
 from labctl.web import is_page
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})

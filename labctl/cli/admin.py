@@ -27,8 +27,8 @@ def key_create(
     database: Database = None,
 ) -> None:
     """Make a key and print it, this once: only its digest is kept."""
-    from labctl.services.admin.api_keys import KeyRequest, Role
     from labctl.services.commands.local import open_commands
+    from labctl.services.schemas.admin import KeyRequest, Role
 
     with one_clear_line(), open_commands(database) as commands:
         answer = commands.create_key(KeyRequest.model_validate({"name": name, "role": role}))
@@ -79,8 +79,9 @@ def audit_list(
     database: Database = None,
 ) -> None:
     """List who did what, when and why."""
-    from labctl.services.admin.audit import AuditResponse, list_audit
+    from labctl.services.admin.audit import list_audit
     from labctl.services.commands.open import open_readonly
+    from labctl.services.schemas.admin import AuditResponse
 
     answers: list[AuditResponse] = []
     with one_clear_line(), open_readonly(database) as store:

@@ -64,7 +64,7 @@ def clear(
 ) -> None:
     """Say that you have looked at a bench that was not confirmed safe; campaigns may start on it again."""
     from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import ClearRequest
+    from labctl.services.schemas.benches import ClearRequest
 
     with one_clear_line(), open_commands(database) as commands:
         answer = commands.clear_bench(bench, ClearRequest(by=by, reason=reason))

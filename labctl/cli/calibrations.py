@@ -13,7 +13,7 @@ from labctl.cli.options import Database, Json, RecordingId, Serial
 from labctl.cli.output import console, format_number, print_json, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.answers import FitResponse
+    from labctl.services.schemas.calibrations import FitResponse
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
 By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it.")]
@@ -34,7 +34,7 @@ def fit(
 ) -> None:
     """Fit a model to a recording; it becomes the unit's next calibration version."""
     from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import FitRequest
+    from labctl.services.schemas.calibrations import FitRequest
 
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
     with one_clear_line(), open_commands(database) as commands:
@@ -128,7 +128,7 @@ def _act(
     database: str | None,
 ) -> None:
     from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import CertifyRequest
+    from labctl.services.schemas.calibrations import CertifyRequest
 
     with one_clear_line(), open_commands(database) as commands:
         request = CertifyRequest(by=by, reason=reason, due_days=due_days)

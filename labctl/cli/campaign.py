@@ -12,7 +12,8 @@ from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import console, format_number, print_json, stderr, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.answers import CampaignResponse, PlanResponse
+    from labctl.services.schemas.campaigns import CampaignResponse
+    from labctl.services.schemas.plans import PlanResponse
 
 app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units.")
 app.add_typer(schedule.app, name="schedule")
@@ -107,11 +108,11 @@ def start(
     """
     from labctl.cli.progress_bar import CampaignProgress
     from labctl.cli.terminal_operator import TerminalOperator
-    from labctl.services.campaigns.execution import StartRequest, run_here
+    from labctl.services.campaigns.execution import run_here
     from labctl.services.commands.local import service_url
-    from labctl.services.commands.protocol import CampaignRequest
     from labctl.services.planning.loading import own_text
     from labctl.services.schedule.queue import is_scheduled
+    from labctl.services.schemas.campaigns import CampaignRequest, StartRequest
 
     with one_clear_line():
         wanted = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}

@@ -55,7 +55,7 @@ def pause(
 ) -> None:
     """Hold a running campaign after the present data set; the bench is still watched."""
     from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import ReasonRequest
+    from labctl.services.schemas.campaigns import ReasonRequest
 
     with one_clear_line(), open_commands(database) as commands:
         answer = commands.pause_campaign(campaign, ReasonRequest(reason=reason, by=person(by)))
@@ -81,7 +81,7 @@ def resume(
     from labctl.cli.terminal_operator import TerminalOperator
     from labctl.services.campaigns.resume import resume_here
     from labctl.services.commands.local import service_url
-    from labctl.services.commands.protocol import ResumeRequest
+    from labctl.services.schemas.campaigns import ResumeRequest
 
     with one_clear_line():
         request = ResumeRequest.model_validate({"by": person(by), "power": power})
@@ -127,7 +127,7 @@ def confirm(
 ) -> None:
     """Answer a campaign's question: it is done, or cannot be. An answer to an older question is refused."""
     from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import ConfirmRequest
+    from labctl.services.schemas.campaigns import ConfirmRequest
 
     with one_clear_line():
         wanted = campaign if campaign is not None else look(database, None).id

@@ -14,7 +14,8 @@ from labctl.cli.output import console, format_number, print_json, table
 
 if TYPE_CHECKING:
     from labctl.fitting.effects import Formula
-    from labctl.services.schemas.answers import CriticismResponse, FitResponse, LadderResponse
+    from labctl.services.schemas.calibrations import FitResponse, LadderResponse
+    from labctl.services.schemas.criticism import CriticismResponse
 
 VersionOption = Annotated[int | None, typer.Option("--version", metavar="N", help="Version; default: the newest.")]
 FormulaOption = Annotated[
@@ -167,8 +168,8 @@ def improve(
 ) -> None:
     """Change a version's effects and fit again: a new version, with the error before and after."""
     from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import ImproveRequest
     from labctl.services.formulas import as_lines
+    from labctl.services.schemas.calibrations import ImproveRequest
 
     def names(given: list[str] | None) -> list[str]:
         return [name.strip() for text in given or [] for name in text.split(",") if name.strip()]

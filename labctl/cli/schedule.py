@@ -11,8 +11,8 @@ from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr, table
 
 if TYPE_CHECKING:
-    from labctl.services.commands.protocol import CampaignRequest
-    from labctl.services.schemas.answers import ScheduledResponse
+    from labctl.services.schemas.campaigns import CampaignRequest
+    from labctl.services.schemas.schedule import ScheduledResponse
 
 app = typer.Typer(no_args_is_help=True, help="The schedule: campaigns that begin later, in a running service.")
 

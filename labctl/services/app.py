@@ -16,10 +16,17 @@ from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.execution import describe_safe_state
 from labctl.services.campaigns.status import from_rows, looked_after
 from labctl.services.commands.local import LocalCommands
-from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.services.schedule import queue
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.answers import CampaignResponse, EventResponse, ScheduledResponse
+from labctl.services.schemas.campaigns import (
+    CampaignRequest,
+    CampaignResponse,
+    ConfirmRequest,
+    EventResponse,
+    ReasonRequest,
+    ResumeRequest,
+)
+from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import Store
 from procedures.execution.signals import add_shutdown_hook
 

@@ -21,7 +21,7 @@ from weakref import WeakValueDictionary
 
 from platformdirs import user_cache_path
 
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.base import ResponseModel
 
 A = TypeVar("A", bound=ResponseModel)
 ROOMS = ("instruments", "labctl", "procedures")

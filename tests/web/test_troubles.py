@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import httpx
 import pytest
 
-from labctl.services.admin.api_keys import KeyRequest, Role
+from labctl.services.schemas.admin import KeyRequest, Role
 from tests.helpers.paths import EXAMPLES
 from tests.web.conftest import Faults, Service
 from tests.web.test_pages import settled

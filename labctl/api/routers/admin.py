@@ -9,9 +9,10 @@ from fastapi import APIRouter, Query
 
 from labctl.api.dependencies import ServiceDep
 from labctl.api.middleware import NEEDS_APPROVER
-from labctl.services.admin.api_keys import KeyRequest, KeyResponse, NewKeyResponse, list_keys
-from labctl.services.admin.audit import AuditResponse, list_audit
-from labctl.services.commands.protocol import BackupNote, ReasonRequest
+from labctl.services.admin.api_keys import list_keys
+from labctl.services.admin.audit import list_audit
+from labctl.services.schemas.admin import AuditResponse, BackupNote, KeyRequest, KeyResponse, NewKeyResponse
+from labctl.services.schemas.campaigns import ReasonRequest
 
 router = APIRouter(prefix="/api", tags=["keys and audit"])
 

@@ -10,21 +10,25 @@ from labctl.api.dependencies import ServiceDep
 from labctl.api.middleware import NEEDS_APPROVER
 from labctl.fitting.effects import read_formula
 from labctl.services.calibrations import fitting as services
-from labctl.services.calibrations.revision import PreviewResponse, preview_unit
-from labctl.services.calibrations.surface import SurfaceResponse, surface_of
-from labctl.services.calibrations.uncertainty import UncertaintyResponse, uncertainty_at
-from labctl.services.commands.protocol import CertifyRequest, FitRequest, ImproveRequest
+from labctl.services.calibrations.revision import preview_unit
+from labctl.services.calibrations.surface import surface_of
+from labctl.services.calibrations.uncertainty import uncertainty_at
 from labctl.services.criticism import criticise as criticism_services
-from labctl.services.criticism.plots import PictureResponse, pictures_unit
-from labctl.services.schemas.answers import (
+from labctl.services.criticism.plots import pictures_unit
+from labctl.services.schemas.calibrations import (
     CalibrationRow,
     CertificationResponse,
-    CriticismResponse,
+    CertifyRequest,
+    FitRequest,
     FitResponse,
+    ImproveRequest,
     LadderResponse,
-    ResidualsResponse,
+    PreviewResponse,
+    SurfaceResponse,
+    UncertaintyResponse,
     VersionResponse,
 )
+from labctl.services.schemas.criticism import CriticismResponse, PictureResponse, ResidualsResponse
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 RecordingNumber = Annotated[int | None, Query(description="Recording; default: the unit's newest.")]

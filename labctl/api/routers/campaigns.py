@@ -9,10 +9,17 @@ from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
 from labctl.api.dependencies import ServiceDep
-from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
-from labctl.services.planning.planner import CampaignPlanResponse, campaign_plan
+from labctl.services.planning.planner import campaign_plan
 from labctl.services.schedule.queue import is_scheduled
-from labctl.services.schemas.answers import CampaignResponse, ScheduledResponse
+from labctl.services.schemas.campaigns import (
+    CampaignRequest,
+    CampaignResponse,
+    ConfirmRequest,
+    ReasonRequest,
+    ResumeRequest,
+)
+from labctl.services.schemas.plans import CampaignPlanResponse
+from labctl.services.schemas.schedule import ScheduledResponse
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from labctl.api.dependencies import ServiceDep
-from labctl.services.commands.protocol import PlanRequest
 from labctl.services.planning import planner as services
-from labctl.services.planning.planner import PlannedResponse, RecipeResponse
+from labctl.services.schemas.plans import PlannedResponse, PlanRequest, RecipeResponse
 
 router = APIRouter(prefix="/api", tags=["campaigns"])
 

@@ -8,16 +8,21 @@ from fastapi import APIRouter, Query, UploadFile
 from fastapi.responses import StreamingResponse
 
 from labctl.api.dependencies import ServiceDep
-from labctl.services.commands.protocol import ExampleRequest, SimulatedRequest
 from labctl.services.recordings import catalogue
 from labctl.services.recordings import transfer as services
-from labctl.services.recordings.allan import AllanResponse, allan_unit
-from labctl.services.recordings.catalogue import DataSetsResponse, RecordingResponse
+from labctl.services.recordings.allan import allan_unit
 from labctl.services.recordings.downloads import zip_recording
-from labctl.services.recordings.examples import SimulatedRecordingResponse
-from labctl.services.recordings.traces import TraceResponse
 from labctl.services.recordings.traces import trace as trace_of
-from labctl.services.schemas.answers import ImportResponse
+from labctl.services.schemas.recordings import (
+    AllanResponse,
+    DataSetsResponse,
+    ExampleRequest,
+    ImportResponse,
+    RecordingResponse,
+    SimulatedRecordingResponse,
+    SimulatedRequest,
+    TraceResponse,
+)
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 

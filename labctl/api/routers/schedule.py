@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query
 
 from labctl.api.dependencies import ServiceDep
 from labctl.services.schedule import queue
-from labctl.services.schemas.answers import ScheduledResponse
+from labctl.services.schemas.schedule import ScheduledResponse
 
 router = APIRouter(prefix="/api/schedule", tags=["campaigns"])
 

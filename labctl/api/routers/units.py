@@ -8,10 +8,10 @@ from fastapi import APIRouter
 
 from labctl.api.dependencies import ServiceDep
 from labctl.services.benches.check import bench_statuses
-from labctl.services.commands.protocol import ClearRequest
 from labctl.services.effects import catalogue
 from labctl.services.recordings.units import list_units, unit
-from labctl.services.schemas.answers import BenchStatus, UnitResponse
+from labctl.services.schemas.benches import BenchStatus, ClearRequest
+from labctl.services.schemas.recordings import UnitResponse
 
 router = APIRouter(prefix="/api", tags=["what there is"])
 

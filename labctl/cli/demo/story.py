@@ -11,7 +11,7 @@ from labctl.cli.demo import example_data, find_missing_effect, serve_calibration
 from labctl.cli.demo.runner import DemoRunner, maybe_silent
 from labctl.errors import BadInput
 from labctl.services.calibrations.fitting import certify
-from labctl.services.commands.protocol import CertifyRequest
+from labctl.services.schemas.calibrations import CertifyRequest
 from labctl.store import open_store
 
 DATABASE = "demo.sqlite"

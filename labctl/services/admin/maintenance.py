@@ -7,38 +7,8 @@ from pathlib import Path
 from labctl.config import default_database
 from labctl.errors import LabctlError
 from labctl.services.commands.local import open_commands
-from labctl.services.commands.protocol import BackupNote
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.admin import BackupNote, BackupResponse, CheckResponse, FindingResponse
 from labctl.store import Progress, check, copy_database
-
-
-class FindingResponse(ResponseModel):
-    """Something that is not as it was written."""
-
-    part: str
-    text: str
-
-
-class CheckResponse(ResponseModel):
-    """What was looked at, and what was found."""
-
-    ok: bool
-    database: str
-    blocks: int
-    calibrations: int
-    audit_rows: int
-    findings: list[FindingResponse]
-
-
-class BackupResponse(ResponseModel):
-    """A backup that is on the disk."""
-
-    file: str
-    bytes: int
-    sha256: str
-    noted: bool
-    remark: str = ""
-    findings: list[FindingResponse]
 
 
 def check_database(database: str | None, progress: Progress | None = None) -> CheckResponse:

@@ -14,7 +14,7 @@ from instruments.simulation import serve_simulation
 from labctl.errors import BadInput
 from labctl.services.campaigns.status import abandoned_campaigns, describe_interrupted, outlives_its_process
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import BenchStatus, DeviceCheck
+from labctl.services.schemas.benches import BenchStatus, DeviceCheck
 from labctl.store import BenchRow, Store
 
 

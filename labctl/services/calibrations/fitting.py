@@ -10,9 +10,15 @@ from labctl.actor import actor
 from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
-from labctl.services.commands.protocol import CertifyRequest, FitRequest
 from labctl.services.recordings.transfer import newest_recording, points_of
-from labctl.services.schemas.answers import CalibrationRow, CertificationResponse, FitResponse, VersionResponse
+from labctl.services.schemas.calibrations import (
+    CalibrationRow,
+    CertificationResponse,
+    CertifyRequest,
+    FitRequest,
+    FitResponse,
+    VersionResponse,
+)
 from labctl.store import CertificationRow, NewCalibration, Store
 
 

@@ -9,7 +9,6 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
@@ -25,37 +24,17 @@ from labctl.fitting.models.presets import changed
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.recording import Recording
 from labctl.services.cache import cached
-from labctl.services.commands.protocol import ImproveRequest
 from labctl.services.criticism.criticise import version_of
 from labctl.services.criticism.evaluation import load_reduced_readings, model_of
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.recordings.transfer import newest_recording, points_of
-from labctl.services.schemas.answers import (
-    ErrorFigures,
+from labctl.services.schemas.calibrations import (
     FitResponse,
-    ModelResponse,
-    ResidualColumns,
-    ResponseModel,
-    Validity,
+    ImproveRequest,
+    PreviewResponse,
 )
+from labctl.services.schemas.criticism import ResidualColumns
 from labctl.store import CalibrationRecord, NewCalibration, Store
-
-
-class PreviewResponse(ResponseModel):
-    """What a changed model would be; nothing was kept, so it has no version of its own."""
-
-    serial: str
-    improved_from: int
-    recording: int
-    model: ModelResponse
-    axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
-    error: ErrorFigures
-    before: ErrorFigures
-    validity: Validity
-    plausible: dict[str, dict[str, Any]] = Field(description="Effect -> the usual range, and whether it is inside.")
-    left_out: list[dict[str, Any]] = Field(description="Effects that would not leave the house with a calibration.")
-    residuals: ResidualColumns = Field(description="What the changed model leaves, data set by data set.")
-
 
 #: Changes whose fits are at hand, by what was asked.
 _RECENT: dict[str, _Change] = {}

@@ -16,8 +16,13 @@ from labctl.services.benches.lease import BenchHold
 from labctl.services.campaigns.execution import Prepared, prepare, run
 from labctl.services.campaigns.resume import as_it_was, leave_safe, prepare_resume, too_often
 from labctl.services.campaigns.status import ENDED, answer_of, campaign_status
-from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import (
+    CampaignRequest,
+    CampaignResponse,
+    ConfirmRequest,
+    ReasonRequest,
+    ResumeRequest,
+)
 from labctl.services.simulation.recordings import with_hidden_effects
 from labctl.store import CampaignRow, Store
 from procedures.contracts.control import Control

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Hashable
 from typing import Any, TypeVar, cast
 
 from labctl.services.campaigns.status import ENDED, event_answer
-from labctl.services.schemas.answers import CampaignResponse, EventResponse
+from labctl.services.schemas.campaigns import CampaignResponse, EventResponse
 from labctl.store import Store
 
 #: An open event stream says that it is alive after this long without an event.

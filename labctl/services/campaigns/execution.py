@@ -6,8 +6,6 @@ from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass
 
-from pydantic import Field
-
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
@@ -20,9 +18,8 @@ from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.benches.host import boot_id
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.campaigns.status import ENDED, answer_of, describe_interrupted, from_rows
-from labctl.services.commands.protocol import Request
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import CampaignResponse, StartRequest
 from labctl.store import NewCampaign, NewUnit, Store
 from labctl.store.connection.database import note_campaign
 from procedures.contracts.control import Control
@@ -37,18 +34,6 @@ from procedures.planning.plan import Plan, make_plan
 
 Observe = Callable[[CampaignResponse], None]
 Attend = Callable[[Operator, Callable[[str], None]], None]
-
-
-class StartRequest(Request):
-    """Which recipe to run on which bench, here and now."""
-
-    recipe: str
-    bench: str | None = None
-    clip: bool = False
-    speed: float | None = Field(
-        default=None, gt=0, allow_inf_nan=False, description="Of a simulated bench; absent: as fast as it can."
-    )
-    seed: int | None = Field(default=None, ge=0, description="Of a simulated bench.")
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,8 @@ from labctl.services.campaigns.execution import (
     run_attended,
 )
 from labctl.services.campaigns.status import from_rows, how_far
-from labctl.services.commands.protocol import ResumeRequest
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
 from labctl.store import CampaignRow, ResumePoint, Store, TakeUp, open_store
 from procedures.execution.resume import Restart
 from procedures.execution.safe_state import make_safe

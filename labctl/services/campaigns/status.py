@@ -8,7 +8,7 @@ from datetime import timedelta
 from typing import Literal
 
 from instruments.bench_config import BenchFile
-from labctl.services.schemas.answers import CampaignResponse, EventResponse, OutputResponse, PromptResponse
+from labctl.services.schemas.campaigns import CampaignResponse, EventResponse, OutputResponse, PromptResponse
 from labctl.store import CampaignRow, EventRow, Store
 from procedures.contracts.control import ControlRequest
 from procedures.monitoring.progress import Progress

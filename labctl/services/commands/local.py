@@ -13,32 +13,33 @@ from labctl.services.admin import api_keys
 from labctl.services.benches.check import bench_status
 from labctl.services.calibrations import fitting, revision
 from labctl.services.campaigns.status import campaign_status, outlives_its_process
-from labctl.services.commands.protocol import (
-    BackupNote,
-    CampaignRequest,
-    CertifyRequest,
-    ClearRequest,
-    Commands,
-    ConfirmRequest,
-    ExampleRequest,
-    FitRequest,
-    ImproveRequest,
-    ReasonRequest,
-    ResumeRequest,
-    SimulatedRequest,
-)
+from labctl.services.commands.protocol import Commands
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.recordings import examples, transfer
-from labctl.services.recordings.examples import SimulatedRecordingResponse
 from labctl.services.schedule import queue
-from labctl.services.schemas.answers import (
-    BenchStatus,
-    CampaignResponse,
+from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
+from labctl.services.schemas.benches import BenchStatus, ClearRequest
+from labctl.services.schemas.calibrations import (
     CertificationResponse,
+    CertifyRequest,
+    FitRequest,
     FitResponse,
-    ImportResponse,
-    ScheduledResponse,
+    ImproveRequest,
 )
+from labctl.services.schemas.campaigns import (
+    CampaignRequest,
+    CampaignResponse,
+    ConfirmRequest,
+    ReasonRequest,
+    ResumeRequest,
+)
+from labctl.services.schemas.recordings import (
+    ExampleRequest,
+    ImportResponse,
+    SimulatedRecordingResponse,
+    SimulatedRequest,
+)
+from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import Store, holder_of, open_store
 
 #: What a campaign is called while its bench may move or be hot; one that was interrupted had its safe state.
@@ -99,11 +100,11 @@ class LocalCommands:
         """Write down what a person did to a campaign, before it shows."""
         self._store.audit.record(self._clock.utc(), f"campaign {act}", f"campaign {campaign}", {"reason": reason})
 
-    def create_key(self, request: api_keys.KeyRequest) -> api_keys.NewKeyResponse:
+    def create_key(self, request: KeyRequest) -> NewKeyResponse:
         """Make an API key."""
         return api_keys.create_key(self._store, request, self._clock.utc())
 
-    def revoke_key(self, name: str, reason: str) -> api_keys.KeyResponse:
+    def revoke_key(self, name: str, reason: str) -> KeyResponse:
         """Take a key's power away."""
         return api_keys.revoke_key(self._store, name, reason, self._clock.utc())
 

@@ -11,30 +11,28 @@ import httpx
 
 from labctl.config import KEY_VARIABLE, key, os_user
 from labctl.errors import Conflict, LabctlError, NotCertified, StoreError
-from labctl.services.admin.api_keys import KeyRequest, KeyResponse, NewKeyResponse
-from labctl.services.campaigns.execution import StartRequest
-from labctl.services.commands.protocol import (
-    BackupNote,
-    CampaignRequest,
-    CertifyRequest,
-    ClearRequest,
-    ConfirmRequest,
-    FitRequest,
-    ImproveRequest,
-    ReasonRequest,
-    Request,
-    ResumeRequest,
-)
 from labctl.services.planning.loading import own_text
 from labctl.services.recordings.transfer import FILE_NAMES
-from labctl.services.schemas.answers import (
-    BenchStatus,
-    CampaignResponse,
+from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
+from labctl.services.schemas.base import Request
+from labctl.services.schemas.benches import BenchStatus, ClearRequest
+from labctl.services.schemas.calibrations import (
     CertificationResponse,
+    CertifyRequest,
+    FitRequest,
     FitResponse,
-    ImportResponse,
-    ScheduledResponse,
+    ImproveRequest,
 )
+from labctl.services.schemas.campaigns import (
+    CampaignRequest,
+    CampaignResponse,
+    ConfirmRequest,
+    ReasonRequest,
+    ResumeRequest,
+    StartRequest,
+)
+from labctl.services.schemas.recordings import ImportResponse
+from labctl.services.schemas.schedule import ScheduledResponse
 
 TIMEOUT_S = 300.0
 #: By which a command without a key says who runs it.

@@ -20,7 +20,7 @@ from labctl.services.criticism.report_text import answer_of
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.formulas import catalogue_with
 from labctl.services.recordings.transfer import points_of
-from labctl.services.schemas.answers import CriticismResponse, ResidualsResponse
+from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse
 from labctl.store import CalibrationRecord, Store
 
 

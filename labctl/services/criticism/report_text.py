@@ -11,7 +11,7 @@ from labctl.fitting.criticism import Criticism
 from labctl.fitting.criticism.criticise import LARGE_DRIFT, Suspect, failing, pictures, worst
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.effects import CATALOGUE, kind_of
-from labctl.services.schemas.answers import CriticismResponse
+from labctl.services.schemas.criticism import CriticismResponse
 
 
 def answer_of(

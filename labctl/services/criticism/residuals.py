@@ -13,7 +13,7 @@ from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.data.channels import Array, Channels
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.recording import Recording
-from labctl.services.schemas.answers import ResidualColumns
+from labctl.services.schemas.criticism import ResidualColumns
 
 
 def residual_columns(

@@ -15,7 +15,7 @@ from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
 from instruments.interfaces.table import TableLimits
 from labctl.errors import BadBench
-from labctl.services.schemas.answers import PlanResponse, Visibility
+from labctl.services.schemas.plans import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan

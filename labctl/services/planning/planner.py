@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import tomli_w
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
 from instruments.bench_config import BenchFile
 from labctl.errors import BadInput
-from labctl.services.commands.protocol import PlanRequest
 from labctl.services.planning.loading import (
     bench_for,
     limits_of,
@@ -19,7 +18,15 @@ from labctl.services.planning.loading import (
     plan_answer,
     recipe_document,
 )
-from labctl.services.schemas.answers import PlanResponse, ResponseModel
+from labctl.services.schemas.plans import (
+    CampaignPlanResponse,
+    PlannedResponse,
+    PlanRequest,
+    RecipeResponse,
+    RunColumns,
+    StepState,
+    TimelineColumns,
+)
 from labctl.services.simulation.walk import visibility
 from labctl.store import StepRow, Store
 from procedures.contracts.errors import PlanRefused
@@ -28,65 +35,6 @@ from procedures.recipe.recipe import Recipe, shipped_recipes
 
 #: What a plan could find is worked out by walking through it second by second; a longer one is refused.
 LONGEST_LOOK_S = 14 * 86_400.0
-
-StepState = Literal["to come", "running", "done", "failed", "interrupted", "skipped"]
-
-
-class RecipeResponse(ResponseModel):
-    """A recipe that comes with labctl, and what it would take."""
-
-    name: str
-    description: str
-    text: str = Field(description="The recipe itself, TOML.")
-    bench: str
-    steps: int | None = None
-    datasets: int | None = None
-    expected_s: float | None = None
-    refused: str | None = Field(default=None, description="Why this bench cannot do it; then there are no figures.")
-    remark: str = Field(default="", description="What speaks against it although the bench can do it.")
-
-
-class TimelineColumns(ResponseModel):
-    """The steps of a plan in order, as lists of equal length."""
-
-    number: list[int] = Field(description="From 1.")
-    kind: list[str]
-    start_s: list[float] = Field(description="From the beginning, if every step takes as long as expected.")
-    expected_s: list[float]
-    temperature_c: list[float | None] = Field(description="Set point in force; null: none was set yet.")
-    rate_dps: list[float | None] = Field(description="Of data sets; null: the table is at rest.")
-    position: list[str | None] = Field(description="In which the units are; null: as they were found.")
-    dataset: list[int | None]
-
-
-class PlannedResponse(PlanResponse):
-    """What a campaign would do, with its steps."""
-
-    timeline: TimelineColumns
-
-
-class RunColumns(TimelineColumns):
-    """The steps of a campaign, with what became of each."""
-
-    state: list[StepState]
-    started_s: list[float | None] = Field(description="Campaign time.")
-    ended_s: list[float | None]
-    forecast_s: list[float] = Field(description="When it began, or will if all that is left takes as expected.")
-
-
-class CampaignPlanResponse(ResponseModel):
-    """The plan of a campaign, and how far it is."""
-
-    campaign: int
-    recipe: str
-    text: str = Field(description="The recipe as it was run, TOML; empty: by an older labctl.")
-    bench: str
-    state: str
-    schedule_hash: str
-    steps: int
-    datasets: int
-    expected_s: float
-    timeline: RunColumns
 
 
 def list_recipes(bench: BenchFile | None) -> list[RecipeResponse]:

@@ -14,7 +14,7 @@ import numpy as np
 from labctl.errors import BadRecording, NotEnoughData, NotFound
 from labctl.recording import Recording, RecordingInfo, read_recording, write_recording
 from labctl.recording.points import with_pieces
-from labctl.services.schemas.answers import ImportResponse
+from labctl.services.schemas.recordings import ImportResponse
 from labctl.store import RecordingRow, Store
 
 if TYPE_CHECKING:

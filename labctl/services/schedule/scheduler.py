@@ -14,9 +14,8 @@ from typing import Protocol
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
 from labctl.errors import BenchBusy, LabctlError
-from labctl.services.commands.protocol import CampaignRequest
 from labctl.services.schedule import times
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse
 from labctl.store import StartEventRow, StartRow, Store
 from procedures.contracts.errors import ProcedureError
 

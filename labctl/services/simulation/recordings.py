@@ -22,9 +22,8 @@ from instruments.protocols.arrick_c4_moves import plan_move
 from instruments.simulation import hidden_defaults, open_simulation
 from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo, write_recording
-from labctl.services.commands.protocol import Request
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.base import Request, ResponseModel
 from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn
 from procedures.planning.plan import Plan, make_plan
 

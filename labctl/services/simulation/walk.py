@@ -16,7 +16,7 @@ from labctl.fitting.criticism.noise_grid import USUAL_DPS, Noise
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.effects import CATALOGUE
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.services.schemas.answers import Visibility
+from labctl.services.schemas.plans import Visibility
 from labctl.services.simulation.sizing import hidden_recording, usual_model
 from procedures.planning.plan import Plan
 

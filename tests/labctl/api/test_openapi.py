@@ -14,8 +14,8 @@ from instruments.clock import VirtualClock
 from labctl.api import create_app
 from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.commands.protocol import CertifyRequest, FitRequest
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.calibrations import CertifyRequest, FitRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES

@@ -18,8 +18,8 @@ from labctl.api import create_app
 from labctl.api.middleware import AccessPolicy
 from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.commands.protocol import FitRequest
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES, RECIPES

@@ -17,9 +17,9 @@ from labctl.cli.terminal_operator import TerminalOperator
 from labctl.config import os_user
 from labctl.errors import Stopped
 from labctl.services.campaigns import execution, resume
-from labctl.services.campaigns.execution import StartRequest, run_here
+from labctl.services.campaigns.execution import run_here
 from labctl.services.campaigns.resume import resume_here
-from labctl.services.commands.protocol import ResumeRequest
+from labctl.services.schemas.campaigns import ResumeRequest, StartRequest
 from labctl.store import open_store
 from procedures.contracts.operator import HumanOperator, Prompt
 

@@ -12,7 +12,8 @@ import pytest
 from labctl.services import cache as keeping
 from labctl.services.cache import cached, cached_group
 from labctl.services.criticism import evaluation
-from labctl.services.schemas.answers import CertificationResponse, LadderResponse, ResponseModel
+from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.calibrations import CertificationResponse, LadderResponse
 from labctl.store import open_store
 from tests.labctl.cli.test_cli import Lab
 from tests.labctl.fitting.criticism.test_criticism import single_axis

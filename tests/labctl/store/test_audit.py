@@ -26,9 +26,8 @@ from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import prepare, run
 from labctl.services.campaigns.status import campaign_status
-from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.store import Store, migrate, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES

@@ -21,8 +21,8 @@ from labctl.errors import DiskFull, StoreError
 from labctl.recording import read_recording
 from labctl.services.campaigns.execution import prepare, run
 from labctl.services.commands.local import LocalCommands
-from labctl.services.commands.protocol import CertifyRequest, FitRequest
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.calibrations import CertifyRequest, FitRequest
 from labctl.store import Store, check, copy_database, open_store
 from labctl.store.connection import commit_counter as seals
 from tests.helpers.paths import EXAMPLES

@@ -23,12 +23,12 @@ from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData
 from labctl.services.app import LabService
 from labctl.services.campaigns import bench_runner, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
+from labctl.services.campaigns.execution import prepare, run, run_here
 from labctl.services.campaigns.status import campaign_status, list_campaigns
 from labctl.services.commands.local import LocalCommands
-from labctl.services.commands.protocol import CampaignRequest
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.transfer import newest_recording
+from labctl.services.schemas.campaigns import CampaignRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control

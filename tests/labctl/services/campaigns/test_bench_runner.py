@@ -16,7 +16,7 @@ from labctl.actor import Actor, acting
 from labctl.api import create_app
 from labctl.api.middleware import AccessPolicy
 from labctl.errors import BenchBusy, Conflict
-from labctl.services.admin.api_keys import KeyRequest, Role, create_key
+from labctl.services.admin.api_keys import create_key
 from labctl.services.app import LabService
 from labctl.services.benches import lease
 from labctl.services.benches.lease import STOP_S, BenchHold
@@ -24,9 +24,10 @@ from labctl.services.campaigns import execution, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import prepare
 from labctl.services.campaigns.status import campaign_status
-from labctl.services.commands.protocol import CampaignRequest, ResumeRequest
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import start_status
+from labctl.services.schemas.admin import KeyRequest, Role
+from labctl.services.schemas.campaigns import CampaignRequest, ResumeRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from procedures.contracts.operator import HumanOperator

@@ -16,10 +16,10 @@ from instruments.errors import NoReply
 from labctl.cli.app import app
 from labctl.errors import Conflict
 from labctl.services.benches.host import power_failed
-from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
+from labctl.services.campaigns.execution import prepare, run, run_here
 from labctl.services.campaigns.resume import MOST_TRIES, prepare_resume, resume_here, too_often
-from labctl.services.commands.protocol import ResumeRequest
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.campaigns import ResumeRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control

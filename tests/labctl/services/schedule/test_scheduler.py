@@ -14,11 +14,10 @@ from labctl.api import create_app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull
 from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.commands.protocol import CampaignRequest
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import add_start, cancel_start, is_scheduled, list_starts, start_status
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.errors import PlanRefused
