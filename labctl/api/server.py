@@ -21,7 +21,7 @@ from labctl.services.admin.api_keys import require_an_api_key
 from labctl.services.app import LabService
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import clock_for
+from labctl.services.campaigns.preparation import clock_for
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database

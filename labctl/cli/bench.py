@@ -38,7 +38,7 @@ def check(
 @app.command("status")
 def status(as_json: Json = False, database: Database = None) -> None:
     """Say which benches were not confirmed safe when their last campaign ended, or had none: their process is gone."""
-    from labctl.services.benches.check import bench_statuses
+    from labctl.services.campaigns.bench_status import bench_statuses
     from labctl.services.commands.open import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:

@@ -64,7 +64,7 @@ def written(sources: list[str] | None) -> list[Formula]:
     """Return the formulas of a command line. Raises BadInput."""
     if not sources:
         return []
-    from labctl.services.formulas import with_files
+    from labctl.services.effects import with_files
 
     return with_files(sources)
 
@@ -168,7 +168,7 @@ def improve(
 ) -> None:
     """Change a version's effects and fit again: a new version, with the error before and after."""
     from labctl.services.commands.local import open_commands
-    from labctl.services.formulas import as_lines
+    from labctl.services.effects import as_lines
     from labctl.services.schemas.calibrations import ImproveRequest
 
     def names(given: list[str] | None) -> list[str]:

@@ -117,7 +117,7 @@ class LabService:
         add_shutdown_hook(self.end_soon)
         with acting(ITSELF):  # nobody asked for it
             if self._runner is not None:
-                self._runner.take_up_left()
+                self._runner.resume_unfinished()
             if self.scheduler is not None:
                 self.scheduler.start()
 

@@ -10,6 +10,7 @@ from labctl.api.dependencies import ServiceDep
 from labctl.api.middleware import NEEDS_APPROVER
 from labctl.fitting.effects import read_formula
 from labctl.services.calibrations import fitting as services
+from labctl.services.calibrations.certification import list_certifications
 from labctl.services.calibrations.revision import preview_unit
 from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
@@ -82,7 +83,7 @@ def one_version(serial: str, version: int, service: ServiceDep) -> VersionRespon
 @router.get("/certifications", summary="What was certified and revoked")
 def certifications(serial: str, service: ServiceDep) -> list[CertificationResponse]:
     """Every act of certifying and revoking a version of the unit, newest first: who, why, when, and due when."""
-    return services.list_certifications(service.store, serial)
+    return list_certifications(service.store, serial)
 
 
 @router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")

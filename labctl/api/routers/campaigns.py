@@ -9,7 +9,7 @@ from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
 from labctl.api.dependencies import ServiceDep
-from labctl.services.planning.planner import campaign_plan
+from labctl.services.campaigns.plan_view import campaign_plan
 from labctl.services.schedule.queue import is_scheduled
 from labctl.services.schemas.campaigns import (
     CampaignRequest,

@@ -11,8 +11,8 @@ from labctl.api.dependencies import ServiceDep
 from labctl.services.recordings import catalogue
 from labctl.services.recordings import transfer as services
 from labctl.services.recordings.allan import allan_unit
-from labctl.services.recordings.downloads import zip_recording
 from labctl.services.recordings.traces import trace as trace_of
+from labctl.services.recordings.transfer import zip_recording
 from labctl.services.schemas.recordings import (
     AllanResponse,
     DataSetsResponse,
@@ -59,7 +59,7 @@ def recording(
     points: Annotated[bool, Query(description="With the means of its data sets.")] = True,
 ) -> dict[str, Any]:
     """What the recording is: unit, axes, channels, data sets."""
-    return services.describe_recording(service.store, recording, points=points)
+    return catalogue.describe_recording(service.store, recording, points=points)
 
 
 @router.get("/{recording}/datasets", summary="Its data sets")
@@ -111,4 +111,4 @@ def samples(
     limit: Annotated[int, Query(ge=1, le=100_000, description="At most this many readings.")] = 10_000,
 ) -> dict[str, Any]:
     """The readings of one data set, column by column, in the units named beside them."""
-    return services.dataset_samples(service.store, recording, dataset, limit)
+    return catalogue.dataset_samples(service.store, recording, dataset, limit)

@@ -7,7 +7,7 @@ from typing import Any
 from fastapi import APIRouter
 
 from labctl.api.dependencies import ServiceDep
-from labctl.services.benches.check import bench_statuses
+from labctl.services.campaigns.bench_status import bench_statuses
 from labctl.services.effects import catalogue
 from labctl.services.recordings.units import list_units, unit
 from labctl.services.schemas.benches import BenchStatus, ClearRequest

@@ -27,7 +27,7 @@ from labctl.services.cache import cached
 from labctl.services.criticism.criticise import version_of
 from labctl.services.criticism.evaluation import load_reduced_readings, model_of
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.recordings.transfer import newest_recording, points_of
+from labctl.services.recordings.loading import newest_recording, points_of
 from labctl.services.schemas.calibrations import (
     FitResponse,
     ImproveRequest,

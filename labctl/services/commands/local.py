@@ -10,8 +10,8 @@ from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.services.admin import api_keys
-from labctl.services.benches.check import bench_status
-from labctl.services.calibrations import fitting, revision
+from labctl.services.calibrations import certification, fitting, revision
+from labctl.services.campaigns.bench_status import bench_status
 from labctl.services.campaigns.status import campaign_status, outlives_its_process
 from labctl.services.commands.protocol import Commands
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
@@ -75,11 +75,11 @@ class LocalCommands:
 
     def certify(self, serial: str, version: int, request: CertifyRequest) -> CertificationResponse:
         """Make a version the unit's current one."""
-        return fitting.certify(self._store, serial, version, "certify", request, self._clock.utc())
+        return certification.certify(self._store, serial, version, "certify", request, self._clock.utc())
 
     def revoke(self, serial: str, version: int, request: CertifyRequest) -> CertificationResponse:
         """Take a version out of force."""
-        return fitting.certify(self._store, serial, version, "revoke", request, self._clock.utc())
+        return certification.certify(self._store, serial, version, "revoke", request, self._clock.utc())
 
     def abort_campaign(self, campaign: int, reason: str) -> CampaignResponse:
         """Close a campaign that no process runs any more; one that runs here would hold the database."""

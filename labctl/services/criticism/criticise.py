@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from labctl.errors import BadInput
 from labctl.services.cache import cached_group
-from labctl.services.recordings.transfer import newest_recording
+from labctl.services.recordings.loading import newest_recording
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.calibrations import LadderResponse, LadderRow
 from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse

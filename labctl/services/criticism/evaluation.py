@@ -18,8 +18,8 @@ from labctl.recording import Recording
 from labctl.services.criticism.next_experiment import experiments_for
 from labctl.services.criticism.report_text import answer_of
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.formulas import catalogue_with
-from labctl.services.recordings.transfer import points_of
+from labctl.services.effects import catalogue_with
+from labctl.services.recordings.loading import points_of
 from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse
 from labctl.store import CalibrationRecord, Store
 

@@ -133,8 +133,3 @@ def plan_answer(plan: Plan, bench_file: BenchFile, look: Look | None = None) -> 
         schedule_hash=plan.schedule_hash,
         visibility=look(plan, bench_file) if look else None,
     )
-
-
-def shipped_recipe_names() -> dict[str, Path]:
-    """Return the recipes that come with labctl."""
-    return shipped_recipes()

@@ -80,3 +80,34 @@ def _of_table(numbers: list[int], points: Recording) -> dict[str, ChannelColumns
 
 def _numbers(values: np.ndarray[Any, Any]) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def describe_recording(store: Store, recording: int, *, points: bool = True) -> dict[str, Any]:
+    """Return what a recording is and, if asked for, the means of its data sets."""
+    row = store.recordings.get(recording)
+    about = {
+        "id": row.id,
+        "serial": row.serial,
+        "campaign": row.campaign,
+        "kind": row.kind,
+        "info": dict(row.info),
+        "created_at": row.created_at.isoformat(),
+        "datasets": row.datasets,
+        "readings": row.readings,
+    }
+    if not points:
+        return about
+    columns = store.recordings.points(recording).columns
+    return {**about, "points": {name: np.asarray(values).tolist() for name, values in columns.items()}}
+
+
+def dataset_samples(store: Store, recording: int, dataset: int, limit: int) -> dict[str, Any]:
+    """Return the readings of one data set, at most `limit`."""
+    columns = store.recordings.dataset(recording, dataset)
+    n = len(next(iter(columns.values()), ()))
+    return {
+        "recording": recording,
+        "dataset": dataset,
+        "readings": n,
+        "columns": {name: np.asarray(values)[:limit].tolist() for name, values in columns.items()},
+    }

@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from instruments.clock import VirtualClock
-from labctl.services.campaigns.execution import prepare
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.planner import _forecast
 from labctl.store import StepRow, Store
 from procedures.recipe.recipe import shipped_recipes

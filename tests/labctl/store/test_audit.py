@@ -24,7 +24,8 @@ from labctl.errors import BadInput
 from labctl.services.admin.audit import anchor_of, verify_audit
 from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import prepare, run
+from labctl.services.campaigns.execution import run
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest

@@ -19,7 +19,8 @@ from instruments.clock import VirtualClock
 from labctl.cli.app import app
 from labctl.errors import DiskFull, StoreError
 from labctl.recording import read_recording
-from labctl.services.campaigns.execution import prepare, run
+from labctl.services.campaigns.execution import run
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.commands.local import LocalCommands
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.calibrations import CertifyRequest, FitRequest

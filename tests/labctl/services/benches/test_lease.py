@@ -16,7 +16,8 @@ from instruments.clock import Clock, VirtualClock
 from labctl.errors import Conflict, StoreError
 from labctl.services.benches.lease import RENEW_S, STOP_S, TERM_S, BenchHold, this_machine
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import prepare, run
+from labctl.services.campaigns.execution import run
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import load_bench
 from labctl.store import LeaseRow, Store, open_store
 from labctl.store.connection.database import Database

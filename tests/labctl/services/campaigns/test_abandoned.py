@@ -21,13 +21,14 @@ from labctl.api.server import ServeRequest, create_service
 from labctl.cli.app import app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
 from labctl.services.app import LabService
-from labctl.services.campaigns import bench_runner, resume
+from labctl.services.campaigns import recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import prepare, run, run_here
+from labctl.services.campaigns.execution import run, run_here
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status, list_campaigns
 from labctl.services.commands.local import LocalCommands
 from labctl.services.planning.loading import load_bench
-from labctl.services.recordings.transfer import newest_recording
+from labctl.services.recordings.loading import newest_recording
 from labctl.services.schemas.campaigns import CampaignRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
@@ -74,9 +75,10 @@ def test_a_bench_that_is_silent_when_its_campaign_is_to_be_taken_up_is_not_held_
     def silent(*_: Any) -> None:
         raise NoReply("table", "no answer")
 
+    monkeypatch.setattr(recovery, "open_bench", silent)
     monkeypatch.setattr(resume, "open_bench", silent)
     runner = BenchRunner(store, BENCH, VirtualClock)
-    runner.take_up_left()
+    runner.resume_unfinished()
     assert store.campaigns.get(1).state == "failed"
     assert "no answer" in store.benches.unconfirmed(BENCH.name)
     with pytest.raises(Conflict, match="not confirmed safe"):
@@ -92,9 +94,9 @@ def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, m
         states.append(store.campaigns.get(1).state)
         return ("table to rest: it still moves",)
 
-    monkeypatch.setattr(bench_runner, "too_often", lambda _: "taken up 5 times")
-    monkeypatch.setattr(resume, "make_safe", safe)
-    BenchRunner(store, BENCH, VirtualClock).take_up_left()
+    monkeypatch.setattr(recovery, "retries_exhausted", lambda _: "taken up 5 times")
+    monkeypatch.setattr(recovery, "make_safe", safe)
+    BenchRunner(store, BENCH, VirtualClock).resume_unfinished()
     assert states == ["running"]
     assert store.campaigns.get(1).reason == "taken up 5 times"
     assert store.benches.unconfirmed(BENCH.name) == "table to rest: it still moves"
@@ -124,7 +126,7 @@ def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: S
 def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say_so(store: Store) -> None:
     older, newer = left_running(store), left_running(store)
     runner = BenchRunner(store, BENCH, VirtualClock)
-    runner.take_up_left()
+    runner.resume_unfinished()
     rest(runner)
     assert store.campaigns.get(newer).state == "done"
     row = store.campaigns.get(older)
@@ -174,7 +176,7 @@ def test_an_end_that_could_not_be_written_is_written_before_anything_else_begins
     with pytest.raises(StoreError, match="the disk is full"):
         runner.start(CampaignRequest(recipe="short"))
     disk.full = False
-    runner.take_up_cut_short()
+    runner.resume_interrupted()
     row = store.campaigns.get(campaign)
     assert (row.state, "the disk is full" in row.reason) == ("failed", True)
     assert f"campaign {campaign} ended while" in store.benches.unconfirmed(BENCH.name)

@@ -20,9 +20,9 @@ from labctl.services.admin.api_keys import create_key
 from labctl.services.app import LabService
 from labctl.services.benches import lease
 from labctl.services.benches.lease import STOP_S, BenchHold
-from labctl.services.campaigns import execution, resume
+from labctl.services.campaigns import preparation, recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import prepare
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import start_status
@@ -99,7 +99,7 @@ def lab(tmp_path: Path) -> Iterator[Lab]:
 def moves(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Whenever a bench is opened."""
     opened: list[str] = []
-    for module in (execution, resume):
+    for module in (preparation, recovery, resume):
         real = module.open_bench
 
         def opening(bench: Any, clock: Any, real: Any = real) -> Any:
@@ -164,7 +164,7 @@ def test_a_campaign_whose_bench_was_lost_is_taken_up_before_the_queue_goes_on(la
 def test_a_campaign_that_waits_keeps_its_bench_and_lets_it_go_when_it_is_lost(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(execution, "operator_of", lambda _: HumanOperator())
+    monkeypatch.setattr(preparation, "operator_of", lambda _: HumanOperator())
     seen: list[str] = []
 
     def heard() -> None:
@@ -191,7 +191,7 @@ def test_without_the_lease_nothing_is_taken_up_and_nothing_moves(tmp_path: Path,
     left.bench.close()
     moves.clear()
     first.lose()
-    first.runner.take_up_left()
+    first.runner.resume_unfinished()
     with pytest.raises(BenchBusy, match="may not be driven"):
         first.runner.resume(left.id, ResumeRequest(by="Ada"))
     assert (moves, first.states()) == ([], ["planned"])
@@ -249,6 +249,7 @@ def test_what_cannot_be_taken_up_waits_for_a_person_and_the_queue_goes_on(
     def silent(*_: Any) -> None:
         raise NoReply("table", "no answer")
 
+    monkeypatch.setattr(recovery, "open_bench", silent)
     monkeypatch.setattr(resume, "open_bench", silent)
     lab.tick()
     left = campaign_status(lab.store, 1)

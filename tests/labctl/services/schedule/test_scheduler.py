@@ -41,7 +41,7 @@ class Lab:
     def service(self) -> Scheduler:
         return Scheduler(self.store, self.clock, self, BENCH.name)
 
-    def take_up_cut_short(self) -> None:
+    def resume_interrupted(self) -> None:
         self.went_on += 1
 
     def start(self, request: CampaignRequest) -> CampaignResponse:
