@@ -13,8 +13,8 @@ import uvicorn
 
 from instruments.clock import Clock, WallClock
 from labctl.api import systemd
+from labctl.api.access_policy import LOOPBACK_NAMES, MIB, AccessPolicy
 from labctl.api.app import create_app
-from labctl.api.middleware import LOOPBACK_NAMES, MIB, AccessPolicy
 from labctl.config import default_database
 from labctl.errors import BadInput
 from labctl.services.admin.api_keys import require_an_api_key

@@ -17,7 +17,7 @@ import uvicorn
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.api.middleware import AccessPolicy
+from labctl.api.access_policy import AccessPolicy
 from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.planning.loading import load_bench

@@ -6,14 +6,16 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
 
-from labctl.api.dependencies import ServiceDep
-from labctl.api.middleware import NEEDS_APPROVER
+from labctl.api.access_policy import NEEDS_APPROVER
+from labctl.api.dependencies import ServiceDep, command_route
 from labctl.fitting.effects import read_formula
 from labctl.services.calibrations import fitting as services
 from labctl.services.calibrations.certification import list_certifications
 from labctl.services.calibrations.revision import preview_unit
 from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
+from labctl.services.commands.requests import ToNewestOrVersion, ToUnit, ToVersion
+from labctl.services.commands.table import CERTIFY, FIT, IMPROVE, REVOKE
 from labctl.services.criticism import criticise as criticism_services
 from labctl.services.criticism.plots import pictures_unit
 from labctl.services.schemas.calibrations import (
@@ -62,16 +64,16 @@ def calibrations(serial: str, service: ServiceDep) -> list[CalibrationRow]:
     return services.list_calibrations(service.store, serial)
 
 
-@router.post("/calibrations", summary="Fit a model", status_code=201)
+@command_route(router, FIT, "Fit a model")
 def fit(serial: str, request: FitRequest, service: ServiceDep) -> FitResponse:
     """Fit a model to a recording; it becomes the unit's next version."""
-    return service.commands().fit(serial, request)
+    return service.execute(FIT, ToUnit(serial, request))
 
 
-@router.post("/calibrations/{version}/improve", summary="Change a model", status_code=201)
+@command_route(router, IMPROVE, "Change a model")
 def improve(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> FitResponse:
     """Add effects to a version, or take some out, and fit everything again; it becomes the unit's next version."""
-    return service.commands().improve(serial, request.model_copy(update={"version": version}))
+    return service.execute(IMPROVE, ToNewestOrVersion(serial, version, request))
 
 
 @router.get("/calibrations/{version}", summary="One version")
@@ -150,16 +152,16 @@ def ladder(serial: str, service: ServiceDep) -> LadderResponse:
     return criticism_services.ladder(service.store, serial)
 
 
-@router.post("/calibrations/{version}/certify", summary="Make a version current", dependencies=[NEEDS_APPROVER])
+@command_route(router, CERTIFY, "Make a version current", dependencies=[NEEDS_APPROVER])
 def certify(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
     """Make a version the one in force: who, why, and when it is due again. An older version again is a rollback.
 
     Asks for an approver.
     """
-    return service.commands().certify(serial, version, request)
+    return service.execute(CERTIFY, ToVersion(serial, version, request))
 
 
-@router.post("/calibrations/{version}/revoke", summary="Take a version out of force", dependencies=[NEEDS_APPROVER])
+@command_route(router, REVOKE, "Take a version out of force", dependencies=[NEEDS_APPROVER])
 def revoke(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
     """Take the version out of force; the unit then has no certified calibration. Asks for an approver."""
-    return service.commands().revoke(serial, version, request)
+    return service.execute(REVOKE, ToVersion(serial, version, request))

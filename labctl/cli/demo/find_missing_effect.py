@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from instruments.clock import VirtualClock
-from labctl.cli.criticism import ladder_lines
+from labctl.cli.criticism_output import ladder_lines
 from labctl.cli.demo.runner import DemoRunner
 from labctl.services.calibrations.revision import improve_unit
 from labctl.services.criticism.criticise import criticise_unit, ladder

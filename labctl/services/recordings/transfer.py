@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, BinaryIO, Literal
+from typing import IO, BinaryIO, Literal
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 from labctl.errors import BadRecording
 from labctl.recording import RecordingInfo, read_recording, write_recording
 from labctl.services.schemas.recordings import ImportResponse
 from labctl.store import Store
-
-if TYPE_CHECKING:
-    from labctl.services.commands.protocol import Commands
 
 CHUNK_BYTES = 1 << 20
 #: CSV shrinks to a fifth at the quickest; Parquet is packed already.
@@ -49,8 +46,13 @@ def suggested_model(info: RecordingInfo) -> str:
     return "yang2018" if len(info.axes) > 1 else "ojeda2000"
 
 
-def import_files(commands: Commands, files: Sequence[tuple[str, BinaryIO]]) -> ImportResponse:
-    """Take in a recording from uploaded files; their names may only be the format's. Raises BadRecording."""
+def import_files(
+    files: Sequence[tuple[str, BinaryIO]], import_from: Callable[[Path], ImportResponse]
+) -> ImportResponse:
+    """Import a recording from uploaded files; their names may only be the format's. Raises BadRecording.
+
+    `import_from` imports the folder that they are written to.
+    """
     names = [name for name, _ in files]
     for name in names:
         if name not in FILE_NAMES:
@@ -62,7 +64,7 @@ def import_files(commands: Commands, files: Sequence[tuple[str, BinaryIO]]) -> I
             with (Path(folder) / name).open("wb") as target:
                 shutil.copyfileobj(content, target)
         try:
-            return commands.import_recording(Path(folder))
+            return import_from(Path(folder))
         except BadRecording as error:
             raise BadRecording(str(error).replace(f"{folder}/", "")) from None
 

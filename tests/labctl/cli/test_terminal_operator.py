@@ -35,7 +35,7 @@ class Terminal:
         self.stdin = os.fdopen(theirs, encoding="utf-8")
         self._answer = answer
         monkeypatch.setattr("sys.stdin", self.stdin)
-        monkeypatch.setattr(terminal_operator.complaints, "print", self._shown)
+        monkeypatch.setattr(terminal_operator.stderr, "print", self._shown)
 
     def type(self, text: str) -> None:
         os.write(self.ours, text.encode())

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from instruments.clock import SystemClock, VirtualClock
 from labctl.actor import Actor, acting
 from labctl.api import create_app
-from labctl.api.middleware import ASKING
+from labctl.api.access_policy import ASKING
 from labctl.cli.app import app
 from labctl.config import os_user
 from labctl.errors import BadInput

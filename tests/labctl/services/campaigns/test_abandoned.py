@@ -26,15 +26,17 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status, list_campaigns
-from labctl.services.commands.local import LocalCommands
+from labctl.services.commands.requests import ToCampaign
+from labctl.services.commands.table import ABORT_CAMPAIGN
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.loading import newest_recording
-from labctl.services.schemas.campaigns import CampaignRequest, StartRequest
+from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control
 from procedures.contracts.journal import NOT_SAFE, CampaignState, Event
 from procedures.execution.signals import defer_signals
+from tests.helpers.commands import local_executor
 
 BENCH = load_bench("single-axis-sim")
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -136,13 +138,17 @@ def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say
 @pytest.mark.usefixtures("real")
 def test_ending_by_hand_what_no_process_runs_says_that_nobody_made_the_bench_safe(store: Store) -> None:
     campaign = left_running(store)
-    answer = LocalCommands(store, VirtualClock()).abort_campaign(campaign, "the computer died")
+    answer = local_executor(store, VirtualClock()).execute(
+        ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason="the computer died"))
+    )
     assert (answer.state, "Nobody has made bench" in answer.reason) == ("aborted", True)
     assert f"campaign {campaign} ended before" in store.benches.unconfirmed(BENCH.name)
 
 
 def test_a_simulated_bench_ended_with_its_process(store: Store) -> None:
-    answer = LocalCommands(store, VirtualClock()).abort_campaign(left_running(store), "enough")
+    answer = local_executor(store, VirtualClock()).execute(
+        ABORT_CAMPAIGN, ToCampaign(left_running(store), ReasonRequest(reason="enough"))
+    )
     assert (answer.state, store.benches.unconfirmed(BENCH.name)) == ("aborted", "")
 
 

@@ -14,7 +14,7 @@ from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
 from labctl.actor import Actor, acting
 from labctl.api import create_app
-from labctl.api.middleware import AccessPolicy
+from labctl.api.access_policy import AccessPolicy
 from labctl.errors import BenchBusy, Conflict
 from labctl.services.admin.api_keys import create_key
 from labctl.services.app import LabService
@@ -24,6 +24,8 @@ from labctl.services.campaigns import preparation, recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
+from labctl.services.commands.requests import CampaignStart, ToStart
+from labctl.services.commands.table import CANCEL_START, START_CAMPAIGN
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import start_status
 from labctl.services.schemas.admin import KeyRequest, Role
@@ -51,7 +53,7 @@ class Lab:
 
     def enter(self, **when: Any) -> int:
         request = CampaignRequest.model_validate({"recipe": "short", **when})
-        return self.lab_service.commands().schedule_campaign(request).id
+        return self.lab_service.execute(START_CAMPAIGN, CampaignStart(request)).id
 
     def tick(self) -> None:
         self.scheduler.tick()
@@ -264,7 +266,7 @@ def test_entries_and_what_became_of_them_are_in_the_audit_trail(lab: Lab) -> Non
         lab.enter(at="now")
         cancelled = lab.enter(cron="0 2 * * *", time_zone="UTC")
         lab.enter(at="2026-01-05T08:01Z", late_limit_s=0)
-        lab.lab_service.commands().cancel_start(cancelled)
+        lab.lab_service.execute(CANCEL_START, ToStart(cancelled))
     lab.tick()
     lab.clock.sleep(3600)
     lab.hold.renew()

@@ -46,7 +46,7 @@ def client(runner: BenchRunner) -> Iterator[TestClient]:
 def until(client: TestClient, wanted: Any) -> Any:
     """Look at campaign 1, whenever its runner says that something happened, until it is as wanted."""
     happened = threading.Event()
-    stop = client.app.state.service.bench_runner().listen(happened.set)  # type: ignore[attr-defined]
+    stop = client.app.state.service.bench_runner.listen(happened.set)  # type: ignore[attr-defined]
     try:
         for _ in range(PATIENCE):
             happened.clear()

@@ -63,11 +63,13 @@ def clear(
     database: Database = None,
 ) -> None:
     """Say that you have looked at a bench that was not confirmed safe; campaigns may start on it again."""
-    from labctl.services.commands.local import open_commands
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToBench
+    from labctl.services.commands.table import CLEAR_BENCH
     from labctl.services.schemas.benches import ClearRequest
 
-    with one_clear_line(), open_commands(database) as commands:
-        answer = commands.clear_bench(bench, ClearRequest(by=by, reason=reason))
+    with one_clear_line():
+        answer = execute(database, CLEAR_BENCH, ToBench(bench, ClearRequest(by=by, reason=reason)))
     print_json(answer) if as_json else console.print(f"{answer.name}: nothing is unconfirmed", markup=False)
 
 
