@@ -14,7 +14,7 @@ from labctl.errors import StoreError
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.execution import describe_safe_state
-from labctl.services.campaigns.status import from_rows, looked_after
+from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses_of
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.service import ServiceControl
@@ -99,18 +99,21 @@ class LabService:
 
     def status(self, campaign: int) -> CampaignResponse:
         """Return where a campaign is: live when it runs here, else as the database tells."""
-        live = self.bench_runner.status(campaign) if self.bench_runner is not None else None
-        if live is not None:
+        if (live := self._live(campaign)) is not None:
             return live
         row = self.store.campaigns.get(campaign)
-        return looked_after(from_rows(self.store, row), by_somebody=self._runs(campaign))
+        return mark_abandoned(from_rows(self.store, row), attended=self._runs(campaign))
+
+    def _live(self, campaign: int) -> CampaignResponse | None:
+        return None if self.bench_runner is None else self.bench_runner.status(campaign)
 
     def _runs(self, campaign: int) -> bool:
         return self.bench_runner is not None and self.bench_runner.runs(campaign)
 
     def campaigns(self) -> list[CampaignResponse]:
         """Return every campaign, newest first."""
-        return [self.status(row.id) for row in self.store.campaigns.all()]
+        stored = statuses_of(self.store, self.store.campaigns.all())
+        return [self._live(each.id) or mark_abandoned(each, attended=self._runs(each.id)) for each in stored]
 
     def follow(self, campaign: int, after: int) -> AsyncIterator[EventResponse | CampaignResponse | None]:
         """Yield where a campaign is, as `CampaignEventStream.follow` does, until it ends or this service does."""
@@ -134,7 +137,7 @@ class LabService:
 
     def metrics(self) -> dict[str, float]:
         """Return figures for a monitor."""
-        states = [row.state for row in self.store.campaigns.all()]
+        states = self.store.campaigns.states()
         return {
             "labctl_units": float(len(self.store.units.all())),
             "labctl_campaigns": float(len(states)),

@@ -101,7 +101,7 @@ class CampaignEventStream:
         """
 
         def look() -> tuple[str, list[EventResponse]]:
-            state = self._store.campaigns.get(campaign).state
+            state = self._store.campaigns.state(campaign)
             return state, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
 
         return await self._status_cache.at(("told", campaign, after), look)
