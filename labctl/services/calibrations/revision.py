@@ -23,7 +23,7 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.recording import Recording
-from labctl.services.cache import cached
+from labctl.services.cache import RecentResults, cached
 from labctl.services.criticism.criticise import version_of
 from labctl.services.criticism.evaluation import load_reduced_readings, model_of
 from labctl.services.criticism.residuals import residual_columns
@@ -35,10 +35,6 @@ from labctl.services.schemas.calibrations import (
 )
 from labctl.services.schemas.criticism import ResidualColumns
 from labctl.store import CalibrationRecord, NewCalibration, Store
-
-#: Changes whose fits are at hand, by what was asked.
-_RECENT: dict[str, _Change] = {}
-MOST_RECENT = 4
 
 
 @dataclass(frozen=True)
@@ -59,6 +55,10 @@ class _Change:
             **self.after.to_json(), "recording": self.recording, "improved_from": self.row.version,
             "before": self.before.error.to_dict(), "plausible": plausible(self.after, technology),
         }  # fmt: skip
+
+
+#: Changes that were fitted a moment ago: a preview is often kept as the next version.
+_RECENT: RecentResults[_Change] = RecentResults(most=4)
 
 
 def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> FitResponse:
@@ -111,15 +111,11 @@ def _residuals(store: Store, change: _Change) -> ResidualColumns:
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
-    """Fit a changed model, or take the fit of a moment ago: who has looked at a preview often keeps it next."""
+    """Fit a changed model, or return the fit of a moment ago."""
     row = version_of(store, serial, request.version)
     number = newest_recording(store, serial, request.recording)
     asked = json.dumps(_question(store, row, number, request), sort_keys=True)
-    change = _RECENT.get(asked) or _fitted(store, row, number, request)
-    _RECENT[asked] = change
-    for old in list(_RECENT)[:-MOST_RECENT]:
-        _RECENT.pop(old, None)
-    return change
+    return _RECENT.get(asked, lambda: _fitted(store, row, number, request))
 
 
 def _refuse_what_changes_nothing(
