@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
+from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
-from instruments.drivers.unit_handlers import ManualUnitHandler
 from labctl.errors import BadInput, Conflict
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.benches.host import boot_id
