@@ -184,7 +184,7 @@ def _verdict(
         world.within_limits,
         _safe(world),
         difference_dps(fitted(store, campaign), expected) if row.state == "done" else np.inf,
-        store.interruptions.standing(campaign).added_runs > 0,
+        store.resume_points.of_campaign(campaign).added_runs > 0,
     )
     store.close()
     return verdict

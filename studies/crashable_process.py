@@ -19,7 +19,7 @@ from instruments.clock import VirtualClock
 from instruments.simulation import Simulation, open_simulation
 from instruments.simulators.links.device import SimulatedDevice
 from labctl.store.connection.database import Database
-from labctl.store.repositories.recordings import blocks_of
+from labctl.store.repositories.sample_blocks import blocks_of
 from labctl.store.schema import tables
 
 

@@ -25,6 +25,7 @@ from labctl.services.campaigns.preparation import clock_for
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
+from procedures.execution.signals import signal_handlers
 
 SIMULATED_BENCH = "triaxial-sim"
 LAST_PORT = 65535
@@ -103,14 +104,13 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> str:
         server = uvicorn.Server(settings)
         listener.listen(server.config.backlog)  # whoever reads the address may connect at once
         ready(url)
-        signal.signal(
-            signal.SIGHUP, lambda *_: setattr(server, "should_exit", True)
-        )  # a lost terminal ends it in order
-        try:
-            with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how it is stopped
-                server.run(sockets=[listener])
-        finally:
-            service.close()  # a second Ctrl-C makes the server skip it
+        lost_terminal = {signal.SIGHUP: lambda *_: setattr(server, "should_exit", True)}
+        with signal_handlers(lost_terminal):
+            try:
+                with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how it is stopped
+                    server.run(sockets=[listener])
+            finally:
+                service.close()  # a second Ctrl-C makes the server skip it
         return service.left
 
 

@@ -22,7 +22,8 @@ from labctl.cli.commands import (
     recordings,
     schedule,
     server,
-)  # fmt: skip
+)
+from labctl.cli.error_reporting import process_of_one_command
 from labctl.config import os_user
 
 app = typer.Typer(
@@ -81,5 +82,6 @@ def everywhere(
 
 
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line, as the process that it is."""
+    with process_of_one_command():
+        app()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from labctl.services.schemas.campaigns import (
     EventResponse,
 )
 from labctl.store import Store
-from procedures.execution.signals import add_shutdown_hook
+from procedures.execution.signals import shutdown_hook
 
 
 class LabService:
@@ -39,6 +40,7 @@ class LabService:
         self._event_stream = CampaignEventStream(store, self.status, None if runner is None else runner.listen)
         self._opened_at = clock.utc()
         self._stops = self._closed = False
+        self._hooks = ExitStack()
         self.left = ""  #: once it is closed: how the bench was left
 
     @property
@@ -52,7 +54,7 @@ class LabService:
         What is due waits for that campaign. A signal to end is handled here first: an HTTP server waits for its
         requests before it closes the service, and a client may follow a campaign for hours.
         """
-        add_shutdown_hook(self.end_soon)
+        self._hooks.enter_context(shutdown_hook(self.end_soon))
         with acting(ITSELF):  # no request asked for it
             if self.bench_runner is not None:
                 self.bench_runner.resume_unfinished()
@@ -72,12 +74,13 @@ class LabService:
         if self._closed:
             return
         self._closed = True
-        if self.scheduler is not None:
-            self.scheduler.close()
-        if self.bench_runner is not None:
-            self.bench_runner.close()
-            self.left = self._how_left(self.bench_runner)
-        self.store.close()
+        with self._hooks:
+            if self.scheduler is not None:
+                self.scheduler.close()
+            if self.bench_runner is not None:
+                self.bench_runner.close()
+                self.left = self._how_left(self.bench_runner)
+            self.store.close()
 
     def _how_left(self, runner: BenchRunner) -> str:
         bench = runner.bench.name

@@ -1,11 +1,13 @@
-"""The only room that knows SQL: open a Store, and ask its shelves."""
+"""The database: a Store has one repository for each kind of record. No other package knows SQL."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from labctl.store.connection.database import Database, Holder, holder_of, is_url
+from labctl.store.connection.database import Database
+from labctl.store.connection.location import is_url
+from labctl.store.connection.writer_lock import Holder, holder_of
 from labctl.store.integrity.backup import Copy, copy_database
 from labctl.store.integrity.check import Checked, Finding, Progress, check
 from labctl.store.records import (
@@ -31,7 +33,7 @@ from labctl.store.repositories.journal import StoreJournal
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.recordings import Recordings
-from labctl.store.repositories.resume_points import Interruptions, ResumePoint, TakeUp
+from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, TakeUp
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.repositories.units import Units
 
@@ -54,7 +56,6 @@ __all__ = [
     "Finding",
     "Head",
     "Holder",
-    "Interruptions",
     "KeyRow",
     "Keys",
     "LeaseRow",
@@ -68,6 +69,7 @@ __all__ = [
     "RecordingRow",
     "Recordings",
     "ResumePoint",
+    "ResumePoints",
     "StartEventRow",
     "StartRow",
     "Starts",
@@ -85,14 +87,14 @@ __all__ = [
 
 
 class Store:
-    """A database and its shelves."""
+    """An open database with its repositories."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
         self.units = Units(database)
         self.recordings = Recordings(database)
         self.campaigns = Campaigns(database)
-        self.interruptions = Interruptions(database)
+        self.resume_points = ResumePoints(database)
         self.benches = Benches(database)
         self.calibrations = Calibrations(database)
         self.audit = Audit(database)
@@ -114,10 +116,6 @@ class Store:
     def is_sole_writer(self) -> bool:
         """Whether no other process can write to the database as long as this one holds it."""
         return self._database.writes and not is_url(self.location)
-
-    def announce(self, url: str) -> None:
-        """Say at which address the holder of this database can be asked to write."""
-        self._database.announce(url)
 
     def close(self) -> None:
         """Close the database."""

@@ -1,21 +1,43 @@
-"""A data set's figures, channel by channel: written when it closes, read back as points."""
+"""The figures of one data set, channel by channel: mean, standard deviation, white level and number of readings."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import sqlalchemy as sa
 from numpy.typing import NDArray
 
-from labctl.store.dataset_statistics import statistics
-from labctl.store.schema import tables
+from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
 #: Columns that are no measured channel, so have no mean of their own.
 NOT_CHANNELS = frozenset(
     {"dataset", "t_s", "position", "run", "mounting", "table_rate_dps", "table_angle_deg", "power_s", "valid"}
 )
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Figures of one channel in one data set, in the channel's unit."""
+
+    mean: float | None
+    std: float | None
+    white_std: float | None
+    n: int
+
+
+def statistics(values: NDArray[np.float64], *, spectrum: bool) -> Statistics:
+    """Return the figures of valid readings (n,); the white level only with `spectrum`."""
+    n = len(values)
+    if n == 0:
+        return Statistics(None, None, None, 0)
+    return Statistics(
+        float(values.mean()),
+        float(values.std(ddof=1)) if n > 1 else None,
+        white_std(values) if spectrum and n >= LEAST_FOR_SPECTRUM else None,
+        n,
+    )
 
 
 def means_rows(
@@ -39,46 +61,3 @@ def means_rows(
             }
         )
     return rows
-
-
-def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArray[Any]]:
-    """Return the points of a recording's complete data sets, column by column, from rows alone."""
-    d, m = tables.data_sets.c, tables.data_set_means.c
-    heads = connection.execute(
-        sa.select(
-            d.number, d.position, d.run, d.mounting, d.table_rate_dps, d.table_angle_deg, d.chamber_setpoint_c,
-            d.gate_from_s, d.gate_until_s, d.power_on_s, d.n,
-        )
-        .where(d.recording_id == recording, d.state == "complete", d.n > 0)
-        .order_by(d.number)
-    ).all()  # fmt: skip
-    index = {row[0]: i for i, row in enumerate(heads)}
-    columns: dict[str, NDArray[Any]] = {"dataset": np.array([row[0] for row in heads], dtype=np.int64)}
-    begin, end = _floats(heads, 7), _floats(heads, 8)
-    columns["t_s"], columns["duration_s"] = (begin + end) / 2, end - begin
-    columns["position"] = np.array([row[1] for row in heads], dtype=np.str_)
-    columns["run"] = np.array([row[2] for row in heads], dtype=np.int64)
-    columns["mounting"] = np.array([row[3] for row in heads], dtype=np.int64)
-    columns["table_rate_dps"] = _floats(heads, 4)
-    known = {
-        "table_angle_deg": _floats(heads, 5),
-        "chamber_setpoint_c": _floats(heads, 6),
-        "power_s": columns["t_s"] - _floats(heads, 9),
-    }
-    columns |= {name: values for name, values in known.items() if np.isfinite(values).all()}
-    columns["n"] = np.array([row[10] for row in heads], dtype=np.int64)
-    means = connection.execute(
-        sa.select(m.channel, m.number, m.mean, m.std, m.white_std).where(m.recording_id == recording)
-    )
-    for channel, number, mean, std, white in means:
-        if number not in index:
-            continue
-        row = index[number]
-        for name, value in ((channel, mean), (f"{channel}_std", std), (f"{channel}_white_std", white)):
-            if value is not None and (name == channel or channel.startswith("gyro_")):
-                columns.setdefault(name, np.full(len(heads), np.nan))[row] = value
-    return {name: values for name, values in columns.items() if values.dtype.kind != "f" or np.isfinite(values).all()}
-
-
-def _floats(rows: Any, column: int) -> NDArray[np.float64]:
-    return np.array([np.nan if row[column] is None else row[column] for row in rows], dtype=np.float64)

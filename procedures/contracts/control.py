@@ -1,58 +1,70 @@
-"""How another thread asks a running campaign to pause, go on or end. The engine looks at it at least once a second."""
+"""How another thread asks a running campaign to pause, go on or end. The engine polls it at least once a second."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
 class ControlRequest:
-    """What a person wants of the campaign at present."""
+    """What is asked of the campaign at present."""
 
     pause: bool = False
     abort: bool = False
-    taken_up: bool = False  #: after an abort: the campaign is not over, somebody takes it up
+    resumable: bool = False  #: after an abort: the campaign is only interrupted and is to be resumed
     reason: str = ""
 
 
-class Control:
-    """A wish that may be read and changed from any thread. Abort is final."""
+def _no_loss() -> str:
+    return ""
 
-    def __init__(self) -> None:
-        self._lock = threading.RLock()  # a signal may come while its own thread is in here
-        self._wish = ControlRequest()
+
+class Control:
+    """A request that any thread may read and change. An abort is final.
+
+    `loss` returns why the bench may no longer be driven from here, and an empty text while it may. Only `poll` calls
+    it; reading `request` changes nothing.
+    """
+
+    def __init__(self, loss: Callable[[], str] = _no_loss) -> None:
+        self._lock = threading.RLock()  # a signal handler may run in the thread that holds it
+        self._request = ControlRequest()
+        self._loss = loss
 
     @property
-    def wish(self) -> ControlRequest:
-        """The present wish."""
-        return self._wish
+    def request(self) -> ControlRequest:
+        """The present request."""
+        return self._request
+
+    def poll(self) -> ControlRequest:
+        """Interrupt the campaign if the bench may no longer be driven; returns the present request.
+
+        For the thread that drives the bench.
+        """
+        if reason := self._loss():
+            self.interrupt(reason)
+        return self._request
 
     def pause(self, reason: str = "asked by a person") -> None:
         """Ask to hold after the data set that is being taken; the environment is still recorded."""
-        self._change(pause=True, reason=reason)
+        self._change(lambda now: replace(now, pause=True, reason=reason))
 
     def resume(self, reason: str = "asked by a person") -> None:
         """Ask to go on."""
-        self._change(pause=False, reason=reason)
+        self._change(lambda now: replace(now, pause=False, reason=reason))
 
     def abort(self, reason: str = "asked by a person") -> None:
         """Ask for the end, now and in the safe state."""
-        self._change(abort=True, reason=reason)
+        self._change(lambda now: replace(now, abort=True, reason=reason))
 
     def interrupt(self, reason: str) -> None:
-        """Ask to let the bench go, now and in the safe state; the campaign is to be taken up."""
-        self._change(abort=True, taken_up=True, reason=reason)
+        """Ask to release the bench, now and in the safe state; the campaign is to be resumed."""
+        self._change(lambda now: replace(now, abort=True, resumable=True, reason=reason))
 
-    def _change(
-        self, *, reason: str, pause: bool | None = None, abort: bool | None = None, taken_up: bool = False
-    ) -> None:
+    def _change(self, change: Callable[[ControlRequest], ControlRequest]) -> None:
+        """Change the request, unless it is an abort already."""
         with self._lock:
-            if self._wish.abort:
-                return
-            wish = replace(self._wish, reason=reason)
-            if pause is not None:
-                wish = replace(wish, pause=pause)
-            if abort is not None:
-                wish = replace(wish, abort=abort, taken_up=taken_up)
-            self._wish = wish
+            if not self._request.abort:
+                self._request = change(self._request)

@@ -1,4 +1,4 @@
-"""What can go wrong on the first floor. One clear line each: what, where, value, unit, limit and what to do.
+"""The errors of procedures. The text of each is one line: what, where, value, unit, limit and what to do.
 
 ProcedureError
 ├── RecipeError          a recipe cannot be read: file, key and what was expected
@@ -9,7 +9,7 @@ ProcedureError
 │   ├── GuardTripped     a limit that is watched was passed
 │   └── Unanswered       nobody answered a question in time
 ├── Aborted              a person asked for the end
-│   └── Interrupted      the bench had to be let go; somebody takes the campaign up
+│   └── Interrupted      the bench had to be released; the campaign is to be resumed
 └── StalePrompt          an answer to a question that is no longer asked
 """
 
@@ -73,7 +73,7 @@ class Aborted(ProcedureError):
 
 
 class Interrupted(Aborted):
-    """The bench had to be let go; the campaign is to be taken up."""
+    """The bench had to be released; the campaign is to be resumed."""
 
 
 class StalePrompt(ProcedureError):

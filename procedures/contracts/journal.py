@@ -19,7 +19,7 @@ class CampaignState(StrEnum):
     RUNNING = "running"
     PAUSED = "paused"
     WAITING = "waiting"  #: for a person: a mounting to confirm
-    INTERRUPTED = "interrupted"  #: whoever ran it had to let the bench go; to be taken up
+    INTERRUPTED = "interrupted"  #: the bench had to be released; to be resumed
     DONE = "done"
     ABORTED = "aborted"
     FAILED = "failed"

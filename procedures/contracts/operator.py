@@ -33,11 +33,11 @@ class Answer:
 
 
 class Operator(Protocol):
-    """Somebody who can be asked. The engine asks once and then looks for the answer about once a second."""
+    """The one who turns and switches the units. The engine asks once, then polls for the answer about once a second."""
 
     @property
     def at_once(self) -> bool:
-        """Whether answers come without anybody having to walk up."""
+        """Whether answers come without a person at the bench."""
         ...
 
     def ask(self, prompt: Prompt) -> None:
@@ -54,7 +54,7 @@ class Operator(Protocol):
 
 
 class UnitHandlerOperator:
-    """Somebody who does at once what is asked, with a hand that reaches into the simulated bench."""
+    """Answers at once: a unit handler carries out what is asked, as on a simulated bench."""
 
     at_once = True
 

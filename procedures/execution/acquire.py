@@ -20,7 +20,7 @@ BLOCK_S = 1.0  #: readings are written down this often
 SHARED_BLOCK_S = 0.5
 
 
-def acquire(stage: ExecutionContext, step: Acquire) -> dict[str, float]:
+def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     """Take one data set, again where a unit's readings failed and the recipe allows another attempt.
 
     Raises StepFailed, InstrumentError, Aborted.
@@ -29,74 +29,74 @@ def acquire(stage: ExecutionContext, step: Acquire) -> dict[str, float]:
     while True:
         attempt += 1
         try:
-            return _take(stage, step)
+            return _take(context, step)
         except (LinkError, BadData, GuardTripped) as error:
-            unit = _unit_at_fault(stage, error)
+            unit = _unit_at_fault(context, error)
             if unit is None:
                 raise
-            if attempt >= stage.recipe.on_failure.acquire_attempts:
-                if not stage.can_drop(unit):
+            if attempt >= context.recipe.on_failure.acquire_attempts:
+                if not context.can_drop(unit):
                     raise
-                stage.drop(unit, str(error))
+                context.drop(unit, str(error))
                 attempt = 0  # the others had no fault of their own yet
-            stage.log.event(warning("data_set_repeated", f"data set {step.dataset} is taken again: {error}"))
-            stage.bench.table.stop()
-            reopen(stage)
+            context.recorder.event(warning("data_set_repeated", f"data set {step.dataset} is taken again: {error}"))
+            context.bench.table.stop()
+            reopen(context)
 
 
-def reopen(stage: ExecutionContext) -> None:
+def reopen(context: ExecutionContext) -> None:
     """Open every unit's stream anew; a unit that cannot be reached drops out where others go on."""
-    for name, gyro in list(stage.bench.gyros.items()):
+    for name, gyro in list(context.bench.gyros.items()):
         try:
             gyro.stop()
             gyro.start()
         except LinkError as error:
-            if not stage.can_drop(name):
+            if not context.can_drop(name):
                 raise
-            stage.drop(name, str(error))
+            context.drop(name, str(error))
 
 
-def _unit_at_fault(stage: ExecutionContext, error: LinkError | BadData | GuardTripped) -> str | None:
+def _unit_at_fault(context: ExecutionContext, error: LinkError | BadData | GuardTripped) -> str | None:
     """Return the unit whose readings failed; None when it is something else, or a limit that suspends."""
     if isinstance(error, GuardTripped) and (error.kind not in UNIT_FAULTS or error.action != "fail"):
         return None
     unit = error.gyro if isinstance(error, BadData) else error.device
-    return unit if unit in stage.bench.gyros else None
+    return unit if unit in context.bench.gyros else None
 
 
-def _take(stage: ExecutionContext, step: Acquire) -> dict[str, float]:
-    ramp_s = abs(step.rate_dps) / stage.bench.table.limits.max_acceleration_dps2
-    if stage.watch.due(within_s=ramp_s):
-        stage.look()
-    spin = stage.bench.table.spin(step.rate_dps, _steady_s(stage, step))
+def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
+    ramp_s = abs(step.rate_dps) / context.bench.table.limits.max_acceleration_dps2
+    if context.monitor.is_due(within_s=ramp_s):
+        context.poll()
+    spin = context.bench.table.spin(step.rate_dps, _steady_s(context, step))
     gate = _gate(spin, step)
-    tallies = {
-        name: ReadingCounts(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in stage.bench.gyros.items()
+    counts = {
+        name: ReadingCounts(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in context.bench.gyros.items()
     }
-    with stage.watch.taking_readings(spin, tallies):
-        stage.look()
-        _wait_for_gate(stage, gate[0])
-        number = stage.log.journal.dataset_opened(_header(stage, step, spin, gate))
+    with context.monitor.taking_readings(spin, counts):
+        context.poll()
+        _wait_for_gate(context, gate[0])
+        number = context.recorder.journal.dataset_opened(_header(context, step, spin, gate))
         try:
-            _read_gate(stage, number, gate, tallies)
-            if stage.watch.due(within_s=ramp_s + LEAD_S):
-                stage.look(read_latest=False)
-            stage.bench.table.settle(spin)  # a run that does not end as computed was not the run it was taken for
-            _demand_readings(tallies)
+            _read_gate(context, number, gate, counts)
+            if context.monitor.is_due(within_s=ramp_s + LEAD_S):
+                context.poll(read_latest=False)
+            context.bench.table.settle(spin)  # a run that does not end as computed was not the run it was taken for
+            _demand_readings(counts)
         except BaseException as error:
             reason = str(error) or type(error).__name__
-            stage.log.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
+            context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
             raise
-    stage.log.journal.dataset_closed(number, DataSetState.COMPLETE)
-    counts = {f"readings.{name}": float(tally.valid + tally.invalid) for name, tally in tallies.items()}
-    return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **counts}
+    context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
+    taken = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
+    return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **taken}
 
 
-def _steady_s(stage: ExecutionContext, step: Acquire) -> float:
+def _steady_s(context: ExecutionContext, step: Acquire) -> float:
     """Return how long the table has to be steady: settling, the gate rounded up to step edges, and the last block."""
-    step_deg = stage.bench.table.limits.step_deg
+    step_deg = context.bench.table.limits.step_deg
     edges_s = 2 * step_deg / abs(step.rate_dps) if step.rate_dps else 0.0
-    last_block_s = LEAD_S + sum(3 / gyro.sample_rate_hz for gyro in stage.bench.gyros.values())
+    last_block_s = LEAD_S + sum(3 / gyro.sample_rate_hz for gyro in context.bench.gyros.values())
     return step.settle_s + step.duration_s + edges_s + last_block_s
 
 
@@ -111,58 +111,58 @@ def _gate(spin: Spin, step: Acquire) -> tuple[float, float]:
     return from_s, until_s
 
 
-def _wait_for_gate(stage: ExecutionContext, from_s: float) -> None:
+def _wait_for_gate(context: ExecutionContext, from_s: float) -> None:
     """Let the table settle, then drop what the streams have buffered meanwhile, unless the gate is open already."""
-    stage.pass_time(from_s - LEAD_S - stage.clock.now_s(), pausing=False)
-    if stage.clock.now_s() >= from_s:
+    context.pass_time(from_s - LEAD_S - context.clock.now_s(), pausing=False)
+    if context.clock.now_s() >= from_s:
         return
-    for name, gyro in stage.bench.gyros.items():
-        stage.watch.heard(name, gyro, gyro.read_latest())
+    for name, gyro in context.bench.gyros.items():
+        context.monitor.add_readings(name, gyro, gyro.read_latest())
 
 
-def _header(stage: ExecutionContext, step: Acquire, spin: Spin, gate: tuple[float, float]) -> DataSetHeader:
+def _header(context: ExecutionContext, step: Acquire, spin: Spin, gate: tuple[float, float]) -> DataSetHeader:
     return DataSetHeader(
         step=step,
         rate_dps=spin.rate_dps,
         asked_dps=spin.asked_dps,
-        gate_from_s=gate[0] - stage.log.start_s,
-        gate_until_s=gate[1] - stage.log.start_s,
+        gate_from_s=gate[0] - context.recorder.start_s,
+        gate_until_s=gate[1] - context.recorder.start_s,
         angle_from_deg=float(spin.angle_deg(np.array([gate[0]]))[0]),
-        setpoint_c=stage.watch.setpoint_c,
-        run=step.run + stage.added_runs,
-        gyros=tuple(stage.bench.gyros),
+        setpoint_c=context.monitor.setpoint_c,
+        run=step.run + context.added_runs,
+        gyros=tuple(context.bench.gyros),
     )
 
 
 def _read_gate(
-    stage: ExecutionContext, number: int, gate: tuple[float, float], tallies: dict[str, ReadingCounts]
+    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts]
 ) -> None:
-    gyros = stage.bench.gyros
+    gyros = context.bench.gyros
     block_s = BLOCK_S if len(gyros) == 1 else SHARED_BLOCK_S
-    while (left_s := gate[1] - stage.clock.now_s()) > 0:
-        _read_round(stage, number, gate, tallies, min(block_s, left_s) / len(gyros))
-        if stage.watch.due(within_s=block_s):
-            stage.look(read_latest=False)
+    while (left_s := gate[1] - context.clock.now_s()) > 0:
+        _read_round(context, number, gate, counts, min(block_s, left_s) / len(gyros))
+        if context.monitor.is_due(within_s=block_s):
+            context.poll(read_latest=False)
         else:
-            raise_violation(stage.watch.judge())
-        stage.checkpoint()
-    if len(gyros) > 1:  # whoever was read first in the last round still has the end of the gate in its buffer
-        _read_round(stage, number, gate, tallies, 0.0)
-        raise_violation(stage.watch.judge())
+            raise_violation(context.monitor.check_guards())
+        context.checkpoint()
+    if len(gyros) > 1:  # the unit read first in the last round still has the end of the gate in its buffer
+        _read_round(context, number, gate, counts, 0.0)
+        raise_violation(context.monitor.check_guards())
 
 
 def _read_round(
-    stage: ExecutionContext, number: int, gate: tuple[float, float], tallies: dict[str, ReadingCounts], slice_s: float
+    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts], slice_s: float
 ) -> None:
     """Read every unit once and write down what falls into the gate."""
-    for name, gyro in stage.bench.gyros.items():
+    for name, gyro in context.bench.gyros.items():
         readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
         if len(readings):
-            stage.watch.heard(name, gyro, readings)
-        kept = cut(readings, gate, stage.log.start_s)
+            context.monitor.add_readings(name, gyro, readings)
+        kept = cut(readings, gate, context.recorder.start_s)
         if len(kept) or kept.lost or kept.damaged:
-            tallies[name].add(kept)
-            stage.log.journal.readings(number, name, kept, stage.watch.chamber_c)
+            counts[name].add(kept)
+            context.recorder.journal.readings(number, name, kept, context.monitor.chamber_c)
 
 
 def cut(readings: Readings, gate: tuple[float, float], start_s: float) -> Readings:
@@ -175,9 +175,9 @@ def cut(readings: Readings, gate: tuple[float, float], start_s: float) -> Readin
     return Readings(t_s[inside] - start_s, raw, readings.valid[inside], readings.lost, readings.damaged)
 
 
-def _demand_readings(tallies: dict[str, ReadingCounts]) -> None:
-    for name, tally in tallies.items():
-        if tally.valid + tally.invalid == 0:
+def _demand_readings(counts: dict[str, ReadingCounts]) -> None:
+    for name, count in counts.items():
+        if count.valid + count.invalid == 0:
             raise BadData(
-                name, f"not one of about {tally.expected:.0f} readings came; check cable, power and baud rate"
+                name, f"not one of about {count.expected:.0f} readings came; check cable, power and baud rate"
             )

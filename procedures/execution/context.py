@@ -1,31 +1,30 @@
-"""What a step works with: the bench, the watch and time that passes under control."""
+"""What a step works with: the bench, its monitor, the recorder, and time that passes under control of requests."""
 
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
-from procedures.contracts.active_bench import ActiveBench
 from procedures.contracts.bench import Bench
 from procedures.contracts.control import Control
-from procedures.contracts.errors import Aborted, Interrupted, StepFailed, Unanswered
+from procedures.contracts.errors import Aborted, Interrupted
 from procedures.contracts.journal import CampaignState, Event
-from procedures.contracts.operator import Answer, Operator, Prompt
+from procedures.contracts.operator import Operator
 from procedures.contracts.steps import Soak
+from procedures.execution.active_bench import ActiveBench
 from procedures.monitoring.guards import GuardViolation
 from procedures.monitoring.monitor import BenchMonitor
-from procedures.monitoring.recorder import CampaignRecorder, warning
+from procedures.monitoring.recorder import CampaignRecorder
 from procedures.recipe.recipe import Recipe
 
-CHECK_S = 1.0  #: how long the clock runs at most between two looks at what a person wants
-#: From look to look. With a second of reading and a unit's reply in between, rows of the environment are never more
+CHECK_S = 1.0  #: how long the clock runs at most between two looks at the control
+#: From poll to poll. With a second of reading and a unit's reply in between, rows of the environment are never more
 #: than 10 s apart, which is what effects with a memory need.
-LOOK_S = 8.5
-UNIT_FAULTS = {"stale", "damaged_readings", "invalid_readings"}  #: a trip that is one unit's own
+POLL_S = 8.5
+UNIT_FAULTS = {"stale", "damaged_readings", "invalid_readings"}  #: guards whose violation is one unit's own
 
 
 @dataclass
@@ -34,64 +33,65 @@ class ExecutionContext:
 
     recipe: Recipe
     bench: ActiveBench
-    whole: Bench  #: with the units that dropped out
+    full_bench: Bench  #: with the units that dropped out
     clock: Clock
     operator: Operator
     control: Control
-    log: CampaignRecorder
-    watch: BenchMonitor
+    recorder: CampaignRecorder
+    monitor: BenchMonitor
     added_runs: int = 0  #: powered sessions more than the plan has
     paused_s: float = 0.0  #: how long the campaign was paused so far
     soaked: Soak | None = None  #: the soak that still holds: its temperature has not been left since
-    _questions: int = field(default=0, repr=False)
+    owed_soak: Soak | None = None  #: the soak to be done again before the next data set
+    _prompts: int = field(default=0, repr=False)
 
     def checkpoint(self) -> None:
-        """Obey a wish to abort. Raises Aborted."""
-        wish = self.control.wish
-        if wish.abort:
-            raise Interrupted(wish.reason) if wish.taken_up else Aborted(wish.reason)
+        """Obey a request to end. Raises Interrupted for a campaign that is to be resumed, else Aborted."""
+        request = self.control.poll()
+        if request.abort:
+            raise Interrupted(request.reason) if request.resumable else Aborted(request.reason)
 
     def pass_time(self, duration_s: float, *, pausing: bool = True) -> None:
-        """Let the clock run, looking at least once a second at what a person wants. Raises Aborted."""
+        """Let the clock run, with a checkpoint at least once a second. Raises Aborted."""
         until_s = self.clock.now_s() + duration_s
         self.checkpoint()
         while (left_s := until_s - self.clock.now_s()) > 0:
             self.clock.sleep(min(CHECK_S, left_s))
             self.checkpoint()
-            if pausing and self.control.wish.pause:
+            if pausing and self.control.request.pause:
                 self.hold()
 
-    def looks(self, *, pausing: bool = True) -> Iterator[None]:
-        """Look at the bench now and then every few seconds until the caller has seen enough.
+    def polls(self, *, pausing: bool = True) -> Iterator[None]:
+        """Poll the bench now and then every `POLL_S` for as long as the caller iterates.
 
         Raises Aborted, GuardTripped, InstrumentError.
         """
         while True:
-            self.look()
+            self.poll()
             yield
-            self.pass_time(LOOK_S, pausing=pausing)
+            self.pass_time(POLL_S, pausing=pausing)
 
-    def watch_for(self, duration_s: float) -> None:
-        """Let time pass with the environment recorded."""
+    def record_for(self, duration_s: float) -> None:
+        """Let time pass with the environment recorded. Raises what `polls` raises."""
         until_s = self.clock.now_s() + duration_s
-        self.look()
+        self.poll()
         while (left_s := until_s - self.clock.now_s()) > 0:
-            self.pass_time(min(LOOK_S, left_s))
-            self.look()
+            self.pass_time(min(POLL_S, left_s))
+            self.poll()
 
-    def look(self, *, read_latest: bool = True) -> None:
-        """Look at the bench once. Raises GuardTripped for a limit that does more than warn, and InstrumentError."""
-        trips = self.watch.look(LOOK_S, read_latest=read_latest)
-        raise_violation(trips if self.watch.taking else self.without_dropouts(trips))
+    def poll(self, *, read_latest: bool = True) -> None:
+        """Poll the bench once. Raises GuardTripped for a limit that does more than warn, and InstrumentError."""
+        violations = self.monitor.poll(POLL_S, read_latest=read_latest)
+        raise_violation(violations if self.monitor.is_taking_readings else self.without_dropouts(violations))
 
-    def without_dropouts(self, trips: list[GuardViolation]) -> list[GuardViolation]:
-        """Let units drop out whose readings failed while others go on; returns the other trips."""
+    def without_dropouts(self, violations: list[GuardViolation]) -> list[GuardViolation]:
+        """Drop the units whose readings failed while others go on; returns the other violations."""
         left = []
-        for trip in trips:
-            if trip.action == "fail" and trip.kind in UNIT_FAULTS and self.can_drop(trip.device):
-                self.drop(trip.device, trip.message)
+        for violation in violations:
+            if violation.action == "fail" and violation.kind in UNIT_FAULTS and self.can_drop(violation.device):
+                self.drop(violation.device, violation.message)
             else:
-                left.append(trip)
+                left.append(violation)
         return left
 
     def can_drop(self, device: str) -> bool:
@@ -101,85 +101,54 @@ class ExecutionContext:
     def drop(self, gyro: str, reason: str) -> None:
         """Let a unit take no further part; the others go on."""
         unit = self.bench.drop(gyro, reason)
-        self.watch.forget(gyro)
+        self.monitor.forget(gyro)
         with contextlib.suppress(InstrumentError, OSError):  # its stream is closed once more in the safe state
             unit.stop()
-        self.log.journal.unit_dropped(gyro, reason)
-        self.log.board.update(dropped=dict(self.bench.dropped))
-        self.log.event(Event("unit_dropped", f"{gyro} takes no further part: {reason}", level="error", device=gyro))
+        self.recorder.journal.unit_dropped(gyro, reason)
+        self.recorder.tracker.update(dropped=dict(self.bench.dropped))
+        text = f"{gyro} takes no further part: {reason}"
+        self.recorder.event(Event("unit_dropped", text, level="error", device=gyro))
 
     def hold(self) -> None:
-        """Stay as things are while a person wants a pause; the environment is recorded and guards stay armed."""
-        if not self.control.wish.pause:
+        """Stay as things are while a pause is requested; the environment is recorded and guards stay armed."""
+        if not self.control.request.pause:
             return
-        before, began_s = self.log.state, self.clock.now_s()
-        self.log.change_state(CampaignState.PAUSED, self.control.wish.reason)
-        next_look_s = began_s
-        with self.watch.telling(self.notice_leaving):
-            while self.control.wish.pause:
-                if self.clock.now_s() >= next_look_s:
-                    self.look()
-                    next_look_s = self.clock.now_s() + LOOK_S
+        before, began_s = self.recorder.state, self.clock.now_s()
+        self.recorder.change_state(CampaignState.PAUSED, self.control.request.reason)
+        next_poll_s = began_s
+        with self.monitor.listening(self.notice_leaving):
+            while self.control.request.pause:
+                if self.clock.now_s() >= next_poll_s:
+                    self.poll()
+                    next_poll_s = self.clock.now_s() + POLL_S
                 self.clock.sleep(CHECK_S)
                 self.checkpoint()
         self.paused_s += self.clock.now_s() - began_s
-        self.log.change_state(before, self.control.wish.reason)
+        self.recorder.change_state(before, self.control.request.reason)
 
     def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
-        """Forget that a temperature was taken once the air has left its band."""
+        """Take in that a soaked temperature no longer holds, once the air has left its band."""
         if self.soaked and abs(chamber_c - self.soaked.temperature_c) > self.soaked.band_c:
             text = f"{self.soaked.temperature_c:g} deg C was left: the air is at {chamber_c:.2f} deg C"
-            self.log.event(Event("soak_owed", text))
+            self.recorder.event(Event("soak_owed", text))
             self.soaked = None
 
-    def ask(self, prompt: Prompt) -> Answer:
-        """Ask a person and wait for the answer, with the environment recorded.
-
-        Raises StepFailed when the answer is no or does not come in time, and what `looks` raises.
-        """
-        self.log.event(Event("operator.asked", f"{prompt.text} [question {prompt.id}]"))
-        self.operator.ask(prompt)
-        answer = self.operator.answer(prompt.id)
-        if answer is None:
-            answer = self._wait_for(prompt)
-        if not answer.confirmed:
-            raise StepFailed(f"{answer.by} declined: {prompt.text}: {answer.reason}")
-        self.log.event(Event(f"operator.{prompt.kind}", f"{prompt.text}: confirmed by {answer.by}"))
-        return answer
-
-    def _wait_for(self, prompt: Prompt) -> Answer:
-        rules = self.recipe.on_failure
-        timeout_s, remind_s = rules.operator_timeout_s, rules.operator_remind_s or math.inf
-        began_s = next_look_s = self.clock.now_s()
-        remind_at_s = began_s + remind_s
-        self.log.board.update(prompt=prompt)
-        self.log.change_state(CampaignState.WAITING, prompt.text)
-        try:
-            while (answer := self.operator.answer(prompt.id)) is None:
-                if timeout_s is not None and self.clock.now_s() - began_s >= timeout_s:
-                    raise Unanswered(f"nobody answered within {timeout_s:g} s: {prompt.text}")
-                if self.clock.now_s() >= remind_at_s:
-                    remind_at_s += remind_s
-                    waited = f"since {self.clock.now_s() - began_s:.0f} s"
-                    self.log.event(warning("operator.reminded", f"{prompt.text} [question {prompt.id}], open {waited}"))
-                if self.clock.now_s() >= next_look_s:
-                    self.look()
-                    next_look_s = self.clock.now_s() + LOOK_S
-                self.pass_time(CHECK_S, pausing=False)
-        finally:
-            self.operator.withdraw(prompt.id)
-            self.log.board.update(prompt=None)
-        self.log.change_state(CampaignState.RUNNING, f"answered by {answer.by}")
-        return answer
+    @contextlib.contextmanager
+    def owing_soak(self) -> Iterator[None]:
+        """Owe the soak that holds now if its temperature is left while the block runs."""
+        soaked = self.soaked
+        yield
+        if soaked is not None and self.soaked is None:
+            self.owed_soak = soaked
 
     def new_prompt_id(self) -> str:
         """Return an id for a question that no other question of this or an earlier process has had."""
-        self._questions += 1
-        return f"{self.clock.utc():%Y%m%dT%H%M%S.%f}-{self._questions}"
+        self._prompts += 1
+        return f"{self.clock.utc():%Y%m%dT%H%M%S.%f}-{self._prompts}"
 
 
-def raise_violation(trips: list[GuardViolation]) -> None:
+def raise_violation(violations: list[GuardViolation]) -> None:
     """Raise GuardTripped for the first limit that does more than warn; one that fails goes before one that suspends."""
-    serious = [trip for trip in trips if trip.action != "warn"]
+    serious = [each for each in violations if each.action != "warn"]
     if serious:
-        raise min(serious, key=lambda trip: trip.action != "fail").error()
+        raise min(serious, key=lambda each: each.action != "fail").error()

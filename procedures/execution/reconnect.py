@@ -1,10 +1,10 @@
-"""Reaching an instrument again whose wire fell silent: bounded tries with growing pauses, then it is lost."""
+"""Reconnecting to an instrument that fell silent: a bounded number of tries with growing pauses."""
 
 from __future__ import annotations
 
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply
 from procedures.contracts.steps import Acquire, Home, MoveChamber, Rest, Soak, Step
-from procedures.execution.context import LOOK_S, ExecutionContext, raise_violation
+from procedures.execution.context import POLL_S, ExecutionContext, raise_violation
 
 PAUSES_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 STANDSTILL_S = 60.0
@@ -12,7 +12,7 @@ STANDSTILL_S = 60.0
 REPEATABLE = (Home, MoveChamber, Soak, Acquire, Rest)
 
 
-def is_reconnectable(stage: ExecutionContext, step: Step, error: LinkError) -> bool:
+def is_reconnectable(context: ExecutionContext, step: Step, error: LinkError) -> bool:
     """Return whether a step may be begun again once its instrument answers.
 
     A table that is silent or talks nonsense in the middle of a move may have lost steps or time, and a person has to
@@ -20,36 +20,35 @@ def is_reconnectable(stage: ExecutionContext, step: Step, error: LinkError) -> b
     """
     if not isinstance(step, REPEATABLE):
         return False
-    return error.device != stage.bench.table.name or not isinstance(error, NoReply | MalformedReply)
+    return error.device != context.bench.table.name or not isinstance(error, NoReply | MalformedReply)
 
 
-def reconnect(stage: ExecutionContext, error: LinkError) -> None:
+def reconnect(context: ExecutionContext, error: LinkError) -> None:
     """Wait until an instrument answers again. Raises the error when it stays silent, and GuardTripped."""
     device = error.device
-    stage.watch.link(device, "degraded", f"{error}; it is tried again, {len(PAUSES_S)} times")
+    context.monitor.links.change(device, "degraded", f"{error}; it is tried again, {len(PAUSES_S)} times")
     for pause_s in PAUSES_S:
-        stage.pass_time(pause_s, pausing=False)
-        trips = stage.without_dropouts(stage.watch.look(LOOK_S))
-        raise_violation(
-            [trip for trip in trips if trip.action == "fail"]
-        )  # what suspends is seen again when the step begins
+        context.pass_time(pause_s, pausing=False)
+        violations = context.without_dropouts(context.monitor.poll(POLL_S))
+        # a violation that suspends is found again when the step begins
+        raise_violation([each for each in violations if each.action == "fail"])
         try:
-            _reach(stage, device)
+            _reach(context, device)
         except InstrumentError:
             continue
-        stage.watch.link(device, "well")
+        context.monitor.links.change(device, "well")
         return
-    stage.watch.link(device, "lost", f"{error}; not reached again in {len(PAUSES_S)} tries")
+    context.monitor.links.change(device, "lost", f"{error}; not reached again in {len(PAUSES_S)} tries")
     raise error
 
 
-def _reach(stage: ExecutionContext, device: str) -> None:
-    bench = stage.bench
+def _reach(context: ExecutionContext, device: str) -> None:
+    bench = context.bench
     if device == bench.table.name:
         bench.table.stop()
-        until_s = stage.clock.now_s() + STANDSTILL_S
-        while bench.table.is_moving() and stage.clock.now_s() < until_s:
-            stage.pass_time(1.0, pausing=False)
+        until_s = context.clock.now_s() + STANDSTILL_S
+        while bench.table.is_moving() and context.clock.now_s() < until_s:
+            context.pass_time(1.0, pausing=False)
         bench.table.home()
     elif device == bench.chamber.name:
         bench.chamber.read()

@@ -12,7 +12,7 @@ from instruments.interfaces.table import RateTable
 from procedures.contracts.bench import Bench
 
 STANDSTILL_TIMEOUT_S = 30.0
-#: Before each further round of what could not be confirmed: a wire may come back.
+#: Before each further round of what could not be confirmed: a link may come back.
 PAUSES_S = (2.0, 10.0, 30.0)
 
 

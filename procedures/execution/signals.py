@@ -1,62 +1,91 @@
-"""Signals that must not cut short what leaves a bench safe."""
+"""Signals that must not cut short what leaves a bench safe. Each scope restores the handlers that it found.
+
+Only a process's main thread gets signals; in another thread none of these scopes does anything.
+"""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
+#: What `signal.signal` takes and returns; None for a handler that was not set by Python.
+Handler = Callable[[int, FrameType | None], Any] | int | None
+
+#: The signals that end a process.
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def add_shutdown_hook(noted: Callable[[], None]) -> None:
-    """Let `noted` hear of each signal to end before whoever handles it now; it may neither block nor raise.
+@contextmanager
+def signal_handlers(handlers: Mapping[signal.Signals, Handler]) -> Iterator[None]:
+    """Handle signals so while the block runs.
 
-    Nothing happens outside a process's main thread, or where nobody handles them.
+    A handler that something else has replaced by the end of the block is left alone.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if not is_main_thread():
+        yield
         return
+    before = {number: signal.getsignal(number) for number in handlers}
+    try:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        yield
+    finally:
+        restore({number: before[number] for number in handlers if signal.getsignal(number) is handlers[number]})
 
-    def telling(before: Callable[[int, Any], Any]) -> Callable[[int, Any], None]:
-        def tell(number: int, frame: Any) -> None:
-            noted()
-            before(number, frame)
 
-        return tell
+def restore(handlers: Mapping[signal.Signals, Handler]) -> None:
+    """Set handlers that were found earlier."""
+    if not is_main_thread():
+        return
+    for number, handler in handlers.items():
+        if handler is not None:
+            signal.signal(number, handler)
 
-    for number in ENDING:
-        if callable(before := signal.getsignal(number)):
-            signal.signal(number, telling(before))
+
+def is_main_thread() -> bool:
+    """Return whether this thread may set signal handlers."""
+    return threading.current_thread() is threading.main_thread()
 
 
 @contextmanager
-def ignore_signals(noted: Callable[[int], None] = lambda _: None) -> Iterator[None]:
-    """Let nobody interrupt the block by Ctrl-C or a signal; `noted` hears of each.
+def shutdown_hook(hook: Callable[[], None]) -> Iterator[None]:
+    """Call `hook` at each ending signal, before the handler found; it may neither block nor raise.
 
-    Every part of the safe state has an end of its own, so the block ends. Only a process's main thread gets signals;
-    in another thread there is nothing to hold back.
+    A signal that is ignored, or ends the process without a Python handler, does not call it.
     """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
 
-    def note(number: int, _frame: Any) -> None:
-        noted(number)
+    def before_the(handler: Callable[[int, FrameType | None], Any]) -> Handler:
+        def handle(number: int, frame: FrameType | None) -> None:
+            hook()
+            handler(number, frame)
 
-    before = {number: signal.signal(number, note) for number in ENDING}
-    try:
+        return handle
+
+    found = {number: signal.getsignal(number) for number in ENDING}
+    with signal_handlers({number: before_the(handler) for number, handler in found.items() if callable(handler)}):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+
+
+@contextmanager
+def ignore_signals(note: Callable[[int], None] = lambda _: None) -> Iterator[None]:
+    """Keep the ending signals from interrupting the block, which has to end by itself; `note` gets each number."""
+
+    def handle(number: int, _frame: FrameType | None) -> None:
+        note(number)
+
+    with signal_handlers(dict.fromkeys(ENDING, handle)):
+        yield
 
 
 @contextmanager
 def defer_signals() -> Iterator[None]:
-    """Let Ctrl-C or a signal come only after the block, which has to be short: a write that is torn in the middle
-    leaves a connection behind that nobody can write with, and then not even the end can be written.
+    """Let an ending signal take effect only after the block, which has to be short.
+
+    A write that is torn in the middle leaves a connection that takes no further write, not even that of the end.
     """
     heard: list[int] = []
     try:

@@ -11,7 +11,7 @@ from procedures.contracts.steps import Soak
 
 
 class SoakJudge:
-    """Told of every look at the bench, says when a unit has taken the temperature, and why not yet.
+    """Decides from the polls of the bench when the units have taken the temperature, and says why not yet.
 
     The chamber's air is held against the band; leaving it starts the count again. What ends a soak is the unit: the
     change of its own thermometer over the last `drift_window_s`, as the slope of a straight line through that window
@@ -23,11 +23,11 @@ class SoakJudge:
         self.step = step
         self.held_s = 0.0
         self.restarts = 0  #: how often the air left the band after it had been inside
-        self._last: tuple[float, bool] | None = None  #: time of the last look, and whether it was inside
+        self._last: tuple[float, bool] | None = None  #: time of the last poll, and whether it was inside
         self._gyro_c: dict[str, deque[tuple[float, float]]] = {}
 
     def add(self, t_s: float, chamber_c: float, gyro_c: Mapping[str, float]) -> None:
-        """Take one look at the bench: time in s, air and unit temperatures in deg C."""
+        """Take in one poll of the bench: time in s, air and unit temperatures in deg C."""
         inside = abs(chamber_c - self.step.temperature_c) <= self.step.band_c
         if self._last is not None:
             last_s, was_inside = self._last

@@ -13,6 +13,7 @@ from procedures.contracts.operator import Prompt
 from procedures.contracts.steps import Home, Mount, MoveChamber, PowerOff, PowerOn, Rest, SafeState, Soak
 from procedures.execution.acquire import acquire
 from procedures.execution.context import ExecutionContext
+from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
 from procedures.execution.soak import SoakJudge
 
@@ -21,41 +22,41 @@ Figures = dict[str, float]
 STARTING_PAUSES_S = (1.0, 2.0, 4.0)
 
 
-def home(stage: ExecutionContext, _step: Home) -> Figures:
+def home(context: ExecutionContext, _step: Home) -> Figures:
     """Make sure the right instruments answer, and let the table find its home switch."""
-    stage.bench.table.identify()
-    stage.bench.chamber.identify()
-    stage.bench.table.home()
-    return {"angle_deg": stage.bench.table.angle_deg()}
+    context.bench.table.identify()
+    context.bench.chamber.identify()
+    context.bench.table.home()
+    return {"angle_deg": context.bench.table.angle_deg()}
 
 
-def power_on(stage: ExecutionContext, step: PowerOn) -> Figures:
+def power_on(context: ExecutionContext, step: PowerOn) -> Figures:
     """Have the units switched on, make sure they are who the bench file says, open their streams, warm up."""
-    stage.soaked = None
-    run = step.run + stage.added_runs
-    stage.ask(Prompt(stage.new_prompt_id(), "power_on", f"switch the units on (session {run})"))
-    stage.log.journal.session_began(run, stage.log.t_s())
-    open_streams(stage, run)
-    stage.watch_for(step.wait_s)
+    context.soaked = None
+    run = step.run + context.added_runs
+    ask(context, Prompt(context.new_prompt_id(), "power_on", f"switch the units on (session {run})"))
+    context.recorder.journal.session_began(run, context.recorder.t_s())
+    open_streams(context, run)
+    context.record_for(step.wait_s)
     return {"run": float(run)}
 
 
-def open_streams(stage: ExecutionContext, run: int, *, dropping: bool = True) -> None:
+def open_streams(context: ExecutionContext, run: int, *, dropping: bool = True) -> None:
     """Open every unit's stream and begin to watch it. A unit may take a while to start up.
 
     One that stays silent drops out where others go on. Raises InstrumentError.
     """
-    for name in list(stage.bench.gyros):
+    for name in list(context.bench.gyros):
         try:
-            _open_stream(stage, stage.bench.gyros[name])
+            _open_stream(context, context.bench.gyros[name])
         except LinkError as error:
-            if not dropping or not stage.can_drop(name):
+            if not dropping or not context.can_drop(name):
                 raise
-            stage.drop(name, str(error))
-    stage.watch.powered(run)
+            context.drop(name, str(error))
+    context.monitor.units_powered(run)
 
 
-def _open_stream(stage: ExecutionContext, gyro: Gyro) -> None:
+def _open_stream(context: ExecutionContext, gyro: Gyro) -> None:
     for pause_s in (*STARTING_PAUSES_S, None):
         try:
             gyro.identify()
@@ -63,96 +64,96 @@ def _open_stream(stage: ExecutionContext, gyro: Gyro) -> None:
         except LinkError:
             if pause_s is None:
                 raise
-            stage.pass_time(pause_s, pausing=False)
+            context.pass_time(pause_s, pausing=False)
         else:
             return
 
 
-def power_off(stage: ExecutionContext, step: PowerOff) -> Figures:
+def power_off(context: ExecutionContext, step: PowerOff) -> Figures:
     """Close the streams and have the units switched off; the chamber is watched while they are."""
-    stage.soaked = None
-    if not stage.watch.run:  # the switching-on was left out
+    context.soaked = None
+    if not context.monitor.run:  # the switching-on was left out
         return {"run": 0.0}
-    for gyro in stage.bench.gyros.values():
+    for gyro in context.bench.gyros.values():
         gyro.stop()
-    stage.watch.powered(0)
-    run = step.run + stage.added_runs
-    stage.ask(Prompt(stage.new_prompt_id(), "power_off", f"switch the units off (session {run})"))
-    stage.watch_for(step.off_s)
+    context.monitor.units_powered(0)
+    run = step.run + context.added_runs
+    ask(context, Prompt(context.new_prompt_id(), "power_off", f"switch the units off (session {run})"))
+    context.record_for(step.off_s)
     return {"run": float(run)}
 
 
-def mount(stage: ExecutionContext, step: Mount) -> Figures:
+def mount(context: ExecutionContext, step: Mount) -> Figures:
     """Have a person turn the units."""
-    stage.soaked = None
+    context.soaked = None
     text = f"turn the units so that body axis {step.position} points up along the table axis"
-    stage.ask(Prompt(stage.new_prompt_id(), "mount", text, step.position))
+    ask(context, Prompt(context.new_prompt_id(), "mount", text, step.position))
     return {"mounting": float(step.mounting)}
 
 
-def move_chamber(stage: ExecutionContext, step: MoveChamber) -> Figures:
+def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
     """Write the set point and wait until the air is in the band. Raises SoakFailed when it does not arrive in time."""
-    stage.soaked = None
-    set_c = stage.bench.chamber.set_temperature_c(step.temperature_c)
-    half_step_c = stage.bench.chamber.limits.resolution_c / 2
+    context.soaked = None
+    set_c = context.bench.chamber.set_temperature_c(step.temperature_c)
+    half_step_c = context.bench.chamber.limits.resolution_c / 2
     if abs(set_c - step.temperature_c) > half_step_c + 1e-6:
         raise StepFailed(
-            f"{stage.bench.chamber.name}: set point {set_c:g} deg C was read back, not {step.temperature_c:g}"
+            f"{context.bench.chamber.name}: set point {set_c:g} deg C was read back, not {step.temperature_c:g}"
         )
-    began_s = stage.clock.now_s() - stage.paused_s
-    for _ in stage.looks():
-        off_c = abs(stage.watch.chamber_c - step.temperature_c)
-        took_s = stage.clock.now_s() - stage.paused_s - began_s
-        if off_c <= step.band_c and stage.watch.setpoint_c == set_c:
+    began_s = context.clock.now_s() - context.paused_s
+    for _ in context.polls():
+        off_c = abs(context.monitor.chamber_c - step.temperature_c)
+        took_s = context.clock.now_s() - context.paused_s - began_s
+        if off_c <= step.band_c and context.monitor.setpoint_c == set_c:
             break
         if took_s >= step.timeout_s:
             raise SoakFailed(
-                f"{stage.bench.chamber.name}: {stage.watch.chamber_c:.1f} deg C after {took_s:.0f} s, not within"
+                f"{context.bench.chamber.name}: {context.monitor.chamber_c:.1f} deg C after {took_s:.0f} s, not within"
                 f" {step.band_c:g} deg C of {step.temperature_c:g} deg C; limit {step.timeout_s:g} s",
                 {"off_c": off_c, "took_s": took_s},
             )
-    return {"setpoint_c": set_c, "chamber_c": stage.watch.chamber_c}
+    return {"setpoint_c": set_c, "chamber_c": context.monitor.chamber_c}
 
 
-def soak(stage: ExecutionContext, step: Soak) -> Figures:
+def soak(context: ExecutionContext, step: Soak) -> Figures:
     """Hold a temperature until the units have taken it. When they do not in time, the recipe says what follows."""
     judge = SoakJudge(step)
-    began_s = stage.clock.now_s() - stage.paused_s
-    with stage.watch.telling(judge.add):
-        for _ in stage.looks():
+    began_s = context.clock.now_s() - context.paused_s
+    with context.monitor.listening(judge.add):
+        for _ in context.polls():
             if judge.settled():
                 break
-            took_s = stage.clock.now_s() - stage.paused_s - began_s
+            took_s = context.clock.now_s() - context.paused_s - began_s
             if took_s >= step.timeout_s:
-                _unsettled(stage, step, judge, took_s)
+                _unsettled(context, step, judge, took_s)
                 break
-    stage.soaked = step
+    context.soaked = step
     return judge.figures()
 
 
-def _unsettled(stage: ExecutionContext, step: Soak, judge: SoakJudge, took_s: float) -> None:
+def _unsettled(context: ExecutionContext, step: Soak, judge: SoakJudge, took_s: float) -> None:
     """Do what the recipe says about a soak that does not settle. Raises SoakFailed or GuardTripped, or warns."""
-    action = stage.recipe.guards.actions.get("soak", "fail")
+    action = context.recipe.guards.actions.get("soak", "fail")
     reason = f"the soak at {step.temperature_c:g} deg C did not settle within {step.timeout_s:g} s: {judge.why_not()}"
     level = "warning" if action == "warn" else "error"
-    stage.log.event(Event("guard.soak", reason, level, stage.bench.chamber.name, took_s, step.timeout_s, "s"))
+    context.recorder.event(Event("guard.soak", reason, level, context.bench.chamber.name, took_s, step.timeout_s, "s"))
     if action == "fail":
         raise SoakFailed(reason, judge.figures())
     if action == "suspend":
-        raise GuardTripped("soak", action, reason, stage.bench.chamber.name)
+        raise GuardTripped("soak", action, reason, context.bench.chamber.name)
 
 
-def rest(stage: ExecutionContext, step: Rest) -> Figures:
+def rest(context: ExecutionContext, step: Rest) -> Figures:
     """Let nothing move for a while."""
-    with stage.watch.taking_readings():
-        stage.watch_for(step.duration_s)
+    with context.monitor.taking_readings():
+        context.record_for(step.duration_s)
     return {}
 
 
-def safe_state(stage: ExecutionContext, _step: SafeState) -> Figures:
+def safe_state(context: ExecutionContext, _step: SafeState) -> Figures:
     """Bring the bench to its safe state. Raises StepFailed naming what could not be confirmed."""
-    stage.watch.powered(0)
-    if complaints := make_safe(stage.whole, stage.clock):
+    context.monitor.units_powered(0)
+    if complaints := make_safe(context.full_bench, context.clock):
         raise StepFailed("NOT confirmed safe: " + "; ".join(complaints))
     return {}
 

@@ -1,4 +1,4 @@
-"""What is known of the bench at one moment: what guards judge, progress shows and the environment record is made of."""
+"""What is known of the bench at one moment; the guards check it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class BenchSnapshot:
     taking_readings: bool = False  #: the air is meant to be at its set point
     asked_dps: float = 0.0
     rate_dps: float = 0.0
-    tallies: Mapping[str, ReadingCounts] = field(default_factory=dict)
+    counts: Mapping[str, ReadingCounts] = field(default_factory=dict)
 
 
 def gyro_temperature_c(gyro: Gyro, readings: Readings) -> float | None:

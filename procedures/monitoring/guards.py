@@ -1,4 +1,4 @@
-"""Limits that are watched while anything runs. Each is judged at every look, the first time when it is armed."""
+"""Limits that are watched while anything runs. Each is checked at every poll."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from procedures.contracts.errors import GuardTripped
 from procedures.contracts.journal import Event
 from procedures.monitoring.bench_snapshot import BenchSnapshot
 from procedures.planning.limits import BenchLimits
-from procedures.recipe.recipe import Action, GuardKind, GuardRules
+from procedures.recipe.rules import Action, GuardKind, GuardRules
 
 
 @dataclass(frozen=True)
@@ -147,13 +147,13 @@ def _stale(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
 
 
 def _damaged(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
-    for name, tally in now.tallies.items():
-        yield from _fraction(name, tally.damaged, tally.base, guards.rules.max_damaged_fraction, "lost or damaged")
+    for name, count in now.counts.items():
+        yield from _fraction(name, count.damaged, count.base, guards.rules.max_damaged_fraction, "lost or damaged")
 
 
 def _invalid(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
-    for name, tally in now.tallies.items():
-        yield from _fraction(name, tally.invalid, tally.base, guards.rules.max_invalid_fraction, "marked bad")
+    for name, count in now.counts.items():
+        yield from _fraction(name, count.invalid, count.base, guards.rules.max_invalid_fraction, "marked bad")
 
 
 def _fraction(name: str, count: int, base: float, limit: float, what: str) -> Iterator[Excess]:

@@ -1,4 +1,4 @@
-"""What the units put out just now, for whoever looks on: kept as it came, worked out only when somebody asks."""
+"""The present output of each unit: the last readings are kept as they came and averaged only on request."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Output:
     t_s: float  #: campaign time of the last of them
 
 
-class Live:
-    """The last readings that each unit sent. One thread writes, any may ask."""
+class LiveOutput:
+    """The last readings that each unit sent. One thread writes, any thread may read."""
 
     def __init__(self) -> None:
         self._last: dict[str, tuple[tuple[Channel, ...], Readings, float]] = {}

@@ -1,4 +1,4 @@
-"""The journal with the clock in hand: everything written gets campaign time and aware UTC."""
+"""Writes to the journal: every entry gets campaign time and aware UTC, and the progress follows."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from procedures.monitoring.progress import ProgressTracker
 
 
 class CampaignRecorder:
-    """Writes to the journal and keeps the progress board in step with it.
+    """Writes to the journal and updates the progress with every entry.
 
     Campaign time is clock seconds since `start_s`, the clock's reading when the campaign began.
     """
 
-    def __init__(self, journal: Journal, clock: Clock, board: ProgressTracker, start_s: float) -> None:
+    def __init__(self, journal: Journal, clock: Clock, tracker: ProgressTracker, start_s: float) -> None:
         self.journal = journal
         self.clock = clock
-        self.board = board
+        self.tracker = tracker
         self.start_s = start_s
         self.state = CampaignState.PLANNED
 
@@ -28,26 +28,25 @@ class CampaignRecorder:
     def change_state(self, state: CampaignState, reason: str) -> None:
         """Record a change of the campaign's state."""
         self.state = state
-        self.board.update(state=state, reason=reason)
+        self.tracker.update(state=state, reason=reason)
         self.journal.campaign_state(state, reason, self.t_s(), self.clock.utc())
 
     def event(self, event: Event) -> None:
         """Record something worth telling a person."""
-        self.board.update(last_event=event.message)
         if event.level == "error":
-            self.board.update(last_error=event.message)
+            self.tracker.update(last_error=event.message)
         self.journal.event(event, self.t_s(), self.clock.utc())
 
     def step_started(self, index: int) -> None:
         """Record that a step of the plan begins."""
-        self.board.step_started(index, self.t_s())
+        self.tracker.step_started(index, self.t_s())
         self.journal.step_started(index, self.t_s(), self.clock.utc())
 
     def step_ended(self, index: int, result: StepResult) -> None:
         """Record how a step of the plan ended, with the time it took among its figures."""
-        took_s = self.t_s() - self.board.step_began_s
+        took_s = self.t_s() - self.tracker.step_began_s
         result = result.model_copy(update={"figures": {**result.figures, "took_s": took_s}})
-        self.board.step_ended(index)
+        self.tracker.step_ended(index)
         self.journal.step_ended(index, result, self.t_s(), self.clock.utc())
 
 

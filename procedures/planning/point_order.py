@@ -26,9 +26,9 @@ class MountingBlock:
     same_session: bool = False  #: turned without being switched off, whatever the recipe says of other mountings
 
 
-def schedule(recipe: Recipe) -> list[MountingBlock]:
+def order_points(recipe: Recipe) -> list[MountingBlock]:
     """Return the mountings of a recipe in order, with everything measured in each."""
-    return [_with_rates(recipe, stay, number) for number, stay in enumerate(_stays(recipe))]
+    return [_with_rates(recipe, block, number) for number, block in enumerate(_blocks(recipe))]
 
 
 def upside_down(position: str) -> str:
@@ -50,18 +50,18 @@ def temperature_sequence(recipe: Recipe) -> tuple[float, ...]:
     return (*order, order[0]) if recipe.replicates.first_temperature_again else order
 
 
-def _stays(recipe: Recipe) -> list[MountingBlock]:
+def _blocks(recipe: Recipe) -> list[MountingBlock]:
     """Return the mountings with the listed rates, not yet in their order within a level."""
     temperatures = temperature_sequence(recipe)
     if recipe.order == "position-major":
         visits = [(position, temperatures) for position in recipe.positions]
     else:
         visits = [(position, (temperature,)) for temperature in temperatures for position in recipe.positions]
-    stays: list[MountingBlock] = []
+    blocks: list[MountingBlock] = []
     for position, levels in visits:
-        stays.append(MountingBlock(position, tuple(Level(each, recipe.rates_dps) for each in levels)))
-        stays += _inverted(recipe, position, levels)
-    return _merged(stays)
+        blocks.append(MountingBlock(position, tuple(Level(each, recipe.rates_dps) for each in levels)))
+        blocks += _inverted(recipe, position, levels)
+    return _merged(blocks)
 
 
 def _inverted(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[MountingBlock]:
@@ -75,29 +75,29 @@ def _inverted(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list
     return [MountingBlock(upside_down(position), levels, same_session=True)] if levels else []
 
 
-def _merged(stays: list[MountingBlock]) -> list[MountingBlock]:
+def _merged(blocks: list[MountingBlock]) -> list[MountingBlock]:
     """Return the mountings with neighbours of one position as one: nobody turns a unit to where it already is."""
     merged: list[MountingBlock] = []
-    for stay in stays:
-        if merged and merged[-1].position == stay.position:
-            merged[-1] = MountingBlock(stay.position, merged[-1].levels + stay.levels, merged[-1].same_session)
+    for block in blocks:
+        if merged and merged[-1].position == block.position:
+            merged[-1] = MountingBlock(block.position, merged[-1].levels + block.levels, merged[-1].same_session)
         else:
-            merged.append(stay)
+            merged.append(block)
     return merged
 
 
-def _with_rates(recipe: Recipe, stay: MountingBlock, number: int) -> MountingBlock:
+def _with_rates(recipe: Recipe, block: MountingBlock, number: int) -> MountingBlock:
     """Return the mounting with each level's rates in their final order; `number` makes each level's lot its own."""
     levels = tuple(
         Level(
             level.temperature_c,
             level.rates_dps
-            if stay.same_session
+            if block.same_session
             else level_rates(recipe, level.rates_dps, np.random.default_rng([recipe.seed, number, index])),
         )
-        for index, level in enumerate(stay.levels)
+        for index, level in enumerate(block.levels)
     )
-    return MountingBlock(stay.position, levels, stay.same_session)
+    return MountingBlock(block.position, levels, block.same_session)
 
 
 def level_rates(recipe: Recipe, listed: tuple[float, ...], lot: np.random.Generator) -> tuple[float, ...]:

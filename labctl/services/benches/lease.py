@@ -1,11 +1,11 @@
-"""The lease on a bench: one bench, one campaign. Between processes only the wall's time counts, never a campaign's.
+"""The lease on a bench: one bench, one campaign. Between processes only wall-clock time counts, never campaign time.
 
-A holder renews every `RENEW_S`. When it could not for `STOP_S`, or somebody else has the bench by now, the wish to
-interrupt is in every campaign's control: the engine looks there before each step and once a second, so the table is at
-rest before the lease ends after `TERM_S` and another may take the bench. The campaign is left to be taken up.
+A holder renews every `RENEW_S`. When it could not for `STOP_S`, or another process has taken the bench, the control of
+its campaign interrupts: the engine polls the control before each step and once a second, so the table is at rest before
+the lease ends after `TERM_S` and another process may take the bench. The campaign is to be resumed.
 
-Clocks of two computers differ and may jump. A lease that looks over is therefore taken only after a whole term in which
-its beat did not change, measured by the own monotonic time; the written expiry only spares that wait.
+Clocks of two computers differ and may jump. A lease that seems to have ended is therefore taken only after a whole term
+in which its beat did not change, measured by the own monotonic time; the written expiry only spares that wait.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from labctl.errors import BenchBusy, Conflict, LabctlError
 from labctl.services.benches.host import boot_id
 from labctl.store import LeaseRow, Store, open_store
 from labctl.store.connection.database import Database
-from procedures.contracts.control import Control, ControlRequest
+from procedures.contracts.control import Control
 
 TERM_S = 120.0
 RENEW_S = 10.0
@@ -118,7 +118,11 @@ class BenchHold:
 
     def control(self) -> Control:
         """Return the control of a campaign that is interrupted when the bench may no longer be driven."""
-        return _FencedControl(self)
+        return Control(self.loss)
+
+    def loss(self) -> str:
+        """Return why the bench may no longer be driven; an empty text while it may."""
+        return "" if self.held else f"the bench may no longer be driven from here: {self.why_not}"
 
     def keep(self) -> None:
         """Renew from now on, in a thread, until `close`."""
@@ -130,7 +134,7 @@ class BenchHold:
             self.renew()
 
     def close(self) -> None:
-        """Let the bench go."""
+        """Release the bench."""
         self._over.set()
         if self._thread is not None:
             self._thread.join()
@@ -139,21 +143,6 @@ class BenchHold:
             with suppress(LabctlError):  # the row stays and ends by itself
                 self._store.leases.release(self._bench, self._owner)
         _HELD_HERE.discard(self._owner)
-
-
-class _FencedControl(Control):
-    """A control in which the wish to interrupt appears by itself once the bench may no longer be driven."""
-
-    def __init__(self, hold: BenchHold) -> None:
-        super().__init__()
-        self._hold = hold
-
-    @property
-    def wish(self) -> ControlRequest:
-        """The present wish."""
-        if not self._hold.held:
-            self.interrupt(f"the bench may no longer be driven from here: {self._hold.why_not}")
-        return super().wish
 
 
 def hold_bench(store: Store, bench: BenchFile, clock: Clock | None = None) -> BenchHold | None:

@@ -132,7 +132,7 @@ class BenchRunner:
         with self._guard:
             job = self._job
             if job is not None and job.row.id == campaign:
-                if not job.control.wish.pause:
+                if not job.control.request.pause:
                     raise Conflict(f"campaign {campaign} runs and is not paused")
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:
@@ -216,7 +216,7 @@ class BenchRunner:
         job = self._job
         if job is None or job.row.id != campaign or job.progress is None:
             return None
-        return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.wish)
+        return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.request)
 
     def abort(self, campaign: int, reason: str) -> CampaignResponse:
         """End the running campaign in the safe state; returns once it is there."""

@@ -14,7 +14,7 @@ from labctl.services.campaigns.status import ENDED, answer_of, describe_interrup
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schemas.campaigns import CampaignResponse, StartRequest
 from labctl.store import Store
-from labctl.store.connection.database import note_campaign
+from labctl.store.connection.writer_lock import note_campaign
 from procedures.contracts.control import Control
 from procedures.contracts.operator import Operator
 from procedures.execution.engine import Engine

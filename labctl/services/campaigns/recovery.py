@@ -34,7 +34,7 @@ def describe_recovery(store: Store, bench: str) -> str:
     text = how_far(from_rows(store, row))
     if store.benches.unconfirmed(bench):
         return f"{text} and is not taken up: bench {bench} was not confirmed safe"
-    if why_not := retries_exhausted(store.interruptions.standing(row.id)):
+    if why_not := retries_exhausted(store.resume_points.of_campaign(row.id)):
         return f"{text} and is not taken up: {why_not}"
     return f"{text} and is taken up now, safe state first"
 
@@ -115,7 +115,7 @@ class CampaignRecovery:
                 text = f"not taken up: campaign {resumed} goes on here; then `labctl campaign resume {row.id}`"
                 self._store.campaigns.close_unfinished(row.id, text, self._make_clock().utc())
                 continue
-            why_not = retries_exhausted(self._store.interruptions.standing(row.id))
+            why_not = retries_exhausted(self._store.resume_points.of_campaign(row.id))
             try:
                 if why_not is None:
                     resume(row.id)

@@ -69,7 +69,7 @@ def prepare_resume(
         raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
     _refuse_other_units(row, bench_file)
     refuse_unconfirmed(store, bench_file.name)
-    standing, plan = store.interruptions.standing(campaign), plan_of(store, row)
+    standing, plan = store.resume_points.of_campaign(campaign), plan_of(store, row)
     clock = make_clock(standing)
     new_world = bench_file.is_simulated and opened is None  # a simulated bench ends with its process
     lost = request.power == "lost" or (
@@ -84,7 +84,7 @@ def prepare_resume(
     reason = f"taken up by {request.by} after {gap_s:.0f} s unwatched; {power}"
     bench = opened or open_bench(bench_file, clock)
     try:
-        store.interruptions.take_up(campaign, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
+        store.resume_points.take_up(campaign, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
         if new_world and (position := plan.mounted_at(standing.start_at)):
             bench.unit_handler.mount(position)
     except BaseException:

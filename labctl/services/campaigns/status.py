@@ -16,7 +16,7 @@ from procedures.monitoring.progress import Progress
 ENDED = frozenset({"done", "aborted", "failed"})
 
 
-def answer_of(row: CampaignRow, progress: Progress, wish: ControlRequest | None = None) -> CampaignResponse:
+def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | None = None) -> CampaignResponse:
     """Return a campaign as its engine sees it, with what a person asked for and the engine has not yet done."""
     state, prompt = progress.state.value, progress.prompt
     return CampaignResponse(
@@ -37,7 +37,7 @@ def answer_of(row: CampaignRow, progress: Progress, wish: ControlRequest | None 
         rate_dps=progress.rate_dps,
         outputs=[] if state in ENDED else [OutputResponse(**asdict(output)) for output in progress.live.outputs()],
         last_error=progress.last_error or None,
-        wish=None if wish is None or state in ENDED else _open_wish(wish, state),
+        wish=None if request is None or state in ENDED else _open_request(request, state),
         prompt=None if prompt is None else PromptResponse(**asdict(prompt)),
         links=dict(progress.links),
         dropped=dict(progress.dropped),
@@ -47,10 +47,10 @@ def answer_of(row: CampaignRow, progress: Progress, wish: ControlRequest | None 
     )
 
 
-def _open_wish(wish: ControlRequest, state: str) -> Literal["pause", "abort"] | None:
-    if wish.abort:
+def _open_request(request: ControlRequest, state: str) -> Literal["pause", "abort"] | None:
+    if request.abort:
         return "abort"
-    return "pause" if wish.pause and state != "paused" else None
+    return "pause" if request.pause and state != "paused" else None
 
 
 def from_rows(store: Store, row: CampaignRow) -> CampaignResponse:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labctl.errors import BadInput, StoreError
-from labctl.store.connection.database import is_url
+from labctl.store.connection.location import is_url
 
 CHUNK = 1 << 20
 

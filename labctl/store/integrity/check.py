@@ -1,10 +1,10 @@
-"""Is everything in a database what was written? Looks at all of it, in one snapshot, and changes nothing."""
+"""Checks in one snapshot that a database holds what was written to it: file, schema, readings, calibrations, audit."""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,10 +16,11 @@ from labctl.calibration import read_calibration
 from labctl.errors import BadCalibrationFile, StoreError
 from labctl.store import migrate, sample_codec
 from labctl.store.connection.commit_counter import missing
-from labctl.store.connection.database import Database, is_url
+from labctl.store.connection.database import Database
+from labctl.store.connection.location import is_url
 from labctl.store.integrity.check_means import KeptMeans
 from labctl.store.repositories.audit import Head, first_broken
-from labctl.store.repositories.recordings import WHOLE_TABLE
+from labctl.store.repositories.sample_blocks import WHOLE_TABLE
 from labctl.store.schema import tables
 
 #: Blocks that are in memory at a time.
@@ -38,7 +39,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Checked:
-    """What was looked at, and what was found."""
+    """What was checked, and what was found."""
 
     findings: tuple[Finding, ...]
     blocks: int
@@ -46,31 +47,24 @@ class Checked:
     audit_rows: int
 
 
-class _Nothing:
-    def __call__(self, part: str, done: int, total: int) -> None:
-        """Tell nobody."""
-
-
-@contextmanager
-def _looking(location: str) -> Iterator[Database]:
-    with closing(Database(location, write=False, as_it_is=True)) as database:
-        yield database
+def _no_progress(_part: str, _done: int, _total: int) -> None:
+    pass
 
 
 def check(location: str, *, anchor: Head | None = None, progress: Progress | None = None) -> Checked:
     """Check a database by path or URL. Raises StoreError when there is none."""
-    looked = _Look(location, anchor, progress or _Nothing())
-    with _looking(location) as database:
+    run = _Check(location, anchor, progress or _no_progress)
+    with closing(Database(location, write=False, as_it_is=True)) as database:
         try:
             with database.reading() as connection:
-                looked.at_all(connection)
-        except StoreError as error:  # what is damaged need not answer any question
-            looked.find("file", str(error))
-    return Checked(tuple(looked.findings), looked.blocks, looked.calibrations, looked.audit_rows)
+                run.all_parts(connection)
+        except StoreError as error:  # a damaged file need not answer any query
+            run.find("file", str(error))
+    return Checked(tuple(run.findings), run.blocks, run.calibrations, run.audit_rows)
 
 
-class _Look:
-    """One walk through a database."""
+class _Check:
+    """One check of a database, part by part."""
 
     def __init__(self, location: str, anchor: Head | None, progress: Progress) -> None:
         self._location = location
@@ -83,28 +77,32 @@ class _Look:
         """Note something down."""
         self.findings.append(Finding(part, " ".join(text.split())))
 
-    def at_all(self, connection: sa.Connection) -> None:
-        """Look at every part; one that cannot be read does not keep the others from being looked at."""
+    def all_parts(self, connection: sa.Connection) -> None:
+        """Check every part; one that cannot be read does not keep the others from being checked."""
         if not is_url(self._location) and (text := missing(connection, self._location)):
             self.find("file", text)
-        for part, look in (("file", self._at_file), ("schema", self._at_schema)):
-            if not self._tried(part, look, connection):
+        for part, check_part in (("file", self._check_file), ("schema", self._check_schema)):
+            if not self._try(part, check_part, connection):
                 return
-        parts = (("readings", self._at_readings), ("calibrations", self._at_calibrations), ("audit", self._at_audit))
-        for part, look in parts:
-            self._tried(part, look, connection)
+        parts = (
+            ("readings", self._check_readings),
+            ("calibrations", self._check_calibrations),
+            ("audit", self._check_audit),
+        )
+        for part, check_part in parts:
+            self._try(part, check_part, connection)
 
-    def _tried(self, part: str, look: Callable[[sa.Connection], bool], connection: sa.Connection) -> bool:
+    def _try(self, part: str, check_part: Callable[[sa.Connection], bool], connection: sa.Connection) -> bool:
         self._progress(part, 0, 0)
         try:
-            return look(connection)
+            return check_part(connection)
         except sa.exc.DatabaseError as error:
             self.find(part, f"cannot be read: {error.orig}")
         except (ValueError, TypeError) as error:  # the row is there, its content is of another kind
             self.find(part, f"cannot be read: {error}")
         return part != "schema"
 
-    def _at_file(self, connection: sa.Connection) -> bool:
+    def _check_file(self, connection: sa.Connection) -> bool:
         if is_url(self._location):
             return True
         for (text,) in connection.exec_driver_sql("PRAGMA integrity_check(20)"):
@@ -114,7 +112,7 @@ class _Look:
             self.find("file", f"row {row} of {table} names a row of {parent} that is not there")
         return True
 
-    def _at_schema(self, connection: sa.Connection) -> bool:
+    def _check_schema(self, connection: sa.Connection) -> bool:
         found = migrate.revision_of(connection)
         if found == migrate.HEAD:
             return True
@@ -125,7 +123,7 @@ class _Look:
             self.find("schema", f"the database is at step {found}, this labctl at {migrate.HEAD}: {hint}")
         return False
 
-    def _at_readings(self, connection: sa.Connection) -> bool:
+    def _check_readings(self, connection: sa.Connection) -> bool:
         b, d, r = tables.sample_blocks.c, tables.data_sets.c, tables.recordings.c
         kinds = {int(number): kind for number, kind in connection.execute(sa.select(r.id, r.kind))}
         valid = self._valid_readings(connection, int(connection.scalar(sa.select(sa.func.count(b.id))) or 0))
@@ -193,7 +191,7 @@ class _Look:
             return None
         return columns
 
-    def _at_calibrations(self, connection: sa.Connection) -> bool:
+    def _check_calibrations(self, connection: sa.Connection) -> bool:
         c = tables.calibrations.c
         for serial, version, own, document in connection.execute(sa.select(c.serial, c.version, c.hash, c.document)):
             self.calibrations += 1
@@ -207,7 +205,7 @@ class _Look:
                 self.find("calibrations", f"{serial} version {version}: its document is another one ({said})")
         return True
 
-    def _at_audit(self, connection: sa.Connection) -> bool:
+    def _check_audit(self, connection: sa.Connection) -> bool:
         self.audit_rows = int(connection.scalar(sa.select(sa.func.count(tables.audit.c.id))) or 0)
         if broken := first_broken(connection, self._anchor):
             self.find("audit", f"row {broken.row}: {broken.what}")

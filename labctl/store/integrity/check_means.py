@@ -9,8 +9,8 @@ import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
-from labctl.store.dataset_statistics import statistics
-from labctl.store.repositories.recordings import scaled
+from labctl.store.dataset_means import statistics
+from labctl.store.repositories.sample_blocks import scaled
 from labctl.store.schema import tables
 
 #: Sums differ in their last places by the order in which they are made; figures that were changed differ by more.

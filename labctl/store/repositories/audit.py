@@ -15,7 +15,7 @@ from labctl.actor import actor
 from labctl.store.connection.database import Database
 from labctl.store.records import AuditRow
 from labctl.store.schema import tables
-from labctl.store.schema.tables import EPOCH
+from labctl.store.schema.types import EPOCH
 
 FIRST = "0" * 64
 HEAD_ID = 1
@@ -48,13 +48,13 @@ def append(
 ) -> None:
     """Add a row to the trail, inside the transaction of the act that it records.
 
-    `who` is somebody other than the one at the door; both are then in the row.
+    `who` names the one who acted where that is not the authenticated caller; both are then in the row.
     """
-    door = actor()
-    detail = {**detail, **({"via": door.via} if door.via else {})}
-    if who is not None and who != door.name:
-        detail["caller"] = door.name
-    who = (who or door.name)[:200]
+    caller = actor()
+    detail = {**detail, **({"via": caller.via} if caller.via else {})}
+    if who is not None and who != caller.name:
+        detail["caller"] = caller.name
+    who = (who or caller.name)[:200]
     subject = subject[:300]
     h = tables.audit_head
     found = connection.execute(sa.select(h.c.length, h.c.hash).where(h.c.id == HEAD_ID).with_for_update()).first()
@@ -65,7 +65,7 @@ def append(
             at=at, actor=who, action=action, subject=subject, detail=detail, previous_hash=previous, hash=own
         )
     )
-    if found is not None:  # a head that somebody removed is never made again: verifying says that it is gone
+    if found is not None:  # a head that was removed is never made again: verification reports that it is missing
         connection.execute(sa.update(h).where(h.c.id == HEAD_ID).values(length=found.length + 1, hash=own))
 
 
@@ -96,7 +96,7 @@ def first_broken(connection: sa.Connection, anchor: Head | None = None) -> Broke
     """
     a = tables.audit.c
     previous, last, length = FIRST, 0, 0
-    # as they lie in the table: what somebody else wrote there need not be an instant, or JSON
+    # not converted: what another program wrote there need not be an instant, or JSON
     at, detail = sa.type_coerce(a.at, sa.BigInteger), sa.cast(a.detail, sa.Text)
     query = sa.select(a.id, at, a.actor, a.action, a.subject, detail, a.previous_hash, a.hash).order_by(a.id)
     for number, *content, before, own in connection.execute(query):
@@ -124,7 +124,7 @@ def _end_broken(connection: sa.Connection, found: Head, last: int) -> Broken | N
 
 
 def head_of(connection: sa.Connection) -> Head | None:
-    """Return the head of the trail; None when somebody removed it."""
+    """Return the head of the trail; None when it was removed."""
     h = tables.audit_head.c
     row = connection.execute(sa.select(h.length, h.hash).where(h.id == HEAD_ID)).first()
     return None if row is None else Head(int(row.length), str(row.hash))
@@ -153,7 +153,7 @@ class Audit:
             return [AuditRow(*row) for row in connection.execute(query.order_by(a.id).limit(limit))]
 
     def head(self) -> Head | None:
-        """Return how long the trail is and the hash of its last row; None when somebody removed that."""
+        """Return how long the trail is and the hash of its last row; None when the head was removed."""
         with self._database.reading() as connection:
             return head_of(connection)
 

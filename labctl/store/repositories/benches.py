@@ -37,7 +37,7 @@ class Benches:
             return [BenchRow(*row) for row in connection.execute(query)]
 
     def unconfirmed(self, name: str) -> str:
-        """Return what the last safe state of a bench could not confirm; empty when all is well or nobody used it."""
+        """Return what the last safe state of a bench did not confirm; empty for nothing, or a bench never used."""
         return next((row.unconfirmed for row in self.all() if row.name == name), "")
 
     def mark(self, name: str, unconfirmed: str, at: datetime) -> None:

@@ -16,7 +16,7 @@ from labctl.store.records import CampaignRow, EventRow, NewUnit, StepRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
 from labctl.store.repositories.journal import StoreJournal
-from labctl.store.repositories.recordings import new_recording
+from labctl.store.repositories.recording_writer import new_recording
 from labctl.store.schema import tables
 
 
@@ -181,7 +181,7 @@ class Campaigns:
     def close_unfinished(
         self, campaign: int, reason: str, at: datetime, state: Literal["failed", "aborted"] = "failed"
     ) -> None:
-        """Mark a campaign that nobody runs any more as over, saying why."""
+        """Mark a campaign that no process runs any more as over, with the reason."""
         with self._database.writing() as connection:
             connection.execute(
                 sa.update(tables.campaigns)

@@ -21,7 +21,7 @@ from labctl.store.connection.database import Database
 from labctl.store.dataset_means import means_rows
 from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.recordings import block_row, blocks_of, scaled
+from labctl.store.repositories.sample_blocks import block_row, blocks_of, scaled
 from labctl.store.schema import tables
 from procedures.contracts.journal import (
     NOT_SAFE,

@@ -1,4 +1,4 @@
-"""API keys: names, roles, and digests of keys that nobody here knows."""
+"""API keys: names, roles, and digests of keys; the keys themselves are not stored."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class Leases:
         self._database = database
 
     def holder(self, bench_name: str) -> LeaseRow | None:
-        """Return who holds a bench; None when nobody does."""
+        """Return who holds a bench; None when it is free."""
         x = tables.leases.c
         query = sa.select(
             x.bench_name, x.owner, x.host, x.machine, x.pid, x.since, x.beat, x.beat_at, x.expires_at
@@ -43,7 +43,7 @@ class Leases:
         return None if row is None else LeaseRow(*row)
 
     def claim(self, lease: LeaseRow, replacing: LeaseRow | None) -> bool:
-        """Take a bench that nobody holds, or from the holder `replacing` as it was seen; False when that changed."""
+        """Take a bench that is free, or from the holder `replacing` as it was seen; False when that changed."""
         x = tables.leases
         try:
             with self._database.writing() as connection:

@@ -1,4 +1,4 @@
-"""Campaigns that a process left without an end: where they stand, and taking them up in one transaction."""
+"""Campaigns that a process left without an end: the step where each resumes, and resuming it in one transaction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from labctl.errors import Conflict
 from labctl.store.connection.database import Database
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.journal import StoreJournal
-from labctl.store.repositories.recordings import blocks_of
+from labctl.store.repositories.sample_blocks import blocks_of
 from labctl.store.schema import tables
 from procedures.contracts.journal import DataSetState
 from procedures.contracts.steps import StepResult
@@ -24,7 +24,7 @@ FINISHED = frozenset({"done", "skipped"})
 
 @dataclass(frozen=True)
 class ResumePoint:
-    """Where a campaign stands that no process runs."""
+    """Where a campaign resumes that no process runs."""
 
     start_at: int  #: the first step that has to be run
     complete: frozenset[int]  #: steps whose data set was complete when the process ended, before it was said
@@ -50,14 +50,14 @@ class TakeUp:
     boot_id: str | None
 
 
-class Interruptions:
-    """Where interrupted campaigns stand, and how they go on."""
+class ResumePoints:
+    """Where interrupted campaigns resume."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def standing(self, campaign: int) -> ResumePoint:
-        """Return where a campaign stands, from its rows alone."""
+    def of_campaign(self, campaign: int) -> ResumePoint:
+        """Return where a campaign resumes, from its rows alone."""
         c, s, r, d = tables.campaigns.c, tables.steps.c, tables.recordings.c, tables.data_sets.c
         with self._database.reading() as connection:
             row = connection.execute(
@@ -119,7 +119,7 @@ class Interruptions:
         tries = sa.select(sa.func.count()).where(v.campaign_id == campaign, v.kind == "taken_up", v.t_s >= ended_s)
         return last(OWED) > last(PAID), int(connection.scalar(tries) or 0)
 
-    def take_up(self, campaign: int, standing: ResumePoint, how: TakeUp) -> None:
+    def take_up(self, campaign: int, point: ResumePoint, how: TakeUp) -> None:
         """Mark what the interruption left half done, and the campaign as running again. Safe to be cut short itself.
 
         Raises Conflict when it is done already.
@@ -135,7 +135,7 @@ class Interruptions:
             if taken.rowcount == 0:
                 raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
             mine = s.c.campaign_id == campaign
-            self._mark(connection, mine & s.c.number.in_(standing.complete), "done", how, "its data set was complete")
+            self._mark(connection, mine & s.c.number.in_(point.complete), "done", how, "its data set was complete")
             running = mine & (s.c.state == "running")
             self._mark(connection, running, "interrupted", how, "the process that ran it ended")
             append(connection, how.at, "campaign resume", f"campaign {campaign}", {"reason": how.reason})

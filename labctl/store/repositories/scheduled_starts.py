@@ -184,7 +184,7 @@ def _subject(start: int, bench_name: str) -> str:
 def _note(
     connection: sa.Connection, at: datetime, start: int, outcome: Outcome, message: str, campaign: int | None
 ) -> None:
-    """Add to the audit trail what became of a start: nobody was there to see it."""
+    """Add to the audit trail what became of a start, which happens without a person."""
     s = tables.scheduled_starts.c
     bench_name = connection.scalar(sa.select(s.bench_name).where(s.id == start)) or ""
     detail = {"outcome": outcome, "message": message, "campaign": campaign}

@@ -1,1 +1,1 @@
-"""The tables."""
+"""The tables, one module per noun; `tables` holds them all."""

@@ -1,4 +1,4 @@
-"""Questions to a person, and wishes from another thread."""
+"""Questions to the operator."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from procedures.contracts.control import Control
 from procedures.contracts.errors import StalePrompt
 from procedures.contracts.operator import HumanOperator, Prompt, UnitHandlerOperator
 
@@ -60,14 +59,3 @@ def test_a_hand_does_at_once_what_is_asked(rig: Any) -> None:
         assert answer is not None
         assert answer.confirmed
     assert rig.trace == ["hand.mount -x", "hand.power True", "hand.power False"]
-
-
-def test_wishes() -> None:
-    control = Control()
-    control.pause("lunch")
-    assert (control.wish.pause, control.wish.reason) == (True, "lunch")
-    control.resume("back")
-    assert (control.wish.pause, control.wish.abort) == (False, False)
-    control.abort("smoke")
-    control.resume("no, wait")
-    assert (control.wish.abort, control.wish.reason) == (True, "smoke")

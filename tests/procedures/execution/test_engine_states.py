@@ -13,7 +13,8 @@ from instruments.errors import NoReply, RequestRejected
 from procedures.contracts.control import Control
 from procedures.contracts.journal import NEXT, CampaignState
 from procedures.execution.resume import Restart
-from tests.procedures import conftest
+from tests.helpers.engine_rig import Rig
+from tests.helpers.recording_journal import RecordingJournal
 
 
 class Killed(BaseException):
@@ -29,7 +30,7 @@ class Campaign(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.rig: Any = conftest.Rig(("imu", "fog"))
+        self.rig: Any = Rig(("imu", "fog"))
         self.finished: set[int] = set()
         self.complete: Counter[int] = Counter()
         self.legs = 0
@@ -41,7 +42,7 @@ class Campaign(RuleBasedStateMachine):
         """Run from where the campaign stands; `acts` are done at the n-th entry of the journal, counted from here."""
         rig = self.rig
         rig.trace.clear()
-        rig.journal = conftest.RecordingJournal(rig.trace)
+        rig.journal = RecordingJournal(rig.trace)
         rig.control = Control()
         for device in (rig.table, rig.chamber, *rig.gyros.values()):
             device.faults.clear()

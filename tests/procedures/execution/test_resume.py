@@ -10,7 +10,7 @@ from instruments.errors import NoReply
 from procedures.contracts.journal import CampaignState
 from procedures.contracts.operator import HumanOperator
 from procedures.execution.resume import Restart, soak_matters_after_s
-from procedures.recipe.recipe import ResumeRules
+from procedures.recipe.rules import ResumeRules
 
 
 def at(rig: Any, kind: str, number: int = 0) -> int:

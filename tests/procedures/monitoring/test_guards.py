@@ -11,7 +11,7 @@ from procedures.contracts.journal import CampaignState
 from procedures.monitoring.bench_snapshot import BenchSnapshot, ReadingCounts
 from procedures.monitoring.guards import CHECKS, Guards
 from procedures.planning.limits import BenchLimits
-from procedures.recipe.recipe import GuardRules
+from procedures.recipe.rules import GuardRules
 
 WELL = BenchSnapshot(
     t_s=100.0,
@@ -22,7 +22,7 @@ WELL = BenchSnapshot(
     taking_readings=True,
     asked_dps=100.0,
     rate_dps=100.001,
-    tallies={"imu": ReadingCounts(expected=1000, valid=990, invalid=5, damaged=5)},
+    counts={"imu": ReadingCounts(expected=1000, valid=990, invalid=5, damaged=5)},
 )
 
 TRIPS = [
@@ -32,8 +32,8 @@ TRIPS = [
     ("chamber_deviation", {"chamber_c": 17.5}, "chamber", 2.5, 2.0, "deg C"),
     ("chamber_alarm", {"alarms": ("over-temperature",)}, "chamber", 1.0, 0.0, ""),
     ("stale", {"silent_s": {"imu": 31.0}}, "imu", 31.0, 30.0, "s"),
-    ("damaged_readings", {"tallies": {"imu": ReadingCounts(1000, damaged=30)}}, "imu", 3.0, 2.0, "%"),
-    ("invalid_readings", {"tallies": {"imu": ReadingCounts(1000, invalid=600)}}, "imu", 60.0, 50.0, "%"),
+    ("damaged_readings", {"counts": {"imu": ReadingCounts(1000, damaged=30)}}, "imu", 3.0, 2.0, "%"),
+    ("invalid_readings", {"counts": {"imu": ReadingCounts(1000, invalid=600)}}, "imu", 60.0, 50.0, "%"),
     ("rate", {"rate_dps": 98.5}, "table", 1.5, 1.0, "deg/s"),
     ("unit_off_air", {"gyro_c": {"imu": 45.0}}, "imu", 25.0, 20.0, "deg C"),
 ]
@@ -71,7 +71,7 @@ def test_a_trip_names_device_value_limit_and_unit(
 
 def test_a_single_bad_reading_is_no_trend(guards: Guards) -> None:
     tally = ReadingCounts(expected=10, valid=9, damaged=1)
-    assert guards.check(replace(WELL, tallies={"imu": tally})) == []
+    assert guards.check(replace(WELL, counts={"imu": tally})) == []
 
 
 def test_the_air_may_be_anywhere_while_nothing_is_measured(guards: Guards) -> None:

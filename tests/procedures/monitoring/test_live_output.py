@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from instruments.interfaces.gyro import Channel, Readings
-from procedures.monitoring.live_output import Live, Output
+from procedures.monitoring.live_output import LiveOutput, Output
 from procedures.monitoring.progress import Progress
-from tests.procedures.conftest import Rig
+from tests.helpers.engine_rig import Rig
 
 UNIT: Any = SimpleNamespace(channels=(Channel("gyro_z", "deg/s", 0.5, 1.0), Channel("temperature_c", "deg C", 1.0)))
 
@@ -22,14 +22,14 @@ def readings(values: list[int], valid: list[bool]) -> Readings:
 
 
 def test_only_valid_readings_count_in_their_unit() -> None:
-    live = Live()
+    live = LiveOutput()
     live.heard("imu", UNIT, readings([2, 4, 900], [True, True, False]), 40.0)
     (output,) = live.outputs()
     assert output == Output("imu", "gyro_z", "deg/s", 2.5, pytest.approx(0.5**0.5), 2, 62.0)
 
 
 def test_nothing_is_said_of_what_sends_nothing() -> None:
-    live = Live()
+    live = LiveOutput()
     live.heard("imu", UNIT, readings([], []), 0.0)
     live.heard("other", UNIT, readings([1], [False]), 0.0)
     assert live.outputs() == ()

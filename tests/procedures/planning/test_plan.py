@@ -17,7 +17,7 @@ from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, SafeState, Soak
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
-from procedures.planning.point_order import level_rates, schedule, temperature_sequence
+from procedures.planning.point_order import level_rates, order_points, temperature_sequence
 from procedures.recipe.recipe import Recipe, read_recipe, shipped_recipes
 
 
@@ -321,4 +321,4 @@ def test_replicates_add_and_never_drop(rates: list[float], zero_at: set[str], ag
 
 
 def test_a_schedule_is_the_same_however_often_it_is_asked_for() -> None:
-    assert schedule(read_recipe("informative")) == schedule(read_recipe("informative"))
+    assert order_points(read_recipe("informative")) == order_points(read_recipe("informative"))

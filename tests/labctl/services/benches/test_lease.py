@@ -159,7 +159,7 @@ def test_a_lease_lasts_as_long_as_it_is_renewed(store: Store) -> None:
     assert hold.held
     clock.sleep(1)
     assert not hold.held
-    assert hold.control().wish.abort
+    assert hold.control().poll().abort
     hold.renew()
     assert hold.held
 
@@ -169,19 +169,31 @@ def test_a_stolen_lease_ends_the_campaign_and_is_tried_for_again(shared: Store) 
     hold = BenchHold(shared, BENCH, clock)
     hold.take()
     control = hold.control()
-    assert not control.wish.abort
+    assert not control.poll().abort
     mine = shared.leases.holder(BENCH)
     assert mine is not None
     shared.leases.claim(far(clock), replacing=mine)
     hold.renew()
-    assert control.wish.abort
-    assert "far-pc" in control.wish.reason
+    assert control.poll().abort
+    assert "far-pc" in control.request.reason
     with pytest.raises(Conflict, match="far-pc"):
         hold.check()
     shared.leases.release(BENCH, "f" * 32)
     hold.renew()
     hold.check()
-    assert control.wish.abort
+    assert control.poll().abort
+
+
+def test_reading_the_request_interrupts_nothing(store: Store) -> None:
+    clock = VirtualClock(AT)
+    hold = BenchHold(store, BENCH, clock)
+    hold.take()
+    control = hold.control()
+    clock.sleep(STOP_S)
+    assert not hold.held
+    assert not control.request.abort  # a status that is read meanwhile takes nothing from the campaign
+    hold.renew()
+    assert not control.poll().abort
 
 
 def test_a_database_that_cannot_be_written_counts_as_not_renewed(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,7 +209,7 @@ def test_a_database_that_cannot_be_written_counts_as_not_renewed(store: Store, m
     assert hold.held
     clock.sleep(STOP_S)
     assert not hold.held
-    assert "the disk is full" in hold.control().wish.reason
+    assert "the disk is full" in hold.control().poll().reason
 
 
 def test_a_table_is_at_rest_before_a_lease_that_was_not_renewed_ends(store: Store) -> None:

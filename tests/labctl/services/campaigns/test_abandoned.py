@@ -195,7 +195,7 @@ def test_a_bench_is_closed_even_if_what_is_wrong_with_it_cannot_be_written(
     prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
     closed: list[str] = []
     monkeypatch.setattr(type(prepared.bench), "close", lambda bench: closed.append(bench.table.name))
-    monkeypatch.setattr("procedures.execution.engine.make_safe", lambda *_: ("table to rest: no answer",))
+    monkeypatch.setattr("procedures.execution.shutdown.make_safe", lambda *_: ("table to rest: no answer",))
 
     def full(*_: Any) -> None:
         raise StoreError("the disk is full")
@@ -331,7 +331,7 @@ def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, complaints: tuple[str, ...], said: str
 ) -> None:
     disk, location = FullDisk(monkeypatch), str(tmp_path / "lab.sqlite")
-    monkeypatch.setattr("procedures.execution.engine.make_safe", lambda *_: complaints)
+    monkeypatch.setattr("procedures.execution.shutdown.make_safe", lambda *_: complaints)
 
     def fills(answer: Any) -> None:
         disk.full = disk.full or answer.step == 5

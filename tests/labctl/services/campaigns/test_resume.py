@@ -165,10 +165,10 @@ def test_a_campaign_that_never_gets_on_waits_for_a_person(tmp_path: Path) -> Non
         bench = load_bench("single-axis-sim")
         number = prepare(store, "short", bench, VirtualClock(), clip=False).id
         for tries in range(MAX_RESUMES):
-            standing = store.interruptions.standing(number)
-            assert (standing.tries, retries_exhausted(standing)) == (tries, None)
+            point = store.resume_points.of_campaign(number)
+            assert (point.tries, retries_exhausted(point)) == (tries, None)
             prepare_resume(store, number, bench, lambda s: VirtualClock(s.last_at), ResumeRequest()).bench.close()
-        assert "without finishing a step" in (retries_exhausted(store.interruptions.standing(number)) or "")
+        assert "without finishing a step" in (retries_exhausted(store.resume_points.of_campaign(number)) or "")
 
 
 def test_a_host_that_was_off_means_that_the_units_were() -> None:
@@ -189,7 +189,7 @@ def test_a_unit_that_drops_out_is_written_down_and_its_recording_ends_there(tmp_
     ends = {serial: len(store.recordings.points(number)) for serial, number in answer.recordings.items()}
     assert ends["FOG-0001"] == 12
     assert 0 < ends["DSP-1"] < 12
-    assert store.interruptions.standing(answer.id).dropped.keys() == {"dsp"}
+    assert store.resume_points.of_campaign(answer.id).dropped.keys() == {"dsp"}
     assert len(all_readings(database)) > 0
     assert set(complete_data_sets(database)) == set(range(1, 13))
     store.close()

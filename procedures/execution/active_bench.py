@@ -12,19 +12,17 @@ from procedures.contracts.bench import Bench
 
 @dataclass
 class ActiveBench:
-    """A bench whose units can drop out. `dropped` says which did, and why."""
+    """A bench whose units can drop out."""
 
     table: RateTable
     chamber: Chamber
-    gyros: dict[str, Gyro]
-    dropped: dict[str, str] = field(default_factory=dict)
+    gyros: dict[str, Gyro]  #: by name; those that take part
+    dropped: dict[str, str] = field(default_factory=dict)  #: unit name -> why it dropped out
 
     @classmethod
-    def of(cls, bench: Bench, dropped: dict[str, str] | None = None) -> ActiveBench:
-        """Return the crew of an opened bench, without the units that dropped out before."""
-        gone = dict(dropped or {})
-        taking_part = {name: gyro for name, gyro in bench.gyros.items() if name not in gone}
-        return cls(bench.table, bench.chamber, taking_part, gone)
+    def of(cls, bench: Bench) -> ActiveBench:
+        """Return an opened bench with all of its units taking part."""
+        return cls(bench.table, bench.chamber, dict(bench.gyros))
 
     def drop(self, gyro: str, reason: str) -> Gyro:
         """Let a unit take no further part; returns it."""

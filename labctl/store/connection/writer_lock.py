@@ -1,0 +1,98 @@
+"""The lock beside an SQLite file that makes one process its only writer, and the note that names that process."""
+
+from __future__ import annotations
+
+import json
+import os
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from labctl.errors import Conflict
+from labctl.store.connection.location import is_url
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Who writes to a database now."""
+
+    pid: int
+    url: str | None  #: of the service, where the holder is one
+    campaign: int | None = None  #: that runs in the holder's terminal, where the holder is no service
+
+
+def _describe(holder: Holder) -> str:
+    if holder.campaign is not None:
+        return (
+            f"campaign {holder.campaign} runs in process {holder.pid}'s terminal: Ctrl-C there ends it safely; a "
+            "campaign under `labctl serve` can be paused and aborted from here. Anything else waits for its end"
+        )
+    who = f"the service at {holder.url}" if holder.url else f"another labctl (process {holder.pid})"
+    return f"{who} writes to this database now; wait for it, or ask it"
+
+
+def holder_of(location: str) -> Holder | None:
+    """Return who holds a database file for writing; None when it is free."""
+    if is_url(location):
+        return None
+    lock = FileLock(_lock_path(location))
+    try:
+        with lock.acquire(timeout=0):
+            return None
+    except Timeout:
+        return _read_note(location)
+
+
+def _lock_path(location: str) -> str:
+    return f"{location}.lock"
+
+
+def _note_path(location: str) -> Path:
+    return Path(f"{location}.holder")
+
+
+def _read_note(location: str) -> Holder:
+    try:
+        note = json.loads(_note_path(location).read_text(encoding="utf-8"))
+        return Holder(int(note["pid"]), note["url"], note.get("campaign"))
+    except (OSError, ValueError, KeyError):
+        return Holder(0, None)
+
+
+def note_campaign(location: str, campaign: int) -> None:
+    """Note beside a database that this process holds it for a campaign; other processes show it."""
+    if is_url(location):
+        return
+    with suppress(OSError):  # a full disk: the note is only a hint
+        note = {"pid": os.getpid(), "url": None, "campaign": campaign}
+        _note_path(location).write_text(json.dumps(note), encoding="utf-8")
+
+
+class WriterLock:
+    """The lock on one SQLite file, held from its making to `release`."""
+
+    def __init__(self, location: str, url: str | None) -> None:
+        """Take the lock and note at which address this process can be asked to write.
+
+        Raises Conflict naming the holder, and OSError when the note cannot be written.
+        """
+        self._location = location
+        self._lock = FileLock(_lock_path(location))
+        try:
+            self._lock.acquire(timeout=0)
+        except Timeout:
+            raise Conflict(f"{location}: {_describe(_read_note(location))}") from None
+        try:
+            note = {"pid": os.getpid(), "url": url}
+            _note_path(location).write_text(json.dumps(note), encoding="utf-8")
+        except OSError:
+            self.release()
+            raise
+
+    def release(self) -> None:
+        """Let the next writer in. Safe to call twice."""
+        if self._lock.is_locked:
+            _note_path(self._location).unlink(missing_ok=True)
+            self._lock.release()

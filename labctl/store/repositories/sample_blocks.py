@@ -1,0 +1,92 @@
+"""Blocks of readings: rows of sample_blocks, and the readings of a data set in their units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import sqlalchemy as sa
+from numpy.typing import NDArray
+
+from labctl.store import sample_codec
+from labctl.store.schema import tables
+
+WHOLE_TABLE = 0  #: number of the block that holds a whole table of points or coefficients
+
+
+def _blocks_query() -> sa.Select[int, int, int, bytes]:
+    b = tables.sample_blocks.c
+    ours = (b.recording_id == sa.bindparam("recording"), b.number == sa.bindparam("number"))
+    return sa.select(b.n, b.codec, b.crc32, b.data).where(*ours).order_by(b.seq)
+
+
+#: Made once: it is asked for every data set of a recording.
+_BLOCKS = _blocks_query()
+
+
+def block_row(recording: int, number: int, seq: int, block: sample_codec.Block) -> dict[str, Any]:
+    """Return a row of sample_blocks."""
+    return {
+        "recording_id": recording,
+        "number": number,
+        "seq": seq,
+        "n": block.n,
+        "codec": block.codec,
+        "crc32": block.crc32,
+        "data": block.data,
+    }
+
+
+def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[Any]]]:
+    """Return the unpacked blocks of a data set, in order."""
+    found = connection.execute(_BLOCKS, {"recording": recording, "number": number})
+    return [sample_codec.unpack(sample_codec.Block(*row)) for row in found]
+
+
+def join_blocks(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """Return blocks of the same columns as one."""
+    if len(parts) == 1:
+        return parts[0]
+    return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else {})}
+
+
+def channels_of(connection: sa.Connection, recording: int) -> list[dict[str, Any]]:
+    """Return name, unit, scale and offset of each raw channel; empty for a recording that was imported."""
+    query = sa.select(tables.recordings.c.channels).where(tables.recordings.c.id == recording)
+    return connection.scalar(query) or []
+
+
+def readings_in_units(
+    connection: sa.Connection, head: Mapping[str, Any], channels: list[dict[str, Any]]
+) -> dict[str, NDArray[Any]]:
+    """Return the readings of one data set: as they came in from elsewhere, or in their units from what was sent."""
+    raw = join_blocks(blocks_of(connection, head["recording_id"], head["number"]))
+    return scaled(raw, channels, head) if channels else raw
+
+
+def scaled(
+    raw: dict[str, NDArray[Any]], channels: list[dict[str, Any]], head: Mapping[str, Any]
+) -> dict[str, NDArray[Any]]:
+    """Return readings in their units from what the device sent, with the data set's own columns beside them."""
+    t_s = raw["t_ns"] / 1e9
+    n = len(t_s)
+    columns: dict[str, NDArray[Any]] = {
+        "dataset": np.full(n, head["number"], dtype=np.int64),
+        "t_s": t_s,
+        "position": np.full(n, head["position"]),
+        "run": np.full(n, head["run"], dtype=np.int64),
+        "mounting": np.full(n, head["mounting"], dtype=np.int64),
+        "table_rate_dps": np.full(n, head["table_rate_dps"]),
+        "table_angle_deg": head["table_angle_deg"] + head["table_rate_dps"] * (t_s - head["gate_from_s"]),
+    }
+    if head["power_on_s"] is not None:
+        columns["power_s"] = t_s - head["power_on_s"]
+    for channel in channels:
+        columns[channel["name"]] = channel["offset"] + channel["scale"] * raw[channel["name"]]
+    per_axis = [columns[f"temperature_{a}_c"] for a in "xyz" if f"temperature_{a}_c" in columns]
+    if "temperature_c" not in columns and per_axis:
+        columns["temperature_c"] = np.mean(per_axis, axis=0)
+    columns["chamber_c"] = raw["chamber_mc"] / 1e3
+    columns["valid"] = raw["valid"]
+    return columns

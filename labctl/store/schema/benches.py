@@ -1,0 +1,33 @@
+"""The tables of benches and of the leases on them."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+
+from labctl.store.schema.types import Instant, metadata
+
+benches = sa.Table(
+    "benches",
+    metadata,
+    sa.Column("name", sa.String(200), primary_key=True),
+    sa.Column("file", sa.JSON, nullable=False),
+    sa.Column("last_used_at", Instant, nullable=False),
+    sa.Column(
+        "unconfirmed", sa.Text, nullable=False, server_default=""
+    ),  #: of the safe state; until a person clears it
+    sa.Column("unconfirmed_at", Instant),
+)
+
+leases = sa.Table(
+    "leases",
+    metadata,
+    sa.Column("bench_name", sa.String(200), primary_key=True),
+    sa.Column("owner", sa.String(32), nullable=False),
+    sa.Column("host", sa.String(200), nullable=False),
+    sa.Column("machine", sa.String(200), nullable=False),
+    sa.Column("pid", sa.BigInteger, nullable=False),
+    sa.Column("since", Instant, nullable=False),
+    sa.Column("beat", sa.BigInteger, nullable=False),
+    sa.Column("beat_at", Instant, nullable=False),
+    sa.Column("expires_at", Instant, nullable=False),
+)

@@ -1,0 +1,60 @@
+"""What all tables share: one metadata with named constraints, portable column types, and the usual columns.
+
+Instants are aware UTC, kept as whole microseconds.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Dialect
+
+metadata = sa.MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "ck": "ck_%(table_name)s_%(constraint_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_N_name)s_%(referred_table_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+class Instant(sa.TypeDecorator[datetime]):
+    """An aware instant as whole microseconds since 1970; a naive datetime is refused."""
+
+    impl = sa.BigInteger
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> int | None:  # noqa: ARG002
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"an instant needs a time zone: {value!r}")
+        return (value - EPOCH) // timedelta(microseconds=1)
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> datetime | None:  # noqa: ARG002
+        return None if value is None else EPOCH + timedelta(microseconds=int(value))
+
+
+#: Whole numbers that count rows; SQLite numbers rows by itself only in a column of type INTEGER.
+RowId = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
+
+
+def id_column() -> sa.Column[int]:
+    """Return a primary key that the database counts."""
+    return sa.Column("id", RowId, primary_key=True, autoincrement=True)
+
+
+def recording_column() -> sa.Column[int]:
+    """Return the reference to a recording."""
+    return sa.Column("recording_id", RowId, sa.ForeignKey("recordings.id"), nullable=False)
+
+
+def campaign_column() -> sa.Column[int]:
+    """Return the reference to a campaign."""
+    return sa.Column("campaign_id", RowId, sa.ForeignKey("campaigns.id"), nullable=False)

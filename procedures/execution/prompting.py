@@ -1,0 +1,61 @@
+"""Asking the operator: the question, the wait for the answer with reminders, and the time limit of the recipe."""
+
+from __future__ import annotations
+
+import math
+
+from procedures.contracts.errors import StepFailed, Unanswered
+from procedures.contracts.journal import CampaignState, Event
+from procedures.contracts.operator import Answer, Prompt
+from procedures.execution.context import CHECK_S, POLL_S, ExecutionContext
+from procedures.monitoring.recorder import warning
+
+
+def ask(context: ExecutionContext, prompt: Prompt) -> Answer:
+    """Ask the operator and wait for the answer, with the environment recorded.
+
+    Raises StepFailed when the answer is no, Unanswered when none comes in time, and what `ExecutionContext.polls`
+    raises.
+    """
+    context.recorder.event(Event("operator.asked", f"{prompt.text} [question {prompt.id}]"))
+    context.operator.ask(prompt)
+    answer = context.operator.answer(prompt.id)
+    if answer is None:
+        answer = _wait_for_answer(context, prompt)
+    if not answer.confirmed:
+        raise StepFailed(f"{answer.by} declined: {prompt.text}: {answer.reason}")
+    context.recorder.event(Event(f"operator.{prompt.kind}", f"{prompt.text}: confirmed by {answer.by}"))
+    return answer
+
+
+def _wait_for_answer(context: ExecutionContext, prompt: Prompt) -> Answer:
+    """Show that the campaign waits until the answer is there."""
+    recorder = context.recorder
+    recorder.tracker.update(prompt=prompt)
+    recorder.change_state(CampaignState.WAITING, prompt.text)
+    try:
+        answer = _poll_until_answered(context, prompt)
+    finally:
+        context.operator.withdraw(prompt.id)
+        recorder.tracker.update(prompt=None)
+    recorder.change_state(CampaignState.RUNNING, f"answered by {answer.by}")
+    return answer
+
+
+def _poll_until_answered(context: ExecutionContext, prompt: Prompt) -> Answer:
+    rules, clock = context.recipe.on_failure, context.clock
+    timeout_s, remind_s = rules.operator_timeout_s, rules.operator_remind_s or math.inf
+    began_s = next_poll_s = clock.now_s()
+    remind_at_s = began_s + remind_s
+    while (answer := context.operator.answer(prompt.id)) is None:
+        if timeout_s is not None and clock.now_s() - began_s >= timeout_s:
+            raise Unanswered(f"nobody answered within {timeout_s:g} s: {prompt.text}")
+        if clock.now_s() >= remind_at_s:
+            remind_at_s += remind_s
+            text = f"{prompt.text} [question {prompt.id}], open since {clock.now_s() - began_s:.0f} s"
+            context.recorder.event(warning("operator.reminded", text))
+        if clock.now_s() >= next_poll_s:
+            context.poll()
+            next_poll_s = clock.now_s() + POLL_S
+        context.pass_time(CHECK_S, pausing=False)
+    return answer

@@ -1,0 +1,52 @@
+"""The end of a campaign: the bench in its safe state, whatever happened before, and the final state in the journal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from procedures.contracts.journal import NOT_SAFE, CampaignState, Event
+from procedures.execution.context import ExecutionContext
+from procedures.execution.safe_state import make_safe
+from procedures.execution.signals import ignore_signals
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a campaign ended, and why."""
+
+    state: CampaignState
+    reason: str
+    safe: bool  #: whether every part of the safe state was confirmed
+
+
+class Shutdown:
+    """Ends a campaign in the safe state. `complaints` holds what the last safe state could not confirm."""
+
+    def __init__(self, context: ExecutionContext) -> None:
+        self._context = context
+        self.complaints: tuple[str, ...] = ()  #: set before the journal is written, so known when writing fails
+
+    def end(self, state: CampaignState, reason: str, *, bench_is_safe: bool) -> Outcome:
+        """Make the bench safe, unless its last step did, and record how the campaign ended.
+
+        Signals are ignored meanwhile; an interrupt from before that begins the shutdown again.
+        """
+        while True:
+            try:
+                with ignore_signals():
+                    return self._end(state, reason, bench_is_safe=bench_is_safe)
+            except KeyboardInterrupt:
+                continue
+
+    def _end(self, state: CampaignState, reason: str, *, bench_is_safe: bool) -> Outcome:
+        recorder = self._context.recorder
+        if not bench_is_safe:
+            recorder.tracker.update(step_text="making the bench safe")
+        self.complaints = () if bench_is_safe else make_safe(self._context.full_bench, self._context.clock)
+        if self.complaints:
+            text = NOT_SAFE + "; ".join(self.complaints)
+            reason = f"{reason}. {text}"
+            state = CampaignState.FAILED if state is CampaignState.DONE else state
+            recorder.event(Event("safe_state", text, level="error"))
+        recorder.change_state(state, reason)
+        return Outcome(state, reason, safe=not self.complaints)

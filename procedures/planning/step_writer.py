@@ -1,0 +1,138 @@
+"""Writes the steps of a recipe down one after the other, with the time that each is expected to take."""
+
+from __future__ import annotations
+
+import math
+
+from procedures.contracts.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerOn, SafeState, Soak, Step
+from procedures.planning.limits import BenchLimits
+from procedures.planning.point_order import Level, MountingBlock, order_points
+from procedures.recipe.recipe import Recipe
+
+# What is expected of things that have no limit to compute with; only the forecast hangs on them.
+ROOM_C = 25.0
+CHAMBER_SETTLING_S = 300.0  #: from the end of the ramp until the air is in the band
+HOMING_S = 30.0
+MOUNTING_S = 600.0  #: a person walks up, turns the units and confirms
+
+
+def write_steps(recipe: Recipe, limits: BenchLimits) -> tuple[Step, ...]:
+    """Return the steps of a recipe that fits its bench, in order."""
+    writer = _StepWriter(recipe, limits)
+    writer.write()
+    return tuple(writer.steps)
+
+
+class _StepWriter:
+    """Writes the steps down one after the other, keeping track of where the bench will be."""
+
+    def __init__(self, recipe: Recipe, limits: BenchLimits) -> None:
+        self.recipe = recipe
+        self.limits = limits
+        self.steps: list[Step] = []
+        self.air_c = ROOM_C
+        self.position: str = recipe.positions[0]
+        self.mounting = 0
+        self.run = 0
+        self.datasets = 0
+
+    def write(self) -> None:
+        self.steps.append(Home(expected_s=HOMING_S))
+        for block in order_points(self.recipe):
+            self.mount(block)
+            for level in block.levels:
+                self.move_chamber(level.temperature_c)
+                self.soak(level.temperature_c)
+                self.acquire(level)
+        self.power_cycles()
+        self.steps.append(SafeState())
+
+    def mount(self, block: MountingBlock) -> None:
+        """Turn the units: chamber to where it can be opened, off if the recipe says so, turn, on."""
+        if (handling_c := self.recipe.mounting.handling_c) is not None:
+            self.move_chamber(handling_c)
+        repower = self.run == 0 or (self.recipe.mounting.repower_each and not block.same_session)
+        if self.run and repower:
+            self.steps.append(PowerOff(run=self.run))
+        self.position = block.position
+        self.mounting += 1
+        next_run = self.run + 1 if repower else self.run
+        mount = Mount(position=block.position, mounting=self.mounting, run=next_run, expected_s=MOUNTING_S)
+        self.steps.append(mount)
+        if repower:
+            self.power_on()
+
+    def power_on(self) -> None:
+        self.run += 1
+        warm_up_s = self.recipe.warm_up_s
+        self.steps.append(PowerOn(run=self.run, wait_s=warm_up_s, expected_s=warm_up_s))
+
+    def move_chamber(self, temperature_c: float) -> None:
+        rules = self.recipe.soak
+        way_c = abs(temperature_c - self.air_c)
+        expected_s = 60.0 * way_c / self.limits.chamber.ramp_c_per_min
+        if way_c > rules.band_c:
+            expected_s += CHAMBER_SETTLING_S
+        self.air_c = temperature_c
+        self.steps.append(
+            MoveChamber(
+                temperature_c=temperature_c,
+                band_c=rules.band_c,
+                timeout_s=rules.move_timeout_s,
+                expected_s=expected_s,
+            )
+        )
+
+    def soak(self, temperature_c: float) -> None:
+        rules = self.recipe.soak
+        self.steps.append(
+            Soak(
+                temperature_c=temperature_c,
+                hold_s=rules.hold_s,
+                band_c=rules.band_c,
+                max_drift_c=rules.max_drift_c,
+                drift_window_s=rules.drift_window_s,
+                timeout_s=rules.timeout_s,
+                expected_s=max(rules.hold_s, rules.drift_window_s),
+            )
+        )
+
+    def acquire(self, level: Level) -> None:
+        for rate_dps in level.rates_dps:
+            self.datasets += 1
+            real_dps = self.limits.real_rate_dps(rate_dps)
+            duration_s = planned_duration_s(self.recipe, real_dps)
+            ramps_s = 2 * abs(real_dps) / self.limits.table.max_acceleration_dps2
+            self.steps.append(
+                Acquire(
+                    dataset=self.datasets,
+                    rate_dps=rate_dps,
+                    temperature_c=level.temperature_c,
+                    position=self.position,
+                    run=self.run,
+                    mounting=self.mounting,
+                    settle_s=self.recipe.acquire.settle_s,
+                    duration_s=duration_s,
+                    expected_s=self.recipe.acquire.settle_s + duration_s + ramps_s,
+                )
+            )
+
+    def power_cycles(self) -> None:
+        """Switch off and on at the last level's temperature and measure the check rates again."""
+        rules = self.recipe.power_cycle
+        for _ in range(rules.count if rules else 0):
+            assert rules is not None
+            self.steps.append(PowerOff(run=self.run, off_s=rules.off_s, expected_s=rules.off_s))
+            self.power_on()
+            self.soak(self.air_c)
+            self.acquire(Level(self.air_c, rules.rates_dps))
+
+
+def planned_duration_s(recipe: Recipe, rate_dps: float) -> float:
+    """Return how long a data set at `rate_dps` lasts: the recipe's time, stretched to whole turns where it asks so."""
+    rules = recipe.acquire
+    if rules.whole_turns_above_dps is None or abs(rate_dps) < rules.whole_turns_above_dps * (1 - 1e-6):
+        return rules.duration_s
+    turn_s = 360.0 / abs(rate_dps)
+    whole_s = math.ceil(rules.duration_s / turn_s - 1e-9) * turn_s
+    return whole_s if whole_s <= rules.max_duration_s else rules.duration_s

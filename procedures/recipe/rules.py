@@ -1,0 +1,122 @@
+"""The tables of a recipe: how to soak, acquire, mount, guard and resume, each with its defaults and limits."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, Strict
+
+Number = Annotated[float, Strict()]  #: a number written as a number: "20" in quotes is refused
+Whole = Annotated[int, Strict()]
+Yes = Annotated[bool, Strict()]
+Position = Literal["x", "-x", "y", "-y", "z", "-z"]
+Action = Literal["warn", "suspend", "fail"]
+GuardKind = Literal[
+    "chamber_limits",  # air against the chamber's limits
+    "unit_air",  # air against a unit's limits
+    "unit_temperature",  # a unit's own thermometer against its limits
+    "chamber_deviation",  # air off its set point while readings are taken
+    "chamber_alarm",  # the controller itself says so
+    "stale",  # a chamber or a unit has said nothing for too long
+    "damaged_readings",
+    "invalid_readings",
+    "rate",  # really run against asked
+    "unit_off_air",  # a unit's own thermometer against the air, while readings are taken
+    "soak",  # a temperature that a unit does not take in time
+]
+
+
+class Table(BaseModel):
+    """A table of a recipe; an unknown key is an error with a name."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class SoakRules(Table):
+    """When a unit counts as having taken a temperature."""
+
+    hold_s: Number = Field(default=3600.0, ge=0, le=7 * 86_400)  #: time inside the band before anything is measured
+    band_c: Number = Field(default=0.5, gt=0)  #: chamber air within +- this of the set point
+    max_drift_c: Number = Field(default=0.2, gt=0)  #: of each unit's own thermometer over the window below
+    drift_window_s: Number = Field(default=600.0, gt=0)
+    timeout_s: Number = Field(default=10_800.0, gt=0)  #: a soak that takes longer is a failure
+    move_timeout_s: Number = Field(default=10_800.0, gt=0)  #: and so is a chamber that does not arrive
+
+
+class AcquireRules(Table):
+    """How one data set is taken."""
+
+    duration_s: Number = Field(default=60.0, ge=1)
+    settle_s: Number = Field(default=5.0, ge=0)  #: at the steady rate, before the first reading that counts
+    #: From this rate up a data set lasts whole turns, so that what hangs on the table's angle averages out.
+    whole_turns_above_dps: Number | None = Field(default=None, gt=0)
+    max_duration_s: Number = Field(default=180.0, gt=0)  #: unless the whole turns would take longer than this
+
+
+class Replicates(Table):
+    """What is measured more than once, so that the scatter between data sets can be seen."""
+
+    zero_rate: tuple[Literal["start", "middle", "end"], ...] = ()  #: where in a level the table also stands still
+    repeated_rates: Whole = Field(default=0, ge=0)  #: rates of each level, drawn by lot, that are run a second time
+    first_temperature_again: Yes = False  #: each mounting ends with the temperature it began with
+
+
+class Inverted(Table):
+    """Each position once more upside down, in the same powered session."""
+
+    temperatures_c: tuple[Number, ...] = Field(min_length=1)
+    rates_dps: tuple[Number, ...] = Field(min_length=1)
+
+
+class PowerCycle(Table):
+    """The unit switched off and on again at the temperature of the last level, and measured again."""
+
+    count: Whole = Field(default=1, ge=1)
+    off_s: Number = Field(default=600.0, ge=0)
+    rates_dps: tuple[Number, ...] = Field(min_length=1)
+
+
+class Mounting(Table):
+    """How a unit is turned."""
+
+    #: The chamber goes here before a person opens it; absent: the unit is turned at the temperature of the level.
+    handling_c: Number | None = 25.0
+    repower_each: Yes = False  #: the units are switched off whenever one is turned: a new powered session
+
+
+class GuardRules(Table):
+    """Limits that are watched while anything runs."""
+
+    chamber_margin_c: Number = Field(default=2.0, ge=0)  #: air beyond the limits of chamber or unit by more
+    chamber_deviation_c: Number = Field(default=2.0, gt=0)  #: air off its set point while readings are taken
+    gyro_margin_c: Number = Field(default=15.0, ge=0)  #: a unit's own thermometer beyond the unit's limits by more
+    stale_s: Number = Field(default=30.0, gt=0)  #: no fresh reading of a chamber or a unit for longer
+    max_damaged_fraction: Number = Field(default=0.02, gt=0, le=1)  #: of a data set's readings lost or damaged
+    max_invalid_fraction: Number = Field(default=0.5, gt=0, le=1)  #: of them marked bad by the instrument itself
+    max_rate_error_fraction: Number = Field(default=0.01, gt=0)  #: the rate really run against the one asked for
+    #: What a trip does; a guard that is not named fails the campaign.
+    actions: dict[GuardKind, Action] = {"invalid_readings": "warn"}
+    max_gyro_off_air_c: Number = Field(default=20.0, gt=0)  #: of a unit that has been soaked; more is no self-heating
+    release_s: Number = Field(default=60.0, ge=0)  #: a suspended campaign goes on after the limits held for this long
+    suspend_timeout_s: Number = Field(default=7200.0, gt=0)  #: and fails when they did not within this
+    max_suspensions: Whole = Field(default=10, ge=0)  #: of one step; once more fails
+
+
+class OnFailure(Table):
+    """What is tried before a campaign gives up."""
+
+    acquire_attempts: Whole = Field(default=2, ge=1)  #: a data set whose readings failed is taken again
+    link_attempts: Whole = Field(default=3, ge=1)  #: a step whose instrument fell silent is begun so often
+    operator_timeout_s: Number | None = Field(default=None, gt=0)  #: absent: a question waits for ever
+    operator_remind_s: Number | None = Field(default=None, gt=0)  #: an open question is put again this often
+    #: What an unanswered mounting leads to: the end, or its data sets left out and the next mounting asked for.
+    operator_timeout: Literal["fail", "skip"] = "fail"
+
+
+class ResumeRules(Table):
+    """What is done before an interrupted campaign goes on."""
+
+    #: Unwatched for longer, a temperature is soaked again. Absent: for as long as the air takes to leave its band and
+    #: come back unseen, twice the band over the chamber's ramp.
+    soak_again_after_s: Number | None = Field(default=None, ge=0)
+    instruments_within_s: Number = Field(default=120.0, ge=0)  #: they may still be starting up after a power cut
