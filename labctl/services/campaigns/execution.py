@@ -46,7 +46,7 @@ def _engine(
         prepared.operator,
         control=control or Control(),
         observer=observe,
-        start_s=prepared.start_s,
+        time=prepared.time,
     )
 
 

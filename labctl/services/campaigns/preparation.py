@@ -18,6 +18,7 @@ from labctl.store import NewCampaign, NewUnit, Store
 from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator
 from procedures.execution.resume import Restart
 from procedures.execution.safe_state import stop_table
+from procedures.monitoring.campaign_time import CampaignTime
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
 
@@ -33,7 +34,7 @@ class Prepared:
     operator: Operator
     start_at: int = 0
     restart: Restart | None = None  #: what is known of the interruption that it is taken up after
-    start_s: float | None = None  #: the clock's time of campaign time 0; absent: when it begins
+    time: CampaignTime | None = None  #: of a resumed campaign; absent: time 0 is when it begins
 
 
 def operator_of(bench: Bench) -> Operator:

@@ -19,6 +19,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
 from labctl.store import CampaignRow, ResumePoint, Store, TakeUp, open_store
 from procedures.execution.resume import Restart
+from procedures.monitoring.campaign_time import CampaignTime
 from procedures.planning.plan import Plan
 from procedures.recipe.recipe import Recipe
 
@@ -97,7 +98,9 @@ def prepare_resume(
         dropped=standing.dropped,
         skipped=standing.skipped,
     )
-    return Prepared(campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, clock.now_s() - t_s)
+    return Prepared(
+        campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, CampaignTime(clock, t_s)
+    )
 
 
 def _refuse_other_units(row: CampaignRow, bench_file: BenchFile) -> None:
