@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from instruments.clock import SystemClock
-from labctl.services.campaigns import execution
+from labctl.services.campaigns import preparation
 from procedures.contracts.operator import HumanOperator
 from tests.helpers.browser import Faults, Service
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.timeout(300)
 @pytest.fixture
 def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     """A bench on which a person turns and switches the units."""
-    monkeypatch.setattr(execution, "operator_of", lambda _: HumanOperator())
+    monkeypatch.setattr(preparation, "operator_of", lambda _: HumanOperator())
     serving = Service(tmp_path)
     serving.start()
     yield serving

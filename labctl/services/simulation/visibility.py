@@ -7,7 +7,7 @@ from dataclasses import asdict
 from instruments.bench_config import BenchFile
 from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.services.schemas.answers import Visibility
+from labctl.services.schemas.plans import Visibility
 from labctl.services.simulation.walk import hidden_recording
 from procedures.planning.plan import Plan
 

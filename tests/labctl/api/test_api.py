@@ -161,7 +161,7 @@ def test_a_campaign_runs_and_can_be_followed(client: TestClient) -> None:
 
 def test_a_service_that_starts_again_says_what_was_left(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
-    from labctl.services.campaigns.execution import prepare
+    from labctl.services.campaigns.preparation import prepare
 
     store = Store(Database(location, write=True))
     prepare(store, "short", load_bench("single-axis-sim"), VirtualClock(), clip=False).bench.close()

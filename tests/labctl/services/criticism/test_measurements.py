@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from labctl.services.calibrations.fitting import fit_unit
-from labctl.services.commands.protocol import FitRequest
 from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import open_store
 from labctl.store.repositories.recordings import Recordings
 from tests.labctl.fitting.criticism.test_criticism import single_axis

@@ -1,4 +1,4 @@
-"""`labctl fit`, `certify`, `revoke`, `calibration`, `compensate`, `effects`: from a recording to a corrected rate."""
+"""`labctl fit`, `certify`, `revoke`, `calibration` and `compensate`: from a recording to a corrected rate."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from labctl.cli.calibration_output import print_fit
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json, RecordingId, Serial
-from labctl.cli.output import console, format_number, print_json, table
+from labctl.cli.output import console, print_json
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.answers import FitResponse
+    pass
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
 By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it.")]
@@ -33,68 +34,19 @@ def fit(
     database: Database = None,
 ) -> None:
     """Fit a model to a recording; it becomes the unit's next calibration version."""
-    from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import FitRequest
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToUnit
+    from labctl.services.commands.table import FIT
+    from labctl.services.schemas.calibrations import FitRequest
 
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
-    with one_clear_line(), open_commands(database) as commands:
-        answer = commands.fit(serial, FitRequest(recording=recording, model=model, effects=names))
+    with one_clear_line():
+        request = FitRequest(recording=recording, model=model, effects=names)
+        answer = execute(database, FIT, ToUnit(serial, request))
     if as_json:
         print_json(answer)
     else:
         print_fit(answer)
-
-
-def print_fit(answer: FitResponse) -> None:
-    """Print a fit for a person: the errors first, then the coefficients."""
-    error = answer.error
-    console.print(f"[bold]{answer.serial}[/] version {answer.version}: {answer.model.name}")
-    console.print(f"  before             {format_number(error.raw_rms_dps)} deg/s RMS")
-    console.print(f"  after              {format_number(error.rms_dps)} deg/s RMS")
-    console.print(f"  held-out           {format_number(error.heldout_rms_dps)} deg/s RMS")
-    console.print(f"  noise floor        {format_number(error.noise_floor_dps)} deg/s")
-    low, high = answer.validity.temperature_c
-    slow, fast = answer.validity.rate_dps
-    console.print(f"  valid              {low:.1f} to {high:.1f} deg C, {slow:.4g} to {fast:.4g} deg/s")
-    for axis, content in answer.axes.items():
-        coefficients = content["coefficients"]
-        if "temperature_c" in coefficients:
-            console.print(f"\n[bold]axis {axis}[/]: a table over {len(coefficients['temperature_c'])} temperatures")
-            print_table(coefficients)
-            continue
-        rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
-        for name, entry in coefficients.items():
-            rows.add_row(name, entry["unit"], format_number(entry["value"], 6), format_number(entry["u"], 2))
-        console.print(rows)
-
-
-def print_table(coefficients: dict[str, object]) -> None:
-    """Print a coefficient table over temperature, one row per temperature."""
-    names = [name for name in coefficients if name != "temperature_c"]
-    nodes: list[float] = coefficients["temperature_c"]  # type: ignore[assignment]
-    rows = table("", "deg C", *names, numbers=len(names) + 1)
-    for index, node in enumerate(nodes):
-        values = [coefficients[name]["value"][index] for name in names]  # type: ignore[index]
-        rows.add_row(f"{node:.2f}", *(format_number(value, 5) for value in values))
-    console.print(rows)
-
-
-def effects(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001
-    """List the catalogue of physical effects and the model presets."""
-    from labctl.services.effects import catalogue
-
-    answer = catalogue()
-    if as_json:
-        print_json(answer)
-        return
-    rows = table("effects", "id", "origin", "term", "what it is")
-    for effect in answer["effects"]:
-        rows.add_row(effect["id"], effect["origin"], effect["term"], effect["sentence"])
-    console.print(rows)
-    presets = table("\nmodels", "name", "what it is")
-    for preset in answer["models"]:
-        presets.add_row(preset["name"], preset["sentence"])
-    console.print(presets)
 
 
 def certify(
@@ -107,17 +59,17 @@ def certify(
     database: Database = None,
 ) -> None:
     """Make a version the unit's current one. An older version again is a rollback."""
-    _act("certify", serial, version, by, reason, due_days, as_json, database)
+    _set_in_force("certify", serial, version, by, reason, due_days, as_json, database)
 
 
 def revoke(
     serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
 ) -> None:
     """Take a version out of force."""
-    _act("revoke", serial, version, by, reason, None, as_json, database)
+    _set_in_force("revoke", serial, version, by, reason, None, as_json, database)
 
 
-def _act(
+def _set_in_force(
     act: Literal["certify", "revoke"],
     serial: str,
     version: int,
@@ -127,16 +79,15 @@ def _act(
     as_json: bool,
     database: str | None,
 ) -> None:
-    from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import CertifyRequest
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToVersion
+    from labctl.services.commands.table import CERTIFY, REVOKE
+    from labctl.services.schemas.calibrations import CertifyRequest
 
-    with one_clear_line(), open_commands(database) as commands:
+    command = CERTIFY if act == "certify" else REVOKE
+    with one_clear_line():
         request = CertifyRequest(by=by, reason=reason, due_days=due_days)
-        answer = (
-            commands.certify(serial, version, request)
-            if act == "certify"
-            else commands.revoke(serial, version, request)
-        )
+        answer = execute(database, command, ToVersion(serial, version, request))
     if as_json:
         print_json(answer)
     else:

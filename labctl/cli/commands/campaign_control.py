@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from labctl.cli.campaign import CampaignId, look, print_campaign, print_end
-from labctl.cli.error_reporting import ending_is_an_interrupt, one_clear_line
-from labctl.cli.options import BenchName, Database, Json
+from labctl.cli.campaign_output import print_campaign, print_end
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import BenchName, CampaignId, Database, Json
 from labctl.cli.output import console, print_json
 
 Id = Annotated[int, typer.Argument(metavar="ID", help="Campaign.")]
@@ -28,11 +28,12 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
     """Follow a campaign until it ends: from a running service live, else what the database tells."""
     from instruments.clock import SystemClock
     from labctl.cli.progress_bar import CampaignProgress
+    from labctl.services.commands.open import current_status
 
     clock, asked, fault = SystemClock(), "", ""
     with one_clear_line(), CampaignProgress(quiet=as_json) as progress:
         while True:
-            answer = look(database, campaign)
+            answer = current_status(database, campaign)
             progress.update(answer)
             if not as_json and answer.prompt is not None and answer.prompt.id != asked:
                 asked = answer.prompt.id
@@ -54,11 +55,14 @@ def pause(
     database: Database = None,
 ) -> None:
     """Hold a running campaign after the present data set; the bench is still watched."""
-    from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import ReasonRequest
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToCampaign
+    from labctl.services.commands.table import PAUSE_CAMPAIGN
+    from labctl.services.schemas.campaigns import ReasonRequest
 
-    with one_clear_line(), open_commands(database) as commands:
-        answer = commands.pause_campaign(campaign, ReasonRequest(reason=reason, by=person(by)))
+    with one_clear_line():
+        request = ReasonRequest(reason=reason, by=person(by))
+        answer = execute(database, PAUSE_CAMPAIGN, ToCampaign(campaign, request))
     print_json(answer) if as_json else print_campaign(answer)
 
 
@@ -77,25 +81,17 @@ def resume(
     database: Database = None,
 ) -> None:
     """Let a paused campaign go on, or take up one that was interrupted, failed or aborted; safe state first."""
-    from labctl.cli.progress_bar import CampaignProgress
-    from labctl.cli.terminal_operator import TerminalOperator
-    from labctl.services.campaigns.resume import resume_here
-    from labctl.services.commands.local import service_url
-    from labctl.services.commands.protocol import ResumeRequest
+    from labctl.cli.campaign_terminal import campaign_terminal
+    from labctl.services.commands.open import campaign_to_resume, open_commands
+    from labctl.services.commands.requests import CampaignResume
+    from labctl.services.commands.table import RESUME_CAMPAIGN
+    from labctl.services.schemas.campaigns import ResumeRequest
 
     with one_clear_line():
         request = ResumeRequest.model_validate({"by": person(by), "power": power})
-        if url := service_url(database):
-            from labctl.services.commands.remote import HttpCommands
-
-            wanted = look(database, campaign).id
-            answer = HttpCommands(url).resume_campaign(wanted, request)
-            print_json(answer) if as_json else print_campaign(answer)
-            return
-        with ending_is_an_interrupt(), CampaignProgress(quiet=as_json) as progress:
-            answer = resume_here(
-                database, campaign, bench, speed, request, progress.update, TerminalOperator().answer_prompts
-            )
+        asked = CampaignResume(campaign_to_resume(database, campaign), request, bench, speed)
+        with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
+            answer = commands.execute(RESUME_CAMPAIGN, asked)
     print_end(answer, as_json=as_json)
 
 
@@ -106,10 +102,13 @@ def abort(
     database: Database = None,
 ) -> None:
     """End a running campaign now, in the safe state. What was measured is kept."""
-    from labctl.services.commands.local import open_commands
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToCampaign
+    from labctl.services.commands.table import ABORT_CAMPAIGN
+    from labctl.services.schemas.campaigns import ReasonRequest
 
-    with one_clear_line(), open_commands(database) as commands:
-        answer = commands.abort_campaign(campaign, reason)
+    with one_clear_line():
+        answer = execute(database, ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason=reason)))
     print_json(answer) if as_json else print_campaign(answer)
 
 
@@ -126,14 +125,15 @@ def confirm(
     database: Database = None,
 ) -> None:
     """Answer a campaign's question: it is done, or cannot be. An answer to an older question is refused."""
-    from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import ConfirmRequest
+    from labctl.services.commands.open import current_status, execute
+    from labctl.services.commands.requests import ToCampaign
+    from labctl.services.commands.table import CONFIRM_PROMPT
+    from labctl.services.schemas.campaigns import ConfirmRequest
 
     with one_clear_line():
-        wanted = campaign if campaign is not None else look(database, None).id
+        wanted = campaign if campaign is not None else current_status(database, None).id
         request = ConfirmRequest(prompt=prompt, by=person(by), confirmed=decline is None, reason=decline or "")
-        with open_commands(database) as commands:
-            answer = commands.confirm(wanted, request)
+        answer = execute(database, CONFIRM_PROMPT, ToCampaign(wanted, request))
     print_json(answer) if as_json else print_campaign(answer)
 
 

@@ -1,4 +1,4 @@
-"""`labctl campaign schedule`: list, show, cancel; and entering a start, for `labctl campaign start --at | --cron`."""
+"""`labctl campaign schedule`: list, show, cancel. `labctl campaign start --at | --cron` enters a start."""
 
 from __future__ import annotations
 
@@ -6,50 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labctl.cli.campaign_output import print_start
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr, table
 
 if TYPE_CHECKING:
-    from labctl.services.commands.protocol import CampaignRequest
-    from labctl.services.schemas.answers import ScheduledResponse
+    pass
 
 app = typer.Typer(no_args_is_help=True, help="The schedule: campaigns that begin later, in a running service.")
 
 StartId = Annotated[int, typer.Argument(metavar="ID", help="Entry of the schedule.")]
-
-
-def enter(
-    request: CampaignRequest,
-    bench: str | None,
-    database: str | None,
-    *,
-    as_json: bool,
-    pace: float | None,
-    seed: int | None,
-) -> None:
-    """Enter a start into the schedule, and print the entry."""
-    from labctl.errors import BadInput
-    from labctl.services.commands.local import open_commands
-
-    for option, value in (("--speed", pace), ("--seed", seed)):
-        if value is not None:
-            raise BadInput(f"{option} {value}: the service that runs it then sets its own; leave the option out")
-    with open_commands(database) as commands:
-        answer = commands.schedule_campaign(request, bench)
-    print_json(answer) if as_json else print_start(answer)
-
-
-def print_start(answer: ScheduledResponse) -> None:
-    """Print one entry of the schedule."""
-    console.print(f"start {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]")
-    if answer.due_at is not None:
-        again = f", again by cron line {answer.cron!r}" if answer.cron else ""
-        console.print(f"  begins {answer.due_at:%Y-%m-%d %H:%M %z} ({answer.time_zone}){again}", markup=False)
-    for event in answer.history:
-        console.print(f"  due {event.due_at:%Y-%m-%d %H:%M %z}: {event.outcome}: {event.message}", markup=False)
-    if answer.note:
-        console.print(f"  {answer.note}", style="yellow", markup=False)
 
 
 @app.command("list")
@@ -59,8 +26,7 @@ def list_(
     database: Database = None,
 ) -> None:
     """List what begins when, next first."""
-    from labctl.services.commands.local import service_url
-    from labctl.services.commands.open import open_readonly
+    from labctl.services.commands.open import open_readonly, service_url
     from labctl.services.schedule.queue import list_starts
 
     with one_clear_line(), open_readonly(database) as store:
@@ -96,8 +62,10 @@ def show(start: StartId, as_json: Json = False, database: Database = None) -> No
 @app.command("cancel")
 def cancel(start: StartId, as_json: Json = False, database: Database = None) -> None:
     """Take an entry out of the schedule. A campaign that it has begun runs on."""
-    from labctl.services.commands.local import open_commands
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToStart
+    from labctl.services.commands.table import CANCEL_START
 
-    with one_clear_line(), open_commands(database) as commands:
-        answer = commands.cancel_start(start)
+    with one_clear_line():
+        answer = execute(database, CANCEL_START, ToStart(start))
     print_json(answer) if as_json else print_start(answer)

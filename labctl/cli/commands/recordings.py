@@ -20,10 +20,12 @@ def import_(
     database: Database = None,
 ) -> None:
     """Take in a recording made on any bench, in the interchange format."""
-    from labctl.services.commands.local import open_commands
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import RecordingFolder
+    from labctl.services.commands.table import IMPORT_RECORDING
 
-    with one_clear_line(), open_commands(database) as commands:
-        answer = commands.import_recording(folder)
+    with one_clear_line():
+        answer = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
     if as_json:
         print_json(answer)
         return

@@ -1,4 +1,4 @@
-"""The text of the API as a page: Swagger UI, its files from this machine, so that it works without a network."""
+"""Swagger UI with files from this machine, so that it works without a network."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ START = """SwaggerUIBundle({
 
 @router.get("/api-docs")
 def page() -> HTMLResponse:
-    """The page."""
+    """Swagger UI, which reads `openapi.json`."""
     return HTMLResponse(PAGE)
 
 
 @router.get("/api-docs/{name}")
 def file(name: str) -> Response:
-    """One of its files. Raises NotFound."""
+    """A script, style sheet or icon of Swagger UI. Raises NotFound."""
     if name == "start.js":
         return Response(START, media_type="text/javascript")
     if name not in FILES:

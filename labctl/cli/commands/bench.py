@@ -38,7 +38,7 @@ def check(
 @app.command("status")
 def status(as_json: Json = False, database: Database = None) -> None:
     """Say which benches were not confirmed safe when their last campaign ended, or had none: their process is gone."""
-    from labctl.services.benches.check import bench_statuses
+    from labctl.services.campaigns.bench_status import bench_statuses
     from labctl.services.commands.open import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
@@ -63,11 +63,13 @@ def clear(
     database: Database = None,
 ) -> None:
     """Say that you have looked at a bench that was not confirmed safe; campaigns may start on it again."""
-    from labctl.services.commands.local import open_commands
-    from labctl.services.commands.protocol import ClearRequest
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToBench
+    from labctl.services.commands.table import CLEAR_BENCH
+    from labctl.services.schemas.benches import ClearRequest
 
-    with one_clear_line(), open_commands(database) as commands:
-        answer = commands.clear_bench(bench, ClearRequest(by=by, reason=reason))
+    with one_clear_line():
+        answer = execute(database, CLEAR_BENCH, ToBench(bench, ClearRequest(by=by, reason=reason)))
     print_json(answer) if as_json else console.print(f"{answer.name}: nothing is unconfirmed", markup=False)
 
 

@@ -61,14 +61,14 @@ def serve(
 def _found(source: str, database: str | None) -> tuple[str, str]:
     """Say what is wrong with a bench when its service starts, and which campaign was left there; empty for nothing."""
     from labctl.services.campaigns.execution import describe_safe_state
-    from labctl.services.campaigns.resume import to_be_taken_up
+    from labctl.services.campaigns.recovery import describe_recovery
     from labctl.services.commands.open import open_readonly
     from labctl.services.planning.loading import load_bench
 
     name = load_bench(source).name
     with open_readonly(database) as store:
         unconfirmed = store.benches.unconfirmed(name)
-        return describe_safe_state(name, unconfirmed) if unconfirmed else "", to_be_taken_up(store, name)
+        return describe_safe_state(name, unconfirmed) if unconfirmed else "", describe_recovery(store, name)
 
 
 def simulator(
