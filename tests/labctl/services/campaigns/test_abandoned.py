@@ -116,13 +116,13 @@ def test_what_is_not_safe_is_on_the_bench_before_the_campaign_ends(store: Store)
 def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: Store) -> None:
     left_running(store)
     with pytest.raises(NotEnoughData, match="no complete data set yet"):
-        newest_row(store, "FOG-0001", None).id
+        newest_row(store, "FOG-0001", None)
     prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
     run(store, prepared)
     left_running(store)
     assert newest_row(store, "FOG-0001", None).id == 2
     with pytest.raises(NotEnoughData, match="recording 3"):
-        newest_row(store, "FOG-0001", 3).id
+        newest_row(store, "FOG-0001", 3)
 
 
 def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say_so(store: Store) -> None:
