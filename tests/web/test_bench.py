@@ -102,13 +102,15 @@ def test_says_that_it_is_stale_and_goes_on_where_it_was(
 
 
 def test_a_service_without_a_bench_says_how_to_start_one(tmp_path: Path, chromium: object) -> None:
+    from playwright.sync_api import expect
+
     serving = Service(tmp_path / "none", bench=None)
     (tmp_path / "none").mkdir()
     serving.start()
     try:
         page = chromium.new_page()
         page.goto(f"{serving.url}/bench")
-        page.get_by_text("labctl serve --simulate").wait_for()
+        expect(page.get_by_text("labctl serve --simulate")).to_be_visible()
         page.close()
     finally:
         serving.stop()

@@ -48,10 +48,7 @@ schema.app = create_app
 
 
 @schema.parametrize()
-@settings(
-    max_examples=EXAMPLES_EACH, derandomize=True, deadline=None, database=None,
-    suppress_health_check=list(HealthCheck),
-)  # fmt: skip
+@settings(max_examples=EXAMPLES_EACH, suppress_health_check=list(HealthCheck))
 def test_nothing_that_is_sent_is_a_server_error(case: Any, application: Any) -> None:
     for name, there in THERE.items():  # half of what is asked is asked of what is there
         dear = 16 if name == "version" and case.path.endswith(COSTLY) else 2
