@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 from benchmarks.machine import describe
 from instruments.clock import VirtualClock
 from labctl.api import create_app
-from labctl.services.app import LabService
+from labctl.services.lab_service import LabService
 from labctl.store import NewCampaign, Store
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables

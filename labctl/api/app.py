@@ -25,7 +25,7 @@ from labctl.api.routers import (
     swagger_ui,
     units,
 )  # fmt: skip
-from labctl.services.app import LabService
+from labctl.services.lab_service import LabService
 
 DESCRIPTION = """
 Calibrations of gyroscopes by serial number, the campaigns that measured them, and the recordings behind them.

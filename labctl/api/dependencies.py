@@ -7,8 +7,8 @@ from typing import Annotated, Any, TypeVar, cast
 
 from fastapi import APIRouter, Depends, Request
 
-from labctl.services.app import LabService
 from labctl.services.commands.command import Command
+from labctl.services.lab_service import LabService
 
 
 def get_service(request: Request) -> LabService:

@@ -13,8 +13,8 @@ from labctl.api.access_policy import OPEN, READING, AccessPolicy, role_needed
 from labctl.api.problems import as_problem
 from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, TooLarge
 from labctl.services.admin.api_keys import identify, require_role
-from labctl.services.app import LabService
 from labctl.services.commands.remote import USER_HEADER
+from labctl.services.lab_service import LabService
 from labctl.services.schemas.admin import Caller, Role
 from labctl.web import is_page
 

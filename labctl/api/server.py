@@ -18,10 +18,10 @@ from labctl.api.app import create_app
 from labctl.config import default_database
 from labctl.errors import BadInput
 from labctl.services.admin.api_keys import require_an_api_key
-from labctl.services.app import LabService
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import clock_for
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import httpx
 import pytest
 
-from labctl.services.commands.table import CREATE_KEY
+from labctl.services.commands.registry import CREATE_KEY
 from labctl.services.schemas.admin import KeyRequest, Role
 from tests.helpers.browser import Faults, Service, settled
 from tests.helpers.paths import EXAMPLES

@@ -8,8 +8,8 @@ from fastapi import APIRouter
 
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.campaigns.bench_status import bench_statuses
+from labctl.services.commands.registry import CLEAR_BENCH
 from labctl.services.commands.requests import ToBench
-from labctl.services.commands.table import CLEAR_BENCH
 from labctl.services.schemas.benches import BenchStatus, ClearRequest
 
 router = APIRouter(prefix="/api", tags=["what there is"])

@@ -14,8 +14,8 @@ from labctl.services.calibrations.certification import list_certifications
 from labctl.services.calibrations.revision import preview_unit
 from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
+from labctl.services.commands.registry import CERTIFY, FIT, IMPROVE, REVOKE
 from labctl.services.commands.requests import ToNewestOrVersion, ToUnit, ToVersion
-from labctl.services.commands.table import CERTIFY, FIT, IMPROVE, REVOKE
 from labctl.services.criticism import criticise as criticism_services
 from labctl.services.criticism.plots import pictures_unit
 from labctl.services.schemas.calibrations import (

@@ -10,14 +10,14 @@ from fastapi.responses import StreamingResponse
 
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.campaigns.plan_view import campaign_plan
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
-from labctl.services.commands.table import (
+from labctl.services.commands.registry import (
     ABORT_CAMPAIGN,
     CONFIRM_PROMPT,
     PAUSE_CAMPAIGN,
     RESUME_CAMPAIGN,
     START_CAMPAIGN,
 )
+from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
 from labctl.services.schemas.campaigns import (
     CampaignRequest,
     CampaignResponse,

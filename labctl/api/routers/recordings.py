@@ -8,8 +8,8 @@ from fastapi import APIRouter, Query, UploadFile
 from fastapi.responses import StreamingResponse
 
 from labctl.api.dependencies import ServiceDep, command_route
+from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_RECORDING, SIMULATE_RECORDING
 from labctl.services.commands.requests import RecordingFolder
-from labctl.services.commands.table import IMPORT_EXAMPLE, IMPORT_RECORDING, SIMULATE_RECORDING
 from labctl.services.recordings import catalogue
 from labctl.services.recordings.allan import allan_unit
 from labctl.services.recordings.traces import trace as trace_of

@@ -64,8 +64,8 @@ def clear(
 ) -> None:
     """Say that you have looked at a bench that was not confirmed safe; campaigns may start on it again."""
     from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import CLEAR_BENCH
     from labctl.services.commands.requests import ToBench
-    from labctl.services.commands.table import CLEAR_BENCH
     from labctl.services.schemas.benches import ClearRequest
 
     with one_clear_line():

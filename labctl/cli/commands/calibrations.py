@@ -35,8 +35,8 @@ def fit(
 ) -> None:
     """Fit a model to a recording; it becomes the unit's next calibration version."""
     from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import FIT
     from labctl.services.commands.requests import ToUnit
-    from labctl.services.commands.table import FIT
     from labctl.services.schemas.calibrations import FitRequest
 
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
@@ -80,8 +80,8 @@ def _set_in_force(
     database: str | None,
 ) -> None:
     from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import CERTIFY, REVOKE
     from labctl.services.commands.requests import ToVersion
-    from labctl.services.commands.table import CERTIFY, REVOKE
     from labctl.services.schemas.calibrations import CertifyRequest
 
     command = CERTIFY if act == "certify" else REVOKE

@@ -78,8 +78,8 @@ def start(
     """
     from labctl.cli.campaign_terminal import campaign_terminal
     from labctl.services.commands.open import open_commands
+    from labctl.services.commands.registry import START_CAMPAIGN
     from labctl.services.commands.requests import CampaignStart
-    from labctl.services.commands.table import START_CAMPAIGN
     from labctl.services.planning.loading import own_text
     from labctl.services.schemas.campaigns import CampaignRequest
 

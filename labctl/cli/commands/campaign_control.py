@@ -56,8 +56,8 @@ def pause(
 ) -> None:
     """Hold a running campaign after the present data set; the bench is still watched."""
     from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import PAUSE_CAMPAIGN
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.commands.table import PAUSE_CAMPAIGN
     from labctl.services.schemas.campaigns import ReasonRequest
 
     with one_clear_line():
@@ -83,8 +83,8 @@ def resume(
     """Let a paused campaign go on, or take up one that was interrupted, failed or aborted; safe state first."""
     from labctl.cli.campaign_terminal import campaign_terminal
     from labctl.services.commands.open import campaign_to_resume, open_commands
+    from labctl.services.commands.registry import RESUME_CAMPAIGN
     from labctl.services.commands.requests import CampaignResume
-    from labctl.services.commands.table import RESUME_CAMPAIGN
     from labctl.services.schemas.campaigns import ResumeRequest
 
     with one_clear_line():
@@ -103,8 +103,8 @@ def abort(
 ) -> None:
     """End a running campaign now, in the safe state. What was measured is kept."""
     from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import ABORT_CAMPAIGN
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.commands.table import ABORT_CAMPAIGN
     from labctl.services.schemas.campaigns import ReasonRequest
 
     with one_clear_line():
@@ -126,8 +126,8 @@ def confirm(
 ) -> None:
     """Answer a campaign's question: it is done, or cannot be. An answer to an older question is refused."""
     from labctl.services.commands.open import current_status, execute
+    from labctl.services.commands.registry import CONFIRM_PROMPT
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.commands.table import CONFIRM_PROMPT
     from labctl.services.schemas.campaigns import ConfirmRequest
 
     with one_clear_line():

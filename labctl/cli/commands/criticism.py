@@ -77,8 +77,8 @@ def improve(
 ) -> None:
     """Change a version's effects and fit again: a new version, with the error before and after."""
     from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import IMPROVE
     from labctl.services.commands.requests import ToNewestOrVersion
-    from labctl.services.commands.table import IMPROVE
     from labctl.services.effects import as_lines
     from labctl.services.schemas.calibrations import ImproveRequest
 

@@ -20,7 +20,7 @@ def backup(
     """Copy the database to one file, also while a service or a campaign uses it, and check the copy."""
     from labctl.services.admin.maintenance import back_up
     from labctl.services.commands.open import execute
-    from labctl.services.commands.table import NOTE_BACKUP
+    from labctl.services.commands.registry import NOTE_BACKUP
 
     with one_clear_line():
         answer = back_up(database, file, lambda note: execute(database, NOTE_BACKUP, note))

@@ -25,7 +25,7 @@ def create(
 ) -> None:
     """Make a key and print it, this once: only its digest is kept."""
     from labctl.services.commands.open import execute
-    from labctl.services.commands.table import CREATE_KEY
+    from labctl.services.commands.registry import CREATE_KEY
     from labctl.services.schemas.admin import KeyRequest, Role
 
     with one_clear_line():
@@ -62,8 +62,8 @@ def revoke(
 ) -> None:
     """Take a key's power away, at once."""
     from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import REVOKE_KEY
     from labctl.services.commands.requests import ToKey
-    from labctl.services.commands.table import REVOKE_KEY
     from labctl.services.schemas.campaigns import ReasonRequest
 
     with one_clear_line():

@@ -21,8 +21,8 @@ def import_(
 ) -> None:
     """Take in a recording made on any bench, in the interchange format."""
     from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import IMPORT_RECORDING
     from labctl.services.commands.requests import RecordingFolder
-    from labctl.services.commands.table import IMPORT_RECORDING
 
     with one_clear_line():
         answer = execute(database, IMPORT_RECORDING, RecordingFolder(folder))

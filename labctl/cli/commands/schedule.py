@@ -63,8 +63,8 @@ def show(start: StartId, as_json: Json = False, database: Database = None) -> No
 def cancel(start: StartId, as_json: Json = False, database: Database = None) -> None:
     """Take an entry out of the schedule. A campaign that it has begun runs on."""
     from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import CANCEL_START
     from labctl.services.commands.requests import ToStart
-    from labctl.services.commands.table import CANCEL_START
 
     with one_clear_line():
         answer = execute(database, CANCEL_START, ToStart(start))

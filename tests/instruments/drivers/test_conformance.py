@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from instruments.bench import CHAMBERS, GYROS, TABLES
 from instruments.bench_config import read_bench, shipped_benches
+from instruments.drivers.registry import CHAMBERS, GYROS, TABLES
 from instruments.errors import InstrumentError, LimitError, LinkError
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro

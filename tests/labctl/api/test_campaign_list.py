@@ -12,8 +12,8 @@ import pytest
 import sqlalchemy as sa
 
 from instruments.clock import VirtualClock
-from labctl.services.app import LabService
 from labctl.services.campaigns.status import campaign_status, list_campaigns
+from labctl.services.lab_service import LabService
 from labctl.store import NewCampaign, Store, open_store
 from labctl.store.repositories import campaign_summaries
 from labctl.store.schema import tables

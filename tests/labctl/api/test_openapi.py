@@ -12,10 +12,10 @@ from hypothesis import HealthCheck, settings
 
 from instruments.clock import VirtualClock
 from labctl.api import create_app
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.commands.registry import CERTIFY, FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
-from labctl.services.commands.table import CERTIFY, FIT, IMPORT_RECORDING
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.calibrations import CertifyRequest, FitRequest
 from labctl.store import Store

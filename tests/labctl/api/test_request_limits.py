@@ -16,10 +16,10 @@ from starlette.websockets import WebSocketDisconnect
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.api.access_policy import AccessPolicy
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.commands.registry import FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit
-from labctl.services.commands.table import FIT, IMPORT_RECORDING
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store

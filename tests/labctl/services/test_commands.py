@@ -13,12 +13,12 @@ import pytest
 from instruments.clock import VirtualClock
 from labctl.api import create_app
 from labctl.errors import BadRecording, Conflict
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.commands.encoding import json_body, recording_files
+from labctl.services.commands.registry import COMMANDS, FIT, IMPORT_RECORDING, IMPROVE, START_CAMPAIGN
 from labctl.services.commands.remote import HttpExecutor, ServiceRefused
 from labctl.services.commands.requests import CampaignStart, RecordingFolder, ToNewestOrVersion, ToStart, ToUnit
-from labctl.services.commands.table import COMMANDS, FIT, IMPORT_RECORDING, IMPROVE, START_CAMPAIGN
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.calibrations import FitRequest, ImproveRequest
 from labctl.services.schemas.campaigns import CampaignRequest

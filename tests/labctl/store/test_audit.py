@@ -22,11 +22,11 @@ from labctl.cli.app import app
 from labctl.config import os_user
 from labctl.errors import BadInput
 from labctl.services.admin.audit import anchor_of, verify_audit
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.store import Store, migrate, open_store

@@ -21,8 +21,8 @@ from labctl.errors import DiskFull, StoreError
 from labctl.recording import read_recording
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
+from labctl.services.commands.registry import CERTIFY, FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
-from labctl.services.commands.table import CERTIFY, FIT, IMPORT_RECORDING
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.calibrations import CertifyRequest, FitRequest
 from labctl.store import Store, check, copy_database, open_store

@@ -20,14 +20,14 @@ from instruments.errors import NoReply
 from labctl.api.server import ServeRequest, create_service
 from labctl.cli.app import app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
-from labctl.services.app import LabService
 from labctl.services.campaigns import recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status, list_campaigns
+from labctl.services.commands.registry import ABORT_CAMPAIGN
 from labctl.services.commands.requests import ToCampaign
-from labctl.services.commands.table import ABORT_CAMPAIGN
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.loading import newest_row
 from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest, StartRequest
@@ -201,7 +201,7 @@ def test_a_bench_is_closed_even_if_what_is_wrong_with_it_cannot_be_written(
         raise StoreError("the disk is full")
 
     monkeypatch.setattr(store.benches, "mark", full)
-    monkeypatch.setattr("labctl.store.repositories.journal.benches.mark", full)
+    monkeypatch.setattr("labctl.store.repositories.campaign_journal.benches.mark", full)
     control = Control()
     control.abort("enough")
     with pytest.raises(StoreError):

@@ -17,15 +17,15 @@ from labctl.api import create_app
 from labctl.api.access_policy import AccessPolicy
 from labctl.errors import BenchBusy, Conflict
 from labctl.services.admin.api_keys import create_key
-from labctl.services.app import LabService
 from labctl.services.benches import lease
 from labctl.services.benches.lease import STOP_S, BenchHold
 from labctl.services.campaigns import preparation, recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
+from labctl.services.commands.registry import CANCEL_START, START_CAMPAIGN
 from labctl.services.commands.requests import CampaignStart, ToStart
-from labctl.services.commands.table import CANCEL_START, START_CAMPAIGN
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import start_status
 from labctl.services.schemas.admin import KeyRequest, Role

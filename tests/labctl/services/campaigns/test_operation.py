@@ -16,9 +16,9 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.errors import Conflict, StoreError
-from labctl.services.app import LabService
 from labctl.services.campaigns import preparation
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database

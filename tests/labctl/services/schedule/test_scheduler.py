@@ -12,10 +12,10 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.commands.registry import START_CAMPAIGN
 from labctl.services.commands.requests import CampaignStart
-from labctl.services.commands.table import START_CAMPAIGN
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import add_start, cancel_start, is_scheduled, list_starts, start_status
 from labctl.services.schedule.scheduler import Scheduler

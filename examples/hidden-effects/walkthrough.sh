@@ -2,7 +2,7 @@
 # Ten hidden effects, one after the other: simulate, import, fit, criticise, improve - and the ladder at the end.
 # Criticise names each, alone or in a group with what this schedule cannot tell from it; improve adds it, and the ladder
 # falls to the noise floor. Some sizes are larger than is usual: improve says so.
-# Usage: examples/hidden-effects/walk.sh [FOLDER]      (needs labctl on the PATH, or .venv/bin/labctl)
+# Usage: examples/hidden-effects/walkthrough.sh [FOLDER]      (needs labctl on the PATH, or .venv/bin/labctl)
 set -euo pipefail
 folder="${1:-$(mktemp -d)}"
 labctl="$(command -v labctl || echo "$(dirname "$0")/../../.venv/bin/labctl")"

@@ -21,7 +21,7 @@ from labctl.store.connection.database import Database
 from labctl.store.dataset_means import means_rows
 from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.sample_blocks import block_row, blocks_of, scaled
+from labctl.store.repositories.sample_blocks import blocks_of, scaled, write_block
 from labctl.store.schema import tables
 from procedures.contracts.journal import (
     NOT_SAFE,
@@ -35,7 +35,6 @@ from procedures.contracts.steps import StepResult
 from procedures.execution.signals import defer_signals
 
 #: Made once: a statement that is built anew for every second of a campaign costs more than writing it.
-_ADD_BLOCK = sa.insert(tables.sample_blocks)
 _ADD_ENVIRONMENT = sa.insert(tables.environment)
 
 ENDED = frozenset({CampaignState.DONE, CampaignState.ABORTED, CampaignState.FAILED})
@@ -154,8 +153,7 @@ class StoreJournal:
         with self._writing(synced=False) as connection:
             if len(readings):
                 columns = _columns(readings, chamber_c)
-                row = block_row(recording, dataset, len(parts), sample_codec.pack(columns))
-                connection.execute(_ADD_BLOCK, row)
+                write_block(connection, recording, dataset, len(parts), sample_codec.pack(columns))
                 parts.append(columns)
             if readings.lost or readings.damaged:
                 connection.execute(
@@ -203,7 +201,7 @@ class StoreJournal:
             means = means_rows(recording, dataset, scaled(raw, self._channels[gyro], dict(head)), valid)
             connection.execute(sa.insert(tables.data_set_means), means)
             connection.execute(sa.delete(b).where(b.c.recording_id == recording, b.c.number == dataset))
-            connection.execute(_ADD_BLOCK, block_row(recording, dataset, 0, sample_codec.pack(raw, sample_codec.FINAL)))
+            write_block(connection, recording, dataset, 0, sample_codec.pack(raw, sample_codec.FINAL))
         connection.execute(sa.update(d).where(*this).values(state=state.value, reason=reason, n=n))
 
     def environment(self, sample: EnvironmentSample) -> None:

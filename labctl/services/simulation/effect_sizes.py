@@ -5,7 +5,7 @@ from __future__ import annotations
 from instruments.bench_config import BenchFile, GyroSettings
 from labctl.errors import BadInput
 from labctl.fitting.criticism import size_for_z, size_in_noise_units, size_reference
-from labctl.services.simulation.walk import hidden_recording
+from labctl.services.simulation.plan_simulation import hidden_recording
 from procedures.planning.plan import Plan
 
 #: Seed of the unit that sizes are computed on.
