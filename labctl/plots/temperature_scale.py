@@ -1,0 +1,23 @@
+"""The colour of a temperature, in every figure: blue is cold, red is hot. The pages have the same colours.
+
+`labctl/web/static/js/core/temperature_scale.js` holds them for the pages; a test compares the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+#: Share of the temperature range, colour.
+TEMPERATURE_SCALE = [
+    [0.0, "#2d5fbe"],
+    [0.25, "#50aabe"],
+    [0.5, "#beaa5a"],
+    [0.75, "#d76e32"],
+    [1.0, "#b42832"],
+]
+
+
+def temperature_marker(temperature_c: Sequence[float], low_c: float, high_c: float, **more: Any) -> dict[str, Any]:
+    """Return a Plotly marker coloured by temperature, of a range from low_c to high_c shared by a figure's traces."""
+    return {"color": list(temperature_c), "colorscale": TEMPERATURE_SCALE, "cmin": low_c, "cmax": high_c, **more}
