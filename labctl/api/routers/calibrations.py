@@ -10,6 +10,7 @@ from labctl.api.dependencies import ServiceDep
 from labctl.api.middleware import NEEDS_APPROVER
 from labctl.fitting.effects import read_formula
 from labctl.services.calibrations import fitting as services
+from labctl.services.calibrations.comparison import ComparisonResponse, compare_version
 from labctl.services.calibrations.revision import PreviewResponse, preview_unit
 from labctl.services.calibrations.surface import SurfaceResponse, surface_of
 from labctl.services.calibrations.uncertainty import UncertaintyResponse, uncertainty_at
@@ -106,6 +107,12 @@ def pictures(
 ) -> list[PictureResponse]:
     """Every picture that there is something to draw in, as a Plotly figure, with how to read it."""
     return pictures_unit(service.store, serial, version, recording)
+
+
+@router.get("/calibrations/{version}/comparison", summary="A version as it is, beside a recording")
+def comparison(serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None) -> ComparisonResponse:
+    """Measured and modelled error, data set by data set, and the version's model as lines; nothing is refitted."""
+    return compare_version(service.store, serial, version, recording)
 
 
 @router.get("/calibrations/{version}/surface", summary="The modelled error over rate and temperature")
