@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
@@ -18,50 +17,11 @@ from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
-from labctl.services.calibrations.model_lines import ModelLines, lines_over
-from labctl.services.recordings.transfer import newest_row, points_of
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.calibrations.model_lines import lines_over
+from labctl.services.recordings.loading import newest_row, points_of
+from labctl.services.schemas.comparison import ComparisonColumns, ComparisonResponse
 from labctl.store import Store
 from labctl.turn_error import AT_REST_DPS, LEAST_RATE_DPS, bias_at_rest, turn_errors
-
-
-class ComparisonColumns(ResponseModel):
-    """One row per data set (or piece of a long one) and output axis, as lists of equal length."""
-
-    dataset: list[int] = Field(default_factory=list)
-    axis: list[str] = Field(default_factory=list, description="The output axis.")
-    position: list[str] = Field(default_factory=list, description="The body axis that lay along the table axis.")
-    table_rate_dps: list[float] = Field(default_factory=list)
-    own_rate_dps: list[float] = Field(default_factory=list, description="True rate along the output axis.")
-    temperature_c: list[float] = Field(default_factory=list)
-    temperature_level_c: list[float] = Field(default_factory=list, description="Centre of its temperature level.")
-    rate_level_dps: list[float] = Field(default_factory=list, description="Centre of its level of the table rate.")
-    measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
-    modelled_error_dps: list[float] = Field(default_factory=list, description="The version's model there.")
-    residual_dps: list[float] = Field(default_factory=list, description="Measured minus modelled error.")
-    turn_before_deg: list[float | None] = Field(
-        default_factory=list,
-        description="Error after a full turn with the static bias alone taken off; null: too slow, another axis turns, "
-        "or the recording has nothing at rest.",
-    )
-    turn_after_deg: list[float | None] = Field(default_factory=list, description="The same after the calibration.")
-
-
-class ComparisonResponse(ResponseModel):
-    """A version applied as it is, and a recording."""
-
-    serial: str
-    version: int
-    recording: int
-    fitted_to: int | None = Field(description="The recording that the version was fitted to.")
-    source: str = Field(description="Which model all numbers here come from, in words.")
-    held: dict[str, float] = Field(description="Other channels that the lines need: their means in this recording.")
-    left_out: list[dict[str, Any]] = Field(description="Effects of the fit that do not leave with the calibration.")
-    least_turn_rate_dps: float = Field(description="The error per turn is given from this rate on.")
-    at_rest_dps: float = Field(description="Below this table rate a data set is at rest.")
-    columns: ComparisonColumns
-    over_rate: list[ModelLines] = Field(description="A line over the table rate for each temperature level.")
-    over_temperature: list[ModelLines] = Field(description="A line over temperature for each level of the table rate.")
 
 
 def compare_version(store: Store, serial: str, version: int, recording: int | None) -> ComparisonResponse:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.data.fit_data import FitData
@@ -14,24 +13,13 @@ from labctl.fitting.data.levels import level_centres, rate_levels, temperature_r
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.comparison import ModelLines
 
 #: Points of a line, besides those at the measured rates or temperatures themselves.
 POINTS = 61
 #: Lines of one panel; of more levels these many, evenly picked.
 MOST_LINES = 24
 DIGITS = 8
-
-
-class ModelLines(ResponseModel):
-    """The model's error of one output axis in one position: a row for each level, a number for each `at` in it."""
-
-    axis: str
-    position: str
-    level: list[float] = Field(description="Temperature, deg C, or table rate, deg/s, of each line.")
-    levels: int = Field(description="How many levels the recording has; more than lines: evenly picked.")
-    at: list[float] = Field(description="Table rate, deg/s, or temperature, deg C, along the lines.")
-    error_dps: list[list[float]]
 
 
 def lines_over(

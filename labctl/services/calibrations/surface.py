@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
@@ -13,36 +12,15 @@ from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
-from labctl.services.schemas.answers import ResponseModel, Validity
+from labctl.services.schemas.calibrations import Surface, SurfaceResponse, Validity
 from labctl.store import CalibrationRecord, Store
-
-
-class Surface(ResponseModel):
-    """One axis, turned about itself, the others at rest."""
-
-    rate_dps: list[float]
-    temperature_c: list[float]
-    error_dps: list[list[float]] = Field(
-        description="Output minus true rate: a row per temperature, one per rate in it."
-    )
-
-
-class SurfaceResponse(ResponseModel):
-    """What a calibration takes off, within what was calibrated."""
-
-    serial: str
-    version: int
-    validity: Validity
-    held: dict[str, float] = Field(description="Channels that the model needs besides: their means in its recording.")
-    left_out: list[dict[str, Any]] = Field(description="Effects of the fit that do not leave with the calibration.")
-    axes: dict[str, Surface]
 
 
 def surface_of(store: Store, serial: str, version: int, rate_points: int, temperature_points: int) -> SurfaceResponse:
     """Return the modelled error on a grid over the validity. Raises NotFound, BadInput, NotConverged."""
     row = store.calibrations.get(store.units.get(serial).serial, version)
     calibration = read_calibration(row.document)
-    held = held_channels(store, row, calibration)
+    held = _held(store, row, calibration)
     rates, temperatures = _grid(calibration.rate_dps, rate_points), _grid(calibration.temperature_c, temperature_points)
     axes = {
         axis: Surface(
@@ -61,7 +39,7 @@ def _grid(span: tuple[float, float], points: int) -> Array:
     return np.linspace(low, high, points) if high > low else np.array([low])
 
 
-def held_channels(store: Store, row: CalibrationRecord, calibration: Calibration) -> dict[str, float]:
+def _held(store: Store, row: CalibrationRecord, calibration: Calibration) -> dict[str, float]:
     """Return what the model's other channels are held at: their means over the recording that it was fitted to."""
     needs = calibration.fitted.model.needs
     if not needs:

@@ -15,8 +15,8 @@ from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.next_experiment import experiments_for
 from labctl.services.criticism.report_text import answer_of
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.formulas import catalogue_with
-from labctl.services.schemas.answers import CriticismResponse, ResidualsResponse
+from labctl.services.effects import catalogue_with
+from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 
