@@ -15,7 +15,6 @@ from labctl.errors import BadInput
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows
-from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.services.calibrations.model_lines import lines_over
 from labctl.services.recordings.loading import newest_row, points_of
@@ -58,24 +57,24 @@ def _columns(calibration: Calibration, data: FitData) -> ComparisonColumns:
     position = np.asarray(channels["position"]).astype(np.str_)
     rate = channels.table_rate_dps()
     level = rate_levels(rate)
-    modelled = errors_at_true_rates(calibration.fitted, channels)
+    corrected = calibration.fitted.compensate({axis: data.outputs[axis] for axis in calibration.axes}, channels)
     parts = [
-        _axis(data, axis, modelled[axis], position, level_centres(rate, level), level)
+        _axis(data, axis, corrected[axis], position, level_centres(rate, level), level)
         for axis in data.info.axes
-        if axis in modelled
+        if axis in corrected
     ]
     names = ComparisonColumns.model_fields
     return ComparisonColumns(**{name: [value for part in parts for value in part[name]] for name in names})
 
 
 def _axis(
-    data: FitData, axis: str, modelled: Array, position: NDArray[np.str_], rate_level: Array, level: NDArray[np.int64]
+    data: FitData, axis: str, corrected: Array, position: NDArray[np.str_], rate_level: Array, level: NDArray[np.int64]
 ) -> dict[str, list[Any]]:
     """Return the rows of one output axis."""
     channels = data.channels
     rate, own, warm = channels.table_rate_dps(), channels.rate_dps(axis), channels.temperature_c(axis)
     measured = data.outputs[axis] - own
-    residual = measured - modelled
+    residual = corrected - own
     own_turn = np.char.lstrip(position, "-") == axis
     before, after = (
         turn_errors(error - bias_at_rest(error, rate, warm, position), np.where(own_turn, rate, 0.0))
@@ -91,7 +90,7 @@ def _axis(
         "temperature_level_c": level_centres(warm, temperature_rows(warm, position, level)).tolist(),
         "rate_level_dps": rate_level.tolist(),
         "measured_error_dps": measured.tolist(),
-        "modelled_error_dps": modelled.tolist(),
+        "modelled_error_dps": (data.outputs[axis] - corrected).tolist(),
         "residual_dps": residual.tolist(),
         "turn_before_deg": before,
         "turn_after_deg": after,

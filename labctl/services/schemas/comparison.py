@@ -10,7 +10,10 @@ from labctl.services.schemas.base import ResponseModel
 
 
 class ModelLines(ResponseModel):
-    """The model's error of one output axis in one position: a row for each level, a number for each `at` in it."""
+    """The model's error (output minus true rate) of one output axis in one position.
+
+    A row for each level, a number for each `at` in it.
+    """
 
     axis: str
     position: str
@@ -32,8 +35,10 @@ class ComparisonColumns(ResponseModel):
     temperature_level_c: list[float] = Field(default_factory=list, description="Centre of its temperature level.")
     rate_level_dps: list[float] = Field(default_factory=list, description="Centre of its level of the table rate.")
     measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
-    modelled_error_dps: list[float] = Field(default_factory=list, description="The version's model there.")
-    residual_dps: list[float] = Field(default_factory=list, description="Measured minus modelled error.")
+    modelled_error_dps: list[float] = Field(
+        default_factory=list, description="What the version takes off: output minus corrected rate."
+    )
+    residual_dps: list[float] = Field(default_factory=list, description="What it leaves: corrected minus own rate.")
     turn_before_deg: list[float | None] = Field(
         default_factory=list,
         description="Error after a full turn with the static bias alone taken off; null: too slow, another axis turns, "

@@ -2,7 +2,7 @@
 // of the report (labctl/plots/temperature_scale.py).
 
 /** Temperature, by its share of the range shown: blue is cold, red is hot. */
-export const TEMPERATURE_SCALE = [[0, "#2d5fbe"], [0.25, "#50aabe"], [0.5, "#beaa5a"], [0.75, "#d76e32"], [1, "#b42832"]];
+export const TEMPERATURE_SCALE = [[0, "#2d5fbe"], [0.25, "#50aabe"], [0.5, "#beaa5a"], [0.75, "#d27a3a"], [1, "#bf1a20"]];
 /** Rate: violet is negative, grey is rest, green is positive. Neither is cold or hot. */
 export const RATE_SCALE = [[0, "#9b5fc0"], [0.5, "#8f979f"], [1, "#2f9e5b"]];
 /** Residual over floor, the same in every map: blue below, red above. */

@@ -5,7 +5,7 @@ import { axisColour, colour, figure } from "../core/figure.js";
 import { number } from "../core/format.js";
 import { selectField, cardWithHeader, table } from "../core/components.js";
 import { query, updateQuery } from "../core/router.js";
-import { residualMap, selectedRows, colourLimit, datasetsUnder, mapsOf } from "./residual_map.js";
+import { cellsText, residualMap, selectedRows, colourLimit, datasetsUnder, mapsOf } from "./residual_map.js";
 import { channelName, channelTitle, scaled, shownText } from "./dataset_rows.js";
 
 /** What there is of these is drawn at first: time where it is known, else the order of the data sets. */
@@ -14,7 +14,7 @@ const MAX_LISTED = 12;
 
 export function residualDiagnostics(state) {
   const rows = () => selectedRows(state);
-  const picture = residualMap("Residual over floor", "Every measured cell: the mean residual of its data sets over the noise floor. Data sets share a cell where rate and temperature repeat within 0.1 % and 0.25 K. Faded cells are within two floors of zero: by themselves they mean nothing. Drag over cells to pick them, press one to pick it.",
+  const picture = residualMap("Residual over floor", `Every measured cell: the mean residual of its data sets over the noise floor. ${cellsText(state.criticism)} Faded cells are within two floors of zero: by themselves they mean nothing. Drag over cells to pick them, press one to pick it.`,
     () => ({ maps: mapsOf(state.criticism, state.axis), limit: colourLimit(mapsOf(state.criticism, state.axis)), pick: state.pick }));
   bindSelection(picture, datasetsUnder, state);
 

@@ -21,6 +21,12 @@ export function colourLimit(...all) {
   return Math.min(Math.max(largest, LIMITS[0]), LIMITS[1]);
 }
 
+/** Which data sets share a cell, in words. */
+export function cellsText(criticism) {
+  const width = Math.max(0, ...criticism.maps.map((map) => map.level_width_c));
+  return `Data sets share a cell where rate and temperature repeat within 0.1 % and 0.25 K${width ? `; temperatures of one row are within ${plainNumber(width, 2)} K` : ""}.`;
+}
+
 const sorted = (values) => [...new Set(values)].sort((a, b) => a - b);
 
 /** Measured cells of one map: their rates and temperatures, and each cell's mean score and data sets. */
@@ -87,11 +93,10 @@ function positionPanel(map, id, pick) {
     x: which.map((cell) => cell.x), y: which.map((cell) => cell.y), customdata: which.map((cell) => cell.sets), hoverinfo: "skip", selected: { marker: { opacity: marker.opacity ?? 1 } }, unselected: { marker: { opacity: marker.opacity ?? 1 } },
   });
   const picked = found.cells.filter((cell) => cell.sets.some((set) => pick.has(set)));
-  const width = map.level_width_c ? ` (a row: within ${plainNumber(map.level_width_c, 2)})` : "";
   return {
     data: [...traces, mark(found.cells, { size: 18, opacity: 0.01, symbol: "square" }, "cells"), mark(picked, { size: 13, symbol: "square-open", color: colour("text"), line: { width: 2.5 } }, "picked")],
     x: { ...x, showgrid: false, title: { text: "table rate, deg/s" } },
-    y: { ...y, showgrid: false, title: id === "" ? { text: `deg C${filled ? width : ""}` } : undefined },
+    y: { ...y, showgrid: false, title: id === "" ? { text: "deg C" } : undefined },
     text: `${map.position} up: ${map.dataset.length} data sets${found.cells.length < map.dataset.length ? ` in ${found.cells.length} cells` : ""}`,
   };
 }
