@@ -8,7 +8,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from labctl.plots import noise, residual_lines, residual_maps, spectra
+from labctl.plots import model_lines, noise, residual_lines, residual_maps, spectra
 
 
 @dataclass(frozen=True)
@@ -111,9 +111,32 @@ LADDER = _Kind(
 )  # fmt: skip
 
 
-def pictures_of(criticism: Mapping[str, Any], ladder: Mapping[str, Any] | None = None) -> list[Picture]:
-    """Return the pictures of a criticism, and of a ladder, as far as there is something to draw. Both as JSON."""
+COMPARED = (
+    _Kind(
+        "error_over_rate", "Measured and modelled error, as the version is",
+        "Nothing is refitted here. Dots are measured, lines are the version's model at each temperature level: blue is "
+        "cold, red is hot. Rows are outputs, columns the axis that is turned; each panel has its own scale of errors.",
+        model_lines.error_over_rate,
+    ),
+    _Kind(
+        "full_turn", "Error after a full turn",
+        "How far a heading is off after one turn, from 5 deg/s on: left with the static bias at rest taken off only, "
+        "right with the calibration and the static bias that it leaves, both on the same axes; blue is cold, red is "
+        "hot.",
+        model_lines.full_turn,
+    ),
+)  # fmt: skip
+
+
+def pictures_of(
+    criticism: Mapping[str, Any], ladder: Mapping[str, Any] | None = None, comparison: Mapping[str, Any] | None = None
+) -> list[Picture]:
+    """Return the pictures of a criticism, a ladder and a comparison, as far as there is something to draw.
+
+    All three as JSON.
+    """
     found = [_picture(kind, criticism, _effects(kind.id, criticism)) for kind in KINDS]
+    found += [_picture(kind, comparison, ()) for kind in COMPARED if comparison is not None]
     found.append(_picture(LADDER, ladder or {}, ()))
     return [picture for picture in found if picture is not None]
 

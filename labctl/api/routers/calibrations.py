@@ -11,13 +11,13 @@ from labctl.api.dependencies import ServiceDep, command_route
 from labctl.fitting.effects import read_formula
 from labctl.services.calibrations import fitting as services
 from labctl.services.calibrations.certification import list_certifications
-from labctl.services.calibrations.comparison import compare_version
 from labctl.services.calibrations.revision import preview_unit
 from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
 from labctl.services.commands.registry import CERTIFY, FIT, IMPROVE, REVOKE
 from labctl.services.commands.requests import ToNewestOrVersion, ToUnit, ToVersion
 from labctl.services.criticism import criticise as criticism_services
+from labctl.services.criticism.comparison import compare_version
 from labctl.services.criticism.plots import pictures_unit
 from labctl.services.schemas.calibrations import (
     CalibrationRow,

@@ -16,6 +16,7 @@ from labctl.recording import Recording
 from labctl.turn_error import LEAST_RATE_DPS
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.service import add_recording
+from tests.helpers.simulated_recordings import single_axis
 
 PATH = "/api/units/SIM-3/calibrations"
 
@@ -138,3 +139,23 @@ def test_a_law_of_the_output_leaves_what_its_correction_leaves(client: TestClien
 
 def test_a_version_that_is_not_there_is_said_so(three: tuple[TestClient, Recording]) -> None:
     assert three[0].get(f"{PATH}/2/comparison").status_code == 404
+
+
+def test_a_coefficient_has_one_value_in_criticism_preview_and_version(client: TestClient) -> None:
+    recording = single_axis(5, saturation=-0.01)
+    add_recording(client, recording)
+    path = f"/api/units/{recording.info.serial}/calibrations"
+    client.post(path, json={"model": "ojeda2000"})
+    suspects = client.get(f"{path}/1/criticism").json()["suspects"]
+    suspect = next(each for each in suspects if each["effect"] == "saturation")
+    assert suspect["coefficients_from"] == "fit"
+    shown = suspect["coefficients"]["z"]["saturation"]
+    change = {"add": ["saturation"]}
+    preview = client.post(f"{path}/1/preview", json=change).json()
+    made = client.post(f"{path}/1/improve", json=change).json()
+    for answer in (preview, made, client.get(f"{path}/2").json()):
+        found = answer["axes"]["z"]["coefficients"]["saturation"]
+        assert found["value"] == pytest.approx(shown["value"], rel=1e-6)
+        assert found["u"] == pytest.approx(shown["u"], rel=1e-6)
+        (term,) = (term for term in answer["model"]["terms"] if term["effect"] == "saturation")
+        assert term["parameters"] == pytest.approx(suspect["parameters"])

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from labctl.fitting.criticism import residual_maps
+from labctl.fitting.data.earth import up_rate_dps
+from labctl.plots.model_lines import error_over_rate, full_turn
 from labctl.plots.noise import repeats
 from labctl.plots.residual_lines import channels, previous_rate, time
 from labctl.plots.residual_maps import maps
 from labctl.recording import Recording, read_recording, to_points
 from tests.helpers.criticism import held, views
 from tests.helpers.paths import ROOT
+from tests.helpers.service import add_recording, open_client
 from tests.helpers.simulated_recordings import single_axis, three_axes
 
 AXES = ("x", "y", "z")
@@ -139,3 +143,54 @@ def test_a_time_axis_is_there_only_where_time_is_known() -> None:
     timed = time(triaxial()[1])
     assert timed is not None
     assert {axis.title.text for axis in timed.select_xaxes() if axis.title.text} == {"time, h"}
+
+
+def compared(tmp_path: Path) -> tuple[Recording, dict[str, Any]]:
+    """Return the means of a tri-axial recording, and a version fitted to it, as it is, beside it."""
+    recording = three_axes(4, scale_factor_odd=3e-9)
+    with open_client(tmp_path / "lab.sqlite") as client:
+        add_recording(client, recording)
+        path = f"/api/units/{recording.info.serial}/calibrations"
+        client.post(path, json={"model": "yang2018"})
+        return to_points(recording), client.get(f"{path}/1/comparison").json()
+
+
+def test_nine_panels_have_measured_dots_and_model_lines_redder_with_temperature(tmp_path: Path) -> None:
+    points, comparison = compared(tmp_path)
+    figure = error_over_rate(comparison)
+    assert figure is not None
+    dots = {trace.name: trace for trace in figure.data if trace.mode == "markers"}
+    assert set(dots) == {f"{axis} about {position}" for axis in AXES for position in AXES}
+    number = {int(n): k for k, n in enumerate(points.columns["dataset"])}
+    for name, trace in dots.items():
+        axis, position = name[0], name[-1]
+        rows = [number[n] for n in trace.customdata]
+        assert len(rows) == 210
+        rate = np.asarray(points.columns["table_rate_dps"])[rows]
+        assert list(trace.x) == pytest.approx(rate.tolist())
+        true = rate + up_rate_dps(points.info) if axis == position else 0.0 * rate
+        assert list(trace.y) == pytest.approx((points.gyro_dps(axis)[rows] - true).tolist(), abs=1e-9)
+        assert list(trace.marker.color) == pytest.approx(np.asarray(points.columns["temperature_c"])[rows], abs=1e-9)
+        lines = [each for each in figure.data if each.mode == "lines" and each.xaxis == trace.xaxis]
+        (model,) = (m for m in comparison["over_rate"] if (m["axis"], m["position"]) == (axis, position))
+        assert [list(line.y) for line in lines] == model["error_dps"]
+        reds = [[int(part) for part in line.line.color[4:-1].split(",")] for line in lines]
+        assert [r - b for r, _, b in reds] == sorted(r - b for r, _, b in reds)
+
+
+def test_the_error_per_turn_is_drawn_before_and_after_on_the_same_axes(tmp_path: Path) -> None:
+    _, comparison = compared(tmp_path)
+    figure = full_turn(comparison)
+    assert figure is not None
+    columns = comparison["columns"]
+    for axis in AXES:
+        own = [
+            k for k, error in enumerate(columns["turn_before_deg"]) if error is not None and columns["axis"][k] == axis
+        ]
+        ranges = []
+        for name in ("turn_before_deg", "turn_after_deg"):
+            (trace,) = (each for each in figure.data if each.name == f"{axis} {name}")
+            assert list(trace.z) == [columns[name][k] for k in own]
+            assert len(trace.z) == 160
+            ranges.append(figure.layout[trace.scene].zaxis.range)
+        assert ranges[0] == ranges[1]

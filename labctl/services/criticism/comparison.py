@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.calibration import Calibration, read_calibration
-from labctl.errors import BadInput
+from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows
 from labctl.fitting.numeric.arrays import Array
-from labctl.services.calibrations.model_lines import lines_over
+from labctl.services.criticism.model_lines import lines_over
 from labctl.services.recordings.loading import newest_row, points_of
 from labctl.services.schemas.comparison import ComparisonColumns, ComparisonResponse
 from labctl.store import Store
@@ -45,6 +45,14 @@ def compare_version(store: Store, serial: str, version: int, recording: int | No
         least_turn_rate_dps=LEAST_RATE_DPS, at_rest_dps=AT_REST_DPS,
         columns=_columns(calibration, data), over_rate=over_rate, over_temperature=over_temperature,
     )  # fmt: skip
+
+
+def comparison_json(store: Store, serial: str, version: int, recording: int) -> dict[str, Any] | None:
+    """Return the comparison as JSON; None where the version cannot be applied to the recording."""
+    try:
+        return compare_version(store, serial, version, recording).model_dump(mode="json")
+    except LabctlError:
+        return None
 
 
 def _source(calibration: Calibration, fitted_to: int | None, recording: int) -> str:
