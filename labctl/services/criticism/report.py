@@ -6,7 +6,7 @@ from pathlib import Path
 
 from labctl.plots import report_html
 from labctl.services.criticism.comparison import comparison_json
-from labctl.services.criticism.criticise import ladder
+from labctl.services.criticism.ladder import ladder
 from labctl.services.schemas.criticism import CriticismResponse
 from labctl.store import Store
 
