@@ -11,6 +11,8 @@ from labctl.errors import BadInput, NotEnoughData
 
 #: The error per turn grows without bound towards rest.
 LEAST_RATE_DPS = 5.0
+#: Below this rate the table is at rest; the Earth turns at 0.004 deg/s.
+AT_REST_DPS = 0.01
 LEAST_READINGS = 10
 
 
@@ -27,6 +29,36 @@ def error_per_turn(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]
             "deg/s on; look at the error in deg/s instead"
         )
     return error_dps * 360.0 / np.abs(rate_dps)
+
+
+def turn_errors(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]) -> list[float | None]:
+    """Return the error after one turn, deg, of n data sets; None below the least rate, or without an error."""
+    there = (np.abs(rate_dps) >= LEAST_RATE_DPS) & np.isfinite(error_dps)
+    turned = np.full(len(rate_dps), np.nan)
+    turned[there] = error_per_turn(error_dps[there], rate_dps[there])
+    return [float(value) if ok else None for value, ok in zip(turned, there, strict=True)]
+
+
+def bias_at_rest(
+    error_dps: NDArray[np.float64],
+    rate_dps: NDArray[np.float64],
+    temperature_c: NDArray[np.float64],
+    position: NDArray[np.str_],
+) -> NDArray[np.float64]:
+    """Return the static bias that would have been taken before each of n data sets, (n,) deg/s (eqs. 1 and 15).
+
+    It is the mean error at rest in the same position, linearly interpolated to the data set's temperature; a position
+    that was never at rest takes that of all positions. NaN where nothing was measured at rest.
+    """
+    rest = np.abs(rate_dps) < AT_REST_DPS
+    bias = np.full(len(error_dps), np.nan)
+    for there in np.unique(position):
+        here = position == there
+        from_ = rest & here if np.any(rest & here) else rest
+        if np.any(from_):
+            warm, which = np.unique(temperature_c[from_], return_inverse=True)
+            bias[here] = np.interp(temperature_c[here], warm, np.bincount(which, error_dps[from_]) / np.bincount(which))
+    return bias
 
 
 @dataclass(frozen=True)

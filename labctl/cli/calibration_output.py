@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from labctl.cli.output import console, format_number, table
+from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
 if TYPE_CHECKING:
     from labctl.services.schemas.calibrations import FitResponse
@@ -29,16 +31,22 @@ def print_fit(answer: FitResponse) -> None:
             continue
         rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
         for name, entry in coefficients.items():
-            rows.add_row(name, entry["unit"], format_number(entry["value"], 6), format_number(entry["u"], 2))
+            shown = rounded_to_uncertainty(entry["value"], entry["u"])
+            rows.add_row(name, entry["unit"], shown.value + shown.power, shown.u + shown.power if shown.u else "-")
         console.print(rows)
 
 
-def print_table(coefficients: dict[str, object]) -> None:
-    """Print a coefficient table over temperature, one row per temperature."""
+def print_table(coefficients: Mapping[str, Any]) -> None:
+    """Print a coefficient table over temperature, one row per temperature, rounded to their uncertainties."""
     names = [name for name in coefficients if name != "temperature_c"]
-    nodes: list[float] = coefficients["temperature_c"]  # type: ignore[assignment]
+    nodes: list[float] = coefficients["temperature_c"]
     rows = table("", "deg C", *names, numbers=len(names) + 1)
     for index, node in enumerate(nodes):
-        values = [coefficients[name]["value"][index] for name in names]  # type: ignore[index]
-        rows.add_row(f"{node:.2f}", *(format_number(value, 5) for value in values))
+        rows.add_row(f"{node:.2f}", *(_cell(coefficients[name], index) for name in names))
     console.print(rows)
+
+
+def _cell(coefficient: Mapping[str, Any], index: int) -> str:
+    u = coefficient.get("u")
+    shown = rounded_to_uncertainty(coefficient["value"][index], u[index] if u else None)
+    return shown.value + shown.power

@@ -58,12 +58,14 @@ def repeats(answer: Mapping[str, Any]) -> go.Figure | None:
     lines = views.get("repeats") or []
     if not lines:
         return None
-    figure = grid_of([f"{line['axis']}: {line['over_floor']:.2f} of the floor" for line in lines], min(len(lines), 3))
+    figure = grid_of([_repeats_text(line) for line in lines], min(len(lines), 3))
+    timed = all("apart_s" in line for line in lines)
     for panel, line in enumerate(lines):
         where = place(panel, min(len(lines), 3))
         figure.add_trace(
             go.Scatter(
-                x=[t / 60 for t in line["apart_s"]], y=line["difference_dps"], mode="markers",
+                x=[t / 60 for t in line["apart_s"]] if timed else line["apart_sets"],
+                y=line["difference_dps"], mode="markers",
                 marker={"color": colour_of(line["axis"]), "size": 5}, name=line["axis"],
                 text=[f"data sets {a} and {b}" for a, b in line["datasets"]],
                 hovertemplate="%{text}<br>%{y:.3g} deg/s<extra></extra>",
@@ -74,9 +76,15 @@ def repeats(answer: Mapping[str, Any]) -> go.Figure | None:
             figure.add_hline(
                 y=level * 2**0.5 * line["floor_dps"], line={"color": INK, "dash": "dash", "width": 1}, **where
             )
-    figure.update_xaxes(title="apart, min" if views["sets"]["timed"] else "apart, min (by the order of rows)")
+    figure.update_xaxes(title="apart, min" if timed else "apart, data sets")
     figure.update_yaxes(title="difference, deg/s", col=1)
     return figure
+
+
+def _repeats_text(line: Mapping[str, Any]) -> str:
+    shown = len(line["difference_dps"])
+    drawn = f"; {shown} of {line['pairs']} pairs drawn" if shown < line["pairs"] else ""
+    return f"{line['axis']}: {line['over_floor']:.2f} of the floor{drawn}"
 
 
 def ladder(answer: Mapping[str, Any]) -> go.Figure | None:

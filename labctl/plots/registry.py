@@ -8,7 +8,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from labctl.plots import noise, residual_lines, residual_maps, spectra
+from labctl.plots import model_lines, noise, residual_lines, residual_maps, spectra
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,9 @@ class _Kind:
 KINDS = (
     _Kind(
         "map", "Where the model fails, in rate and temperature",
-        "Each cell is the mean residual of its data sets over the noise floor; red is too much, blue too little, the "
-        "same scale in all maps. Dimmed cells are less than two floors from zero: by themselves they mean nothing. A "
+        "Every measured cell: the mean residual of its data sets over the noise floor; red is too much, blue too "
+        "little, the same scale in all maps. Data sets share a cell where rate and temperature repeat within 0.1 % and "
+        "0.25 K. Dimmed cells are less than two floors from zero: by themselves they mean nothing. A "
         "column that is coloured from top to bottom depends on the rate, a row on the temperature, one corner on both.",
         residual_maps.maps,
     ),
@@ -47,9 +48,10 @@ KINDS = (
     ),
     _Kind(
         "time", "Residual against time",
-        "Dotted lines are power-ons; the temperature is below. A slope is drift, a step at a power-on or a re-mounting "
-        "is a shift, a decay after a power-on is warm-up. Lag-1 and the runs test are of the residuals after the drift "
-        "that the noise model knows is taken out: a small p says that neighbours still hang together.",
+        "Dotted lines are power-ons; the temperature is below; without times, the data sets in order. A slope is "
+        "drift, a step at a power-on or a re-mounting is a shift, a decay after a power-on is warm-up. Lag-1 and the "
+        "runs test are of the residuals after the drift that the noise model knows is taken out: a small p says that "
+        "neighbours still hang together.",
         residual_lines.time,
     ),
     _Kind(
@@ -109,9 +111,32 @@ LADDER = _Kind(
 )  # fmt: skip
 
 
-def pictures_of(criticism: Mapping[str, Any], ladder: Mapping[str, Any] | None = None) -> list[Picture]:
-    """Return the pictures of a criticism, and of a ladder, as far as there is something to draw. Both as JSON."""
+COMPARED = (
+    _Kind(
+        "error_over_rate", "Measured and modelled error, as the version is",
+        "Nothing is refitted here. Dots are measured, lines are the version's model at each temperature level: blue is "
+        "cold, red is hot. Rows are outputs, columns the axis that is turned; each panel has its own scale of errors.",
+        model_lines.error_over_rate,
+    ),
+    _Kind(
+        "full_turn", "Error after a full turn",
+        "How far a heading is off after one turn, from 5 deg/s on: left with the static bias at rest taken off only, "
+        "right with the calibration and the static bias that it leaves, both on the same axes; blue is cold, red is "
+        "hot.",
+        model_lines.full_turn,
+    ),
+)  # fmt: skip
+
+
+def pictures_of(
+    criticism: Mapping[str, Any], ladder: Mapping[str, Any] | None = None, comparison: Mapping[str, Any] | None = None
+) -> list[Picture]:
+    """Return the pictures of a criticism, a ladder and a comparison, as far as there is something to draw.
+
+    All three as JSON.
+    """
     found = [_picture(kind, criticism, _effects(kind.id, criticism)) for kind in KINDS]
+    found += [_picture(kind, comparison, ()) for kind in COMPARED if comparison is not None]
     found.append(_picture(LADDER, ladder or {}, ()))
     return [picture for picture in found if picture is not None]
 

@@ -34,9 +34,11 @@ ERRORS = (
 )
 
 
-def report_html(criticism: Mapping[str, Any], ladder: Mapping[str, Any] | None = None) -> str:
+def report_html(
+    criticism: Mapping[str, Any], ladder: Mapping[str, Any] | None = None, comparison: Mapping[str, Any] | None = None
+) -> str:
     """Return the page: the verdict in words, the figures behind it, then the pictures with how to read them."""
-    pictures = pictures_of(criticism, ladder)
+    pictures = pictures_of(criticism, ladder, comparison)
     title = f"{criticism['serial']}, version {criticism['version']}, against recording {criticism['recording']}"
     first, *others = [escape(line) for line in criticism["text"]]
     parts = [

@@ -18,6 +18,7 @@ LABELS = {
     "power_s": "time since power-on, s",
     "previous_rate_dps": "rate before, deg/s",
     "t_s": "time, h",
+    "order": "data sets in order",
 }
 
 
@@ -34,7 +35,8 @@ def channels(answer: Mapping[str, Any]) -> go.Figure | None:
         return None
     columns = min(len(lines), 3)
     lines = sorted(lines, key=lambda line: (line["axis"], line["channel"] != "table_rate_dps", line["channel"]))
-    figure = grid_of([_title(line) for line in lines], columns, horizontal_spacing=0.09)
+    drawn = shown_text(views.get("sets") or {})
+    figure = grid_of([_title(line) + drawn for line in lines], columns, horizontal_spacing=0.09)
     for panel, line in enumerate(lines):
         where, colour = place(panel, columns), colour_of(line["axis"])
         _dots(figure, views.get("sets") or {}, line, colour, where)
@@ -47,6 +49,12 @@ def channels(answer: Mapping[str, Any]) -> go.Figure | None:
 def _title(line: Mapping[str, Any]) -> str:
     position = f", {line['position']} up" if "position" in line else ""
     return f"{line['axis']}{position}: z = {line['z']:.1f}" if line["z"] is not None else f"{line['axis']}{position}"
+
+
+def shown_text(sets: Mapping[str, Any]) -> str:
+    """Return "; n of N data sets drawn" where not every data set is drawn, else nothing."""
+    shown, of = len(sets.get("dataset") or ()), sets.get("of", 0)
+    return f"; {shown} of {of} data sets drawn" if shown < of else ""
 
 
 def _dots(
@@ -64,37 +72,42 @@ def _dots(
 
 
 def time(answer: Mapping[str, Any]) -> go.Figure | None:
-    """Return the residual of each axis against time, power-ons as lines, and the temperature below."""
+    """Return the residual of each axis against time, power-ons as lines, and the temperature below.
+
+    Where no time is known it is against the order of the data sets.
+    """
     views = answer.get("views") or {}
     lines, sets = views.get("time") or [], views.get("sets") or {}
     if not lines or not sets:
         return None
-    hours = [t / HOUR_S for t in sets["channels"]["t_s"]]
-    figure = grid_of([_time_title(line) for line in lines] + ["temperature"], 1, shared_xaxes=True)
+    name, unit = ("t_s", HOUR_S) if sets["timed"] else ("order", 1.0)
+    along = [value / unit for value in sets["channels"][name]]
+    titles = [_time_title(line) + shown_text(sets) for line in lines]
+    figure = grid_of([*titles, "temperature"], 1, shared_xaxes=True)
     for panel, line in enumerate(lines):
         where, colour = place(panel, 1), colour_of(line["axis"])
         dots(
             figure,
-            hours,
+            along,
             sets["residual_dps"][line["axis"]],
             colour,
             [f"data set {n}" for n in sets["dataset"]],
             **where,
         )
-        at = [t / HOUR_S for t in line["t_s"]]
+        at = [value / unit for value in line[name]]
         banded(figure, at, line["mean_dps"], line["low_dps"], line["high_dps"], colour, line["axis"], **where)
-        for begin in line["power_on_t_s"]:
-            figure.add_vline(x=begin / HOUR_S, line={"color": WARM, "width": 1, "dash": "dot"}, **where)
+        for begin in line[f"power_on_{name}"]:
+            figure.add_vline(x=begin / unit, line={"color": WARM, "width": 1, "dash": "dot"}, **where)
         figure.update_yaxes(title="deg/s", **where)
     where = place(len(lines), 1)
     figure.add_trace(
         go.Scatter(
-            x=hours, y=sets["channels"]["temperature_c"], mode="lines", line={"color": WARM}, name="temperature"
+            x=along, y=sets["channels"]["temperature_c"], mode="lines", line={"color": WARM}, name="temperature"
         ),
         **where,
     )
     figure.update_yaxes(title="deg C", **where)
-    figure.update_xaxes(title=label_of("t_s") if sets["timed"] else "time, h (by the order of rows)", **where)
+    figure.update_xaxes(title=label_of(name), **where)
     return figure
 
 
@@ -111,7 +124,8 @@ def previous_rate(answer: Mapping[str, Any]) -> go.Figure | None:
     if not lines:
         return None
     columns = min(len(lines), 3)
-    figure = grid_of([_title(line) for line in lines], columns)
+    drawn = shown_text(views.get("sets") or {})
+    figure = grid_of([_title(line) + drawn for line in lines], columns)
     for panel, line in enumerate(lines):
         where, colour = place(panel, columns), colour_of(line["axis"])
         _dots(figure, views.get("sets") or {}, {**line, "channel": "previous_rate_dps"}, colour, where)

@@ -1,4 +1,4 @@
-"""Residual over floor in rate x temperature, a panel for each axis and position, one colour scale for all."""
+"""Residual over floor in rate x temperature: every measured cell, a panel for each axis and position."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import plotly.graph_objects as go
 
 from labctl.plots.theme import DIMMED_BELOW, SCALE, SCALE_LIMITS, grid_of, place
 
-#: Temperatures nearer than this are one row of a map; wider rows where there would be more than MOST_ROWS.
-SAME_TEMPERATURE_K = 1.0
-MOST_ROWS = 30
-MOST_COLUMNS = 60
+#: Cells that fill less than this share of their rows and columns are drawn where they are, not in a grid.
+LEAST_FILLED = 0.3
+HOVER = "%{x} deg/s, %{y} deg C: %{z:.2f} floors<br>data set %{customdata}<extra></extra>"
 DIM = "rgba(128,128,128,0.5)"
 
 
@@ -24,7 +23,8 @@ def maps(answer: Mapping[str, Any]) -> go.Figure | None:
         return None
     columns = min(len({picture["axis"] for picture in drawn}), 3)
     drawn.sort(key=lambda picture: (picture["position"], picture["axis"]))
-    figure = grid_of([f"{p['axis']}, {p['position']} up" for p in drawn], columns, horizontal_spacing=0.08)
+    titles = [f"{p['axis']}, {p['position']} up: {cells_text(p)}" for p in drawn]
+    figure = grid_of(titles, columns, horizontal_spacing=0.08)
     for panel, picture in enumerate(drawn):
         _panel(figure, picture, place(panel, columns))
     largest = max(abs(score) for picture in drawn for score in picture["over_floor"])
@@ -34,71 +34,72 @@ def maps(answer: Mapping[str, Any]) -> go.Figure | None:
             "colorscale": SCALE, "cmin": -limit, "cmax": limit, "colorbar": {"title": "over<br>floor"},
         }
     )  # fmt: skip
-    figure.update_xaxes(type="category")
-    figure.update_yaxes(type="category")
     figure.update_xaxes(title="table rate, deg/s", row=-(-len(drawn) // columns))
-    figure.update_yaxes(title="deg C", col=1)
+    widest = max(picture["level_width_c"] for picture in drawn)
+    figure.update_yaxes(title=f"deg C (a row: within {widest:.2g})" if widest else "deg C", col=1)
     return figure
 
 
 def _panel(figure: go.Figure, picture: Mapping[str, Any], where: Mapping[str, int]) -> None:
-    columns, across = _bins(picture["table_rate_dps"], 0.0, MOST_COLUMNS)
-    rows, down = _bins(picture["temperature_c"], SAME_TEMPERATURE_K, MOST_ROWS)
-    cells: dict[tuple[int, int], list[int]] = {}
-    for k, cell in enumerate(zip(down, across, strict=True)):
+    columns, rows = (sorted(set(picture[key])) for key in ("rate_level_dps", "temperature_level_c"))
+    cells: dict[tuple[float, float], list[int]] = {}
+    for k, cell in enumerate(zip(picture["temperature_level_c"], picture["rate_level_dps"], strict=True)):
         cells.setdefault(cell, []).append(k)
-    mean = [
-        [_mean(picture["over_floor"], cells.get((r, c), [])) for c in range(len(columns))] for r in range(len(rows))
-    ]
-    sets = [
-        [", ".join(str(picture["dataset"][k]) for k in cells.get((r, c), [])) for c in range(len(columns))]
-        for r in range(len(rows))
-    ]
-    counts = [[len(cells.get((r, c), [])) for c in range(len(columns))] for r in range(len(rows))]
-    dim = [
-        [1 if v is not None and abs(v) * sqrt(n) < DIMMED_BELOW else None for v, n in zip(line, number, strict=True)]
-        for line, number in zip(mean, counts, strict=True)
-    ]
+    mean = {cell: sum(picture["over_floor"][k] for k in sets) / len(sets) for cell, sets in cells.items()}
+    named = {cell: ", ".join(str(picture["dataset"][k]) for k in sets) for cell, sets in cells.items()}
+    dim = {cell: 1 for cell, sets in cells.items() if abs(mean[cell]) * sqrt(len(sets)) < DIMMED_BELOW}
+    if len(cells) < LEAST_FILLED * len(columns) * len(rows):
+        _scattered(figure, cells, mean, named, dim, where)
+        return
+
+    def grid(values: Mapping[tuple[float, float], Any]) -> list[list[Any]]:
+        return [[values.get((row, column)) for column in columns] for row in rows]
+
     x, y = _labels(columns), _labels(rows)
     figure.add_trace(
         go.Heatmap(
-            x=x, y=y, z=mean, customdata=sets, coloraxis="coloraxis", xgap=1, ygap=1, name=picture["axis"],
-            hovertemplate="%{x} deg/s, %{y} deg C: %{z:.2f} floors<br>data set %{customdata}<extra></extra>",
+            x=x, y=y, z=grid(mean), customdata=grid(named), coloraxis="coloraxis", xgap=1, ygap=1,
+            name=picture["axis"], hovertemplate=HOVER, hoverongaps=False,
         ),
         **where,
     )  # fmt: skip
     figure.add_trace(
         go.Heatmap(
-            x=x, y=y, z=dim, colorscale=[[0, DIM], [1, DIM]], showscale=False, hoverinfo="skip", xgap=1, ygap=1,
+            x=x, y=y, z=grid(dim), colorscale=[[0, DIM], [1, DIM]], showscale=False, hoverinfo="skip", xgap=1, ygap=1,
             name="not significant",
         ),
         **where,
     )  # fmt: skip
+    figure.update_xaxes(type="category", **where)
+    figure.update_yaxes(type="category", **where)
+
+
+def _scattered(
+    figure: go.Figure, cells: Mapping[tuple[float, float], Any], mean: Mapping[tuple[float, float], float],
+    named: Mapping[tuple[float, float], str], dim: Mapping[tuple[float, float], int], where: Mapping[str, int],
+) -> None:  # fmt: skip
+    """Draw cells that share few rates or temperatures as squares at their own rate and temperature."""
+    figure.add_trace(
+        go.Scatter(
+            x=[rate for _, rate in cells], y=[warm for warm, _ in cells], mode="markers", name="cells",
+            customdata=list(named.values()), hovertemplate=HOVER.replace("%{z", "%{marker.color"),
+            marker={
+                "symbol": "square", "size": 8, "color": list(mean.values()), "coloraxis": "coloraxis",
+                "opacity": [0.35 if cell in dim else 1.0 for cell in cells],
+            },
+        ),
+        **where,
+    )  # fmt: skip
+
+
+def cells_text(picture: Mapping[str, Any]) -> str:
+    """Return how many data sets a panel shows, and what shares a cell."""
+    cells = len(set(zip(picture["rate_level_dps"], picture["temperature_level_c"], strict=True)))
+    n = len(picture["dataset"])
+    return f"{n} data sets" + (f" in {cells} cells" if cells < n else "")
 
 
 def _labels(values: Sequence[float]) -> list[str]:
     """Return values as short texts that all differ."""
     digits = next(d for d in range(3, 18) if d == 17 or len({f"{v:.{d}g}" for v in values}) == len(values))
     return [f"{value:.{digits}g}" for value in values]
-
-
-def _mean(values: Sequence[float], rows: Sequence[int]) -> float | None:
-    return sum(values[k] for k in rows) / len(rows) if rows else None
-
-
-def _bins(values: Sequence[float], width: float, most: int) -> tuple[list[float], list[int]]:
-    """Return the centres of the rising bins that values fall into, and which bin each value is in."""
-    span = max(values) - min(values)
-    width = max(width, 2e-3 * span)
-    while True:
-        order = sorted(range(len(values)), key=lambda k: values[k])
-        which = [0] * len(values)
-        groups: list[list[float]] = []
-        for k in order:
-            if not groups or values[k] - groups[-1][0] > width:
-                groups.append([])
-            groups[-1].append(values[k])
-            which[k] = len(groups) - 1
-        if len(groups) <= most:
-            return [sum(group) / len(group) for group in groups], which
-        width *= 1.5

@@ -17,6 +17,7 @@ from labctl.services.calibrations.uncertainty import uncertainty_at
 from labctl.services.commands.registry import CERTIFY, FIT, IMPROVE, REVOKE
 from labctl.services.commands.requests import ToNewestOrVersion, ToUnit, ToVersion
 from labctl.services.criticism import criticise as criticism_services
+from labctl.services.criticism.comparison import compare_version
 from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
 from labctl.services.criticism.verification import verify_unit
@@ -33,6 +34,7 @@ from labctl.services.schemas.calibrations import (
     UncertaintyResponse,
     VersionResponse,
 )
+from labctl.services.schemas.comparison import ComparisonResponse
 from labctl.services.schemas.criticism import (
     CriticismResponse,
     PictureResponse,
@@ -132,6 +134,14 @@ def pictures(
 ) -> list[PictureResponse]:
     """Every picture that there is something to draw in, as a Plotly figure, with how to read it."""
     return pictures_unit(service.store, serial, version, recording)
+
+
+@router.get("/calibrations/{version}/comparison", summary="A version as it is, beside a recording")
+def comparison(
+    serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None, other_unit: OtherUnit = False
+) -> ComparisonResponse:
+    """Measured and modelled error, data set by data set, and the version's model as lines; nothing is refitted."""
+    return compare_version(service.store, serial, version, recording, other_unit=other_unit)
 
 
 @router.get("/calibrations/{version}/surface", summary="The modelled error over rate and temperature")

@@ -10,9 +10,10 @@ from labctl.fitting.criticism.criticism import (
     criticise,
     residuals_beside_missing,
 )
+from labctl.fitting.criticism.diagnostics import residual_maps
 from labctl.fitting.criticism.effect_size import SizeReference, size_for_z, size_in_noise_units, size_reference
 from labctl.fitting.criticism.reduction import ReducedRecording, decimate
-from labctl.fitting.criticism.residuals import Residuals, residual_maps, where_it_fails, worst_data_sets
+from labctl.fitting.criticism.residuals import Residuals, where_it_fails, worst_data_sets
 from labctl.fitting.criticism.separation import (
     SEPARATED_CHI2,
     LeadingSignal,

@@ -85,7 +85,7 @@ def criticise(
         return Criticism(verdict, data, None, None, comparison)
     seen = comparison if final is comparison else with_noise_of(comparison, final)
     residuals = residuals_of(seen)
-    suspects = tuple(suspects_of(comparison, seen, fit_data, forward, verdict))
+    suspects = tuple(suspects_of(comparison, seen, fit_data, forward, refined_term))
     suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return Criticism(
         verdict, data, base, _direct_rms_dps(fit_data, model), comparison, residuals,

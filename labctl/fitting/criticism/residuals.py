@@ -105,29 +105,6 @@ def _bins(values: Array) -> list[tuple[float, float, NDArray[np.int64]]]:
     ]
 
 
-def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
-    """Return residual over floor in rate x temperature, one map per axis and position: lists of equal length."""
-    rate = data.at_sets(data.nodes.table_rate_dps())
-    position = np.asarray(data.nodes["position"]).reshape(len(data), -1)[:, 0]
-    found = []
-    for axis, residuals in left.items():
-        warm = data.at_sets(data.nodes.temperature_c(axis))
-        for there in np.unique(position):
-            rows = np.flatnonzero(position == there)
-            found.append(
-                {
-                    "axis": axis,
-                    "position": str(there),
-                    "dataset": data.dataset[rows].tolist(),
-                    "table_rate_dps": rate[rows].tolist(),
-                    "temperature_c": warm[rows].tolist(),
-                    "residual_dps": residuals.means[rows].tolist(),
-                    "over_floor": residuals.score[rows].tolist(),
-                }
-            )
-    return found
-
-
 def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most: int = 10) -> list[dict[str, Any]]:
     """Return the data sets with the largest mean residual over its floor, at most `most`, worst first."""
     found: list[dict[str, Any]] = []

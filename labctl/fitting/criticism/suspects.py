@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,17 +14,18 @@ from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.verdict import (
     ENOUGH,
-    Verdict,
     alias_group,
     coefficients_of,
     probabilities,
     share_removed,
 )
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.effects import Term
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
+from labctl.fitting.numeric.json_numbers import none_for_nan
 
 #: At most this many suspects are reported.
 SHOWN = 6
@@ -37,34 +38,39 @@ class Suspect:
     candidate: Candidate
     probability: float
     p_value: float  #: of its gain in chi2, corrected for the number of options tried
-    coefficients: Mapping[str, Any]  #: axis -> name -> value, u, unit
+    coefficients: Mapping[str, Any]  #: axis -> name -> value, u (None: unknown), unit
+    is_fitted: bool  #: whether these are those of `after`, which a version with the effect has; else of the comparison
     share_removed: float  #: of the excess chi2, 0 to 1
     after: FitResult | None  #: fit with the effect added; None where it was not or cannot be fitted
     group: tuple[str, ...]  #: ids of the effects that cannot be distinguished from it, itself first
 
 
 def suspects_of(
-    comparison: Comparison, seen: Comparison, data: FitData, model: ErrorModel, verdict: Verdict
+    comparison: Comparison,
+    seen: Comparison,
+    data: FitData,
+    model: ErrorModel,
+    shape_of: Callable[[Comparison, Candidate], Term],
 ) -> list[Suspect]:
     """Return what may be missing, best first.
 
-    The ranking is that of `comparison`; the sizes are those of `seen`, with the noise that remains beside a fuller
-    model.
+    The ranking is that of `comparison`. Coefficients are those of a fit with the effect in its best shape (`shape_of`),
+    the one that adding the effect makes; without that fit they are those of `seen`, with the noise that remains
+    beside a fuller model.
     """
     probability = probabilities(comparison.candidates)
     effects = [c for c in comparison.candidates if not c.smooth][:SHOWN]
-    return [
-        Suspect(
-            candidate,
-            probability[candidate.id],
-            _p_value(comparison, seen, candidate),
-            coefficients_of(seen, candidate),
-            share_removed(seen, candidate),
-            _fit_with(candidate, data, model, verdict),
+    found = []
+    for candidate in effects:
+        after = _fit_with(comparison, candidate, data, model, shape_of)
+        fitted = _fitted_coefficients(after, candidate) if after and candidate.id not in model.effect_ids else {}
+        suspect = Suspect(
+            candidate, probability[candidate.id], _p_value(comparison, seen, candidate),
+            fitted or coefficients_of(seen, candidate), bool(fitted), share_removed(seen, candidate), after,
             alias_group(comparison, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,),
-        )
-        for candidate in effects
-    ]
+        )  # fmt: skip
+        found.append(suspect)
+    return found
 
 
 def _p_value(comparison: Comparison, seen: Comparison, candidate: Candidate) -> float:
@@ -76,12 +82,31 @@ def _p_value(comparison: Comparison, seen: Comparison, candidate: Candidate) -> 
     return float(-np.expm1(tried * np.log1p(-min(single, 1 - 1e-16))))
 
 
-def _fit_with(candidate: Candidate, data: FitData, model: ErrorModel, verdict: Verdict) -> FitResult | None:
+def _fit_with(
+    comparison: Comparison,
+    candidate: Candidate,
+    data: FitData,
+    model: ErrorModel,
+    shape_of: Callable[[Comparison, Candidate], Term],
+) -> FitResult | None:
     """Return a fit of the model with the candidate added; None without evidence for it, or where it cannot be had."""
     if candidate.log_bf < 0 or candidate.term is None:
         return None
-    term = verdict.terms.get(candidate.id, candidate.term)
     try:
-        return fit_preset(data, changed(model, (term,)))
+        return fit_preset(data, changed(model, (shape_of(comparison, candidate),)))
     except LabctlError:  # it cannot be fitted beside the base, or not be inverted: there is no figure
         return None
+
+
+def _fitted_coefficients(after: FitResult, candidate: Candidate) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return axis -> name -> value, u and unit of the candidate in a fit, on the axes on which it competed."""
+    found: dict[str, dict[str, dict[str, Any]]] = {}
+    for axis in (axis for axis in candidate.option if axis in after.fitted.axes):
+        fit = after.fitted.axes[axis]
+        rows = [k for k, owner in enumerate(fit.effects) if owner == candidate.id]
+        found[axis] = {
+            # one coefficient for all temperatures: the columns of a table are alike
+            fit.names[k]: {"value": float(fit.values[k, 0]), "u": none_for_nan(fit.u)[k][0], "unit": fit.units[k]}
+            for k in rows
+        }
+    return {axis: values for axis, values in found.items() if values}

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.levels import SAME_TEMPERATURE_C
 from labctl.fitting.numeric.arrays import Array
 
 
@@ -61,7 +62,7 @@ def by_turning_axis(data: FitData, errors: Mapping[str, Array]) -> dict[str, dic
 
 #: Data sets closer than this in rate (of the fastest) and temperature repeat each other.
 REPEAT_RATE = 1e-3
-REPEAT_TEMPERATURE_C = 0.25
+REPEAT_TEMPERATURE_C = SAME_TEMPERATURE_C
 REPEATS_NEEDED = 8
 
 

@@ -10,13 +10,10 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.models.fitted_model import FittedModel
-from labctl.fitting.models.inversion import NotConverged
+from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.services.schemas.calibrations import Surface, SurfaceResponse, Validity
 from labctl.store import CalibrationRecord, Store
-
-#: Rounds in which a law of the output is solved for the output; each shrinks the rest a hundredfold or so.
-ROUNDS, CLOSE_DPS = 100, 1e-12
 
 
 def surface_of(store: Store, serial: str, version: int, rate_points: int, temperature_points: int) -> SurfaceResponse:
@@ -68,21 +65,4 @@ def _error(fitted: FittedModel, axis: str, rates: Array, temperatures: Array, he
     }
     true = {name: rate if name == axis else np.zeros(n) for name in BODY_AXES}
     here = Channels(columns, true)
-    error = fitted.error_dps(here, axis) if fitted.model.argument == "rate" else _of_output(fitted, here, axis)
-    return error.reshape(len(temperatures), len(rates))
-
-
-def _of_output(fitted: FittedModel, here: Channels, axis: str) -> Array:
-    """Return the error of a law of the output, by finding the outputs that it corrects to the true rates."""
-    errors: dict[str, Array] = {name: np.zeros(len(here)) for name in fitted.axes}
-    for _ in range(ROUNDS):
-        seen = here.with_rates({**here.rates, **{name: here.rates[name] + errors[name] for name in errors}})
-        found = {name: fitted.error_dps(seen, name) for name in errors}
-        change = max(float(np.max(np.abs(found[name] - errors[name]))) for name in errors)
-        errors = found
-        if change < CLOSE_DPS * max(1.0, float(np.max(np.abs(here.rates[axis])))):
-            return errors[axis]
-    raise NotConverged(
-        f"model {fitted.model.name!r} has no output for some true rates within its validity: the last round still "
-        f"changed it by {change:.3g} deg/s; fit it in the forward form (`labctl improve`)"
-    )
+    return errors_at_true_rates(fitted, here)[axis].reshape(len(temperatures), len(rates))

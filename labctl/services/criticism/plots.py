@@ -6,6 +6,7 @@ import hashlib
 import json
 
 from labctl.services.cache import cached
+from labctl.services.criticism.comparison import comparison_json
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.criticism.ladder import ladder
 from labctl.services.schemas.criticism import PictureResponse, PicturesResponse
@@ -15,6 +16,7 @@ from labctl.store import Store
 def pictures_unit(store: Store, serial: str, version: int | None, recording: int | None) -> list[PictureResponse]:
     """Return the pictures of a version's criticism and of its unit's ladder. Raises NotFound, BadInput."""
     said, steps = criticise_unit(store, serial, version, recording), ladder(store, serial)
+    compared = comparison_json(store, serial, said.version, said.recording)
 
     def work() -> PicturesResponse:
         from labctl.plots import pictures_of  # noqa: PLC0415  a service starts without a drawing library
@@ -24,9 +26,9 @@ def pictures_unit(store: Store, serial: str, version: int | None, recording: int
                 id=picture.id, title=picture.title, how_to_read=picture.caption, effects=list(picture.effects),
                 figure=json.loads(picture.figure.to_json()),
             )
-            for picture in pictures_of(said.model_dump(mode="json"), steps.model_dump(mode="json"))
+            for picture in pictures_of(said.model_dump(mode="json"), steps.model_dump(mode="json"), compared)
         ]  # fmt: skip
         return PicturesResponse(pictures=found)
 
-    numbers = "\n".join(answer.model_dump_json() for answer in (said, steps))
+    numbers = "\n".join([*(answer.model_dump_json() for answer in (said, steps)), json.dumps(compared)])
     return cached(PicturesResponse, {"numbers": hashlib.sha256(numbers.encode()).hexdigest()}, work).pictures

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from labctl.plots import report_html
+from labctl.services.criticism.comparison import comparison_json
 from labctl.services.criticism.ladder import ladder
 from labctl.services.schemas.criticism import CriticismResponse
 from labctl.store import Store
@@ -13,4 +14,6 @@ from labctl.store import Store
 def write_report(store: Store, answer: CriticismResponse, path: Path) -> None:
     """Write a criticism with its pictures and the unit's ladder. Raises OSError where the file cannot be written."""
     steps = ladder(store, answer.serial)
-    path.write_text(report_html(answer.model_dump(mode="json"), steps.model_dump(mode="json")), encoding="utf-8")
+    compared = comparison_json(store, answer.serial, answer.version, answer.recording)
+    page = report_html(answer.model_dump(mode="json"), steps.model_dump(mode="json"), compared)
+    path.write_text(page, encoding="utf-8")

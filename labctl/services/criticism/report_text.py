@@ -100,7 +100,8 @@ def _suspect(suspect: Suspect, found: Criticism) -> dict[str, Any]:
         "log_bayes_factor": candidate.log_bf,
         "share_removed": suspect.share_removed,
         "coefficients": {axis: dict(values) for axis, values in suspect.coefficients.items()},
-        "parameters": dict(candidate.term.parameters) if candidate.term else {},
+        "coefficients_from": "fit" if suspect.is_fitted else "comparison",
+        "parameters": _shape(suspect),
         "plausible": list(kind.ranges[technology]) if technology in kind.ranges else None,
         "rms_after_dps": after.rms_dps if after else None,
         "heldout_rms_after_dps": after.heldout_rms_dps if after else None,
@@ -109,6 +110,14 @@ def _suspect(suspect: Suspect, found: Criticism) -> dict[str, Any]:
         "explanation": kind.sentence,
         "experiment": kind.experiment,
     }
+
+
+def _shape(suspect: Suspect) -> dict[str, float]:
+    """Return the nonlinear parameters that go with a suspect's coefficients."""
+    term = suspect.candidate.term
+    if suspect.is_fitted and suspect.after is not None:
+        term = next(each for each in suspect.after.fitted.model.terms if each.effect == suspect.candidate.id)
+    return dict(term.parameters) if term else {}
 
 
 def sentences(found: Criticism) -> list[str]:

@@ -31,7 +31,7 @@ LADDER = {
         {"version": 2, "model": "bias_scale+", "effects": ["bias", "x"], "rms_dps": 0.004, "heldout_rms_dps": None},
     ],
 }
-CELLS = ("dataset", "table_rate_dps", "temperature_c", "over_floor")
+CELLS = ("dataset", "rate_level_dps", "temperature_level_c", "over_floor")
 #: Attributes with which a page reaches out.
 REACHING = {"src", "href", "srcset", "action", "data", "poster", "ping", "background", "manifest", "formaction"}
 
@@ -208,7 +208,8 @@ def test_an_empty_criticism_has_no_pictures_and_a_page_all_the_same(more: dict[s
 
 
 def test_a_map_of_one_data_set_is_drawn() -> None:
-    one = {"axis": "z", "position": "z", **dict(zip(CELLS, ([1], [0.0], [25.0], [-3.0]), strict=True))}
+    values = dict(zip(CELLS, ([1], [0.0], [25.0], [-3.0]), strict=True))
+    one = {"axis": "z", "position": "z", "level_width_c": 0.0, **values}
     shown = maps({"maps": [one]})
     assert shown is not None
     assert list(shown.data[0].z[0]) == [-3.0]

@@ -11,6 +11,7 @@ from typing import Any
 
 from labctl.fitting.criticism.diagnostics.angle_spectra import angle_lines, frequency_lines, start_profile
 from labctl.fitting.criticism.diagnostics.axis import AxisView, axis_view
+from labctl.fitting.criticism.diagnostics.cells import residual_maps
 from labctl.fitting.criticism.diagnostics.channels import channel_lines, data_sets, previous_rate, time_line
 from labctl.fitting.criticism.diagnostics.periodogram import between_sets
 from labctl.fitting.criticism.diagnostics.repeatability import hysteresis_lines, repeats
@@ -23,7 +24,7 @@ from labctl.recording import Recording
 #: What there is to see beside the residual against each channel, which goes by the channel's name.
 VIEWS = ("map", "time", "angle", "frequency", "time_in_set", "legs", "previous_rate", "worst", "repeats")
 
-__all__ = ["VIEWS", "draws_of", "views_of"]
+__all__ = ["VIEWS", "draws_of", "residual_maps", "views_of"]
 
 
 def views_of(

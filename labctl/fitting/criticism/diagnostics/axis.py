@@ -27,11 +27,16 @@ class AxisView:
     floor_dps: Array  #: (m,)
     covariance: NDArray[np.float64]  #: (m, m) of the means, (deg/s)^2
     whitened: Array  #: (m,) residuals with their correlation taken out, in noise units
-    t_s: Array
+    t_s: Array  #: (m,) from the recording's start; equal steps where no time is known
     run: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.residual_dps)
+
+    @property
+    def timed(self) -> bool:
+        """Whether the recording says when each data set was measured."""
+        return "t_s" in self.data.nodes
 
     def u_dps(self, weights: NDArray[np.float64]) -> Array:
         """Return the standard uncertainty of weighted sums of means, weights (k, m), as (k,)."""

@@ -11,6 +11,7 @@ from scipy.special import ndtr
 
 from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
+from labctl.fitting.criticism.diagnostics.thinning import drawn_rows
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
@@ -22,32 +23,40 @@ SHARE = 1 / 12
 LEAST = 6
 #: Levels are apart by a gap of this share of the whole, and no wider than their least gap; the finest that will do.
 LEVEL_GAPS = (1e-6, 1e-4, 1e-3, 1e-2)
-#: Data sets that are given one by one; evenly picked when there are more.
-MOST_SETS = 300
 #: Fewer data sets than this have no runs test.
 LEAST_FOR_RUNS = 12
 
 
 def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> dict[str, Any]:
-    """Return the data sets one by one as columns of equal length: what was logged, and each axis' residual."""
+    """Return the data sets one by one as columns of equal length: what was logged, and each axis' residual.
+
+    `of` says how many the recording has; the columns have as many, or `MOST_DRAWN` of them (`drawn_rows`). Where no
+    time is known (`timed`), the channel `order` counts the data sets from 1, and there is no `t_s`.
+    """
     if not axes:
         return {}
     first = axes[0]
-    rows = np.unique(np.linspace(0, len(first) - 1, min(len(first), MOST_SETS)).round().astype(np.int64))
+    rows = drawn_rows(first.position(), first.channel("table_rate_dps"), first.temperature_c())
     names = {name for view in axes for name in smooth_channels(data, view.axis)} | {"table_rate_dps", "temperature_c"}
     if "previous_rate_dps" in data.nodes:
         names.add("previous_rate_dps")
+    name, along = time_axis(first)
     return {
         "of": len(first),
-        "timed": "t_s" in data.nodes,  # else the order of rows stands for time
+        "timed": first.timed,
         "dataset": data.dataset[rows].tolist(),
         "position": first.position()[rows].tolist(),
         "run": first.run[rows].tolist(),
-        "channels": {"t_s": plain_list(first.t_s[rows])}
-        | {name: plain_list(first.channel(name)[rows]) for name in sorted(names) if name in data.nodes},
+        "channels": {name: plain_list(along[rows])}
+        | {name: plain_list(first.channel(name)[rows]) for name in sorted(names - {"t_s"}) if name in data.nodes},
         "residual_dps": {view.axis: plain_list(view.residual_dps[rows]) for view in axes},
         "over_floor": {view.axis: plain_list((view.residual_dps / view.floor_dps)[rows]) for view in axes},
     }
+
+
+def time_axis(view: AxisView) -> tuple[str, Array]:
+    """Return the channel along which data sets follow each other, and its values (m,): `t_s`, or `order` from 1."""
+    return ("t_s", view.t_s) if view.timed else ("order", np.arange(1.0, len(view) + 1))
 
 
 def channel_lines(view: AxisView) -> Iterator[dict[str, Any]]:
@@ -112,14 +121,19 @@ def previous_rate(view: AxisView) -> dict[str, Any] | None:
 
 
 def time_line(view: AxisView) -> dict[str, Any]:
-    """Return the residual against time, where power came, and whether neighbours hang together."""
+    """Return the residual against time, where power came, and whether neighbours hang together.
+
+    Where no time is known it is against the order of the data sets: `order` and `power_on_order` stand for `t_s` and
+    `power_on_t_s`.
+    """
     begins = np.flatnonzero(np.concatenate([[True], view.run[1:] != view.run[:-1]]))
-    line = running_mean(view, view.t_s, np.ones(len(view), dtype=bool))
+    name, along = time_axis(view)
+    line = running_mean(view, along, np.ones(len(view), dtype=bool))
     z, p = runs_test(view.whitened)
     return {
         "axis": view.axis,
-        **{("t_s" if name == "at" else name): values for name, values in line.items()},
-        "power_on_t_s": plain_list(view.t_s[begins]),
+        **{(name if key == "at" else key): values for key, values in line.items()},
+        f"power_on_{name}": plain_list(along[begins]),
         "lag1": plain(_lag1(view.residual_dps, view.run)),
         "lag1_whitened": plain(_lag1(view.whitened, view.run)),
         "runs_z": plain(z),

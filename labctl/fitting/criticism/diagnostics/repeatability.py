@@ -18,7 +18,8 @@ from labctl.fitting.numeric.json_numbers import plain, plain_list
 TURN_K = 2.0
 #: Data sets reached from below and from above are compared at temperatures as close as this.
 SAME_TEMPERATURE_K = 2.0
-MOST_PAIRS = 200
+#: Pairs that are drawn one by one; of more than these, some of every size of difference.
+MOST_PAIRS = 3000
 
 
 def hysteresis_states(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -83,7 +84,8 @@ def _matched(
 def repeats(view: AxisView) -> dict[str, Any] | None:
     """Return how far data sets at one rate, temperature and position scatter; None without any.
 
-    The floor is what noise gives two data sets that far apart in time: drift moves neighbours alike.
+    The floor is what noise gives two data sets that far apart in time: drift moves neighbours alike. `apart_s` is
+    there only where times are known.
     """
     warm, rate, position = view.temperature_c(), view.channel("table_rate_dps"), view.position()
     near = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
@@ -102,7 +104,9 @@ def repeats(view: AxisView) -> dict[str, Any] | None:
     expected = variance[first] + variance[second] - 2 * view.covariance[first, second]
     floor = float(np.sqrt(np.mean(expected) / 2))
     scatter = float(np.sqrt(np.mean(difference**2) / 2))
-    shown = np.unique(np.linspace(0, len(first) - 1, min(len(first), MOST_PAIRS)).round().astype(np.int64))
+    everything = np.arange(len(first))
+    shown = everything if len(first) <= MOST_PAIRS else np.sort(np.argsort(difference)[_evenly(len(first), MOST_PAIRS)])
+    apart = {"apart_s": plain_list(np.abs(view.t_s[second] - view.t_s[first])[shown])} if view.timed else {}
     return {
         "axis": view.axis,
         "pairs": len(first),
@@ -110,6 +114,11 @@ def repeats(view: AxisView) -> dict[str, Any] | None:
         "floor_dps": plain(floor),
         "over_floor": plain(scatter / floor),
         "datasets": [[int(a), int(b)] for a, b in view.data.dataset[np.stack([first, second], axis=1)[shown]]],
-        "apart_s": plain_list(np.abs(view.t_s[second] - view.t_s[first])[shown]),
+        "apart_sets": np.abs(second - first)[shown].tolist(),
+        **apart,
         "difference_dps": plain_list(difference[shown]),
     }
+
+
+def _evenly(n: int, most: int) -> NDArray[np.int64]:
+    return np.unique(np.linspace(0, n - 1, most).round().astype(np.int64))

@@ -145,8 +145,8 @@ def test_three_axes_are_compact_and_plain_json() -> None:
     json.dumps(found, allow_nan=False)
     for name in set(found) - {"sets", "draws"}:
         assert all(numbers(line) <= 1000 for line in found[name]), name
-    assert len(found["sets"]["dataset"]) == 300
     assert found["sets"]["of"] == 630
+    assert sorted(found["sets"]["dataset"]) == list(range(1, 631))
     assert all(len(line["at"]) == 21 for line in found["channels"] if line["channel"] == "table_rate_dps")
     assert {line["position"] for line in found["channels"] if line["channel"] == "table_rate_dps"} == {"x", "y", "z"}
     assert all(
@@ -160,7 +160,10 @@ def test_a_recording_of_means_without_times_has_the_views_that_it_can() -> None:
     warm = of(found, "temperature_c")["at"]
     assert len(warm) == 24  # no levels: a running mean all along
     assert np.max(np.diff(warm)) < 0.2 * np.ptp(warm)
-    assert len(found["time"][0]["t_s"]) == 24
+    assert len(found["time"][0]["order"]) == 24
+    assert "t_s" not in {*found["time"][0], *found["sets"]["channels"]}
+    assert found["sets"]["channels"]["order"] == list(range(1, found["sets"]["of"] + 1))
+    assert "apart_s" not in found["repeats"][0]
     assert found["frequency"] == []
     assert not found["sets"]["timed"]
     assert found["repeats"][0]["pairs"] > 8

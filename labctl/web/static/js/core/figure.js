@@ -20,16 +20,6 @@ export function loadPlotly() {
 
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 export const axisColour = (axis) => colour(`axis-${axis}`) || colour("accent");
-/** Residual over floor, the same in every map: blue below, red above. */
-export const DIVERGING = [[0, "#1f5fa8"], [0.35, "#8db3d9"], [0.5, "#c9ccd0"], [0.65, "#dd9a8b"], [1, "#b3242f"]];
-/** Temperatures from cold to hot. */
-export function temperatureColour(share) {
-  const stops = [[45, 95, 190], [80, 170, 190], [190, 170, 90], [215, 110, 50], [180, 40, 50]];
-  const at = Math.min(Math.max(share, 0), 1) * (stops.length - 1);
-  const k = Math.min(Math.floor(at), stops.length - 2);
-  return `rgb(${stops[k].map((low, c) => Math.round(low + (at - k) * (stops[k + 1][c] - low))).join(",")})`;
-}
-
 const TOOLS = [["zoom2d", "pan2d", "select2d", "lasso2d", "resetScale2d"]];
 const TOOLS_3D = [["orbitRotation", "pan3d", "resetCameraDefault3d"]];
 const config = (data) => ({ displaylogo: false, responsive: true, displayModeBar: "hover", modeBarButtons: data.some((trace) => /surface|3d/.test(trace.type)) ? TOOLS_3D : TOOLS });
@@ -101,7 +91,8 @@ function traces(data) {
   const rows = [["trace", "x", "y", "z"]];
   for (const trace of data) {
     const label = trace.name ?? "";
-    if (trace.z) trace.z.forEach((line, r) => Array.from(line).forEach((z, c) => rows.push([label, trace.x?.[c] ?? c, trace.y?.[r] ?? r, z])));
+    if (trace.z && !trace.z[0]?.length) trace.z.forEach((z, k) => rows.push([label, trace.x[k], trace.y[k], z])); // dots or a line in space
+    else if (trace.z) trace.z.forEach((line, r) => Array.from(line).forEach((z, c) => rows.push([label, trace.x?.[c] ?? c, trace.y?.[r] ?? r, z])));
     else Array.from(trace.x ?? trace.y ?? []).forEach((x, k) => rows.push([label, trace.x ? x : k, trace.y?.[k], ""]));
   }
   return rows;

@@ -1,5 +1,7 @@
 // Format numbers, sizes, durations and times, each with its unit.
 
+import { roundedToUncertainty } from "./rounding.js";
+
 /** A number with `digits` significant digits, not in the form 1e-3: 0.00120, 1 234, 4.5e-7. */
 export function number(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
@@ -57,14 +59,17 @@ export function sizeText(value, unit, digits = 2) {
   return Math.abs(value) >= 0.01 ? `${plainNumber(100 * value, digits)} %` : `${plainNumber(1e6 * value, digits)} ppm`;
 }
 
+/** A result and its expanded uncertainty as texts of the same place, with their common suffix: power of ten and unit. */
+export function resultTexts(value, expanded, unit) {
+  const [factor, own] = unit !== "1" ? [1, unitText(unit)] : Math.abs(value) >= 0.01 ? [100, "%"] : [1e6, "ppm"];
+  const { value: middle, u: half, exponent } = roundedToUncertainty(value * factor, expanded === null ? null : expanded * factor);
+  return { middle, half, power: exponent ? `× 10${superscript(exponent)}` : "", suffix: own };
+}
+
 /** A result with its expanded uncertainty, to the same place: 201.3 ± 3.1 ppm, (9.06 ± 0.02) × 10⁻⁷ (deg/s)⁻¹. */
 export function withUncertainty(value, expanded, unit) {
-  if (!Number.isFinite(value) || !(expanded > 0)) return sizeText(value, unit, 3);
-  const [factor, suffix] = unit !== "1" ? [1, unitText(unit)] : Math.abs(value) >= 0.01 ? [100, "%"] : [1e6, "ppm"];
-  const size = Math.floor(Math.log10(Math.max(Math.abs(value), expanded) * factor));
-  const power = size < -4 || size > 5 ? size : 0;
-  const [middle, half] = [value, expanded].map((each) => (each * factor) / 10 ** power);
-  const decimals = Math.min(Math.max(1 - Math.floor(Math.log10(half)), 0), 8);
-  const text = `${middle.toFixed(decimals)} ± ${half.toFixed(decimals)}`;
-  return `${power ? `(${text}) × 10${superscript(power)}` : text}${suffix ? ` ${suffix}` : ""}`;
+  if (!Number.isFinite(value)) return "–";
+  const { middle, half, power, suffix } = resultTexts(value, expanded > 0 ? expanded : null, unit);
+  const text = half === null ? middle : `${middle} ± ${half}`;
+  return [power ? (half === null ? `${text} ${power}` : `(${text}) ${power}`) : text, suffix].filter(Boolean).join(" ");
 }

@@ -1,7 +1,8 @@
 // Plot of an effect's signature: a thumbnail for the list, a figure for its page.
 
 import { svg } from "../core/elements.js";
-import { colour, figure, temperatureColour } from "../core/figure.js";
+import { colourAt, TEMPERATURE_SCALE } from "../core/colour_scales.js";
+import { colour, figure } from "../core/figure.js";
 import { POSITIONS, signature } from "./signatures.js";
 
 const [WIDE, HIGH] = [116, 62];
@@ -22,11 +23,11 @@ export function signatureThumbnail(id) {
     return picture;
   }
   if (found.course) picture.append(svg("polyline", { points: found.course.x.map((x, k) => at(x, 1.7 * found.course.y[k] - 0.85)).join(" "), class: "temperature-course" }));
-  found.lines.forEach((line, k) => picture.append(svg("polyline", { points: line.x.map((x, i) => at(x, Math.min(Math.max(line.y[i], -1.05), 1.05))).join(" "), class: `curve of-${found.lines.length} nr-${k}` })));
+  found.lines.forEach((line, k) => picture.append(svg("polyline", { points: line.x.map((x, i) => at(x, Math.min(Math.max(line.y[i], -1.05), 1.05))).join(" "), class: `curve of-${found.lines.length} nr-${k}`, style: found.lines.length === 3 ? `stroke: ${lineColour(k, 3)}` : null })));
   return picture;
 }
 
-const lineColour = (k, n) => (n === 1 ? colour("accent") : n === 3 ? temperatureColour(k / 2) : colour(k ? "axis-y" : "axis-x"));
+const lineColour = (k, n) => (n === 1 ? colour("accent") : n === 3 ? colourAt(TEMPERATURE_SCALE, k / 2) : colour(k ? "axis-y" : "axis-x"));
 
 export function signatureFigure(effect) {
   const found = signature(effect.id);

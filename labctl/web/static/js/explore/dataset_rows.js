@@ -1,5 +1,7 @@
 // Data sets as columns: what the criticism says of each data set, for one axis of the gyro.
 
+import { count, plainNumber } from "../core/format.js";
+
 /** Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length. */
 export function datasetRows(criticism, axis) {
   const sets = criticism.views.sets;
@@ -8,22 +10,19 @@ export function datasetRows(criticism, axis) {
 
 export const axisNames = (criticism) => Object.keys(criticism.views.sets?.residual_dps ?? {});
 
-/** Group numbers that lie within `width` of each other: [centre of each group], [group of each number]. */
-export function groupLevels(values, width, most = 60) {
-  const order = values.map((_, k) => k).sort((a, b) => values[a] - values[b]);
-  let near = width;
-  for (;;) {
-    const groups = [];
-    const which = new Array(values.length);
-    for (const k of order) {
-      const last = groups.at(-1);
-      if (!last || values[k] - last.first > near) groups.push({ first: values[k], sum: values[k], n: 1 });
-      else { last.sum += values[k]; last.n += 1; }
-      which[k] = groups.length - 1;
-    }
-    if (groups.length <= most) return [groups.map((group) => group.sum / group.n), which];
-    near = Math.max(near, (values[order.at(-1)] - values[order[0]]) / 500) * 1.5;
+/** "n of N data sets" where not every data set is drawn one by one, else null. */
+export function shownText(criticism) {
+  const { of, dataset } = criticism.views.sets;
+  return dataset.length < of ? `${count(dataset.length)} of ${count(of)} data sets` : null;
+}
+
+/** Numbers as short texts that all differ, so that no two categories of an axis become one. */
+export function distinctLabels(values) {
+  for (let digits = 3; digits < 17; digits += 1) {
+    const labels = values.map((value) => plainNumber(value, digits));
+    if (new Set(labels).size === values.length) return labels;
   }
+  return values.map(String);
 }
 
 /** Data-set numbers as `1-20,35`, for the query string. */
@@ -52,7 +51,7 @@ export const UNITS = {
 };
 const NAMES = {
   table_rate_dps: "table rate", previous_rate_dps: "previous rate", temperature_c: "gyro temperature", chamber_c: "chamber temperature",
-  t_s: "time", power_s: "time since power-on", supply_v: "supply", humidity_pct: "humidity",
+  t_s: "time", power_s: "time since power-on", supply_v: "supply", humidity_pct: "humidity", order: "data sets in order",
 };
 /** A channel's values in the unit that its title names: hours for times. */
 export const scaled = (name, values) => (UNITS[name] === "h" ? values.map((value) => value / 3600) : values);

@@ -5,8 +5,7 @@ import { h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";
 import { cardWithHeader, loadInto, modelName, table } from "../core/components.js";
-import { residualMap, selectedRows, colourLimit } from "./residual_map.js";
-import { datasetRows } from "./dataset_rows.js";
+import { residualMap, colourLimit, mapsOf } from "./residual_map.js";
 
 /** The raw error is hidden at first where it is more than this factor above the fitted errors and would flatten their lines. */
 const RAW_ERROR_RATIO = 10;
@@ -44,8 +43,8 @@ export function errorLadder(state, signal) {
 
   async function faded(parent) {
     const before = await get(`${base}/calibrations/${parent}/criticism`, { query: { recording: state.recording }, signal });
-    const pair = () => [datasetRows(before, state.axis), selectedRows(state)];
-    const one = (k, name) => residualMap(name, null, () => ({ rows: pair()[k], limit: colourLimit(...pair()) }), { pickable: false, height: "16rem" });
+    const pair = () => [mapsOf(before, state.axis), mapsOf(state.criticism, state.axis)];
+    const one = (k, name) => residualMap(name, null, () => ({ maps: pair()[k], limit: colourLimit(...pair()) }), { pickable: false, height: "16rem" });
     const both = [one(0, `Version ${parent}`), one(1, `Version ${state.version}`)];
     state.onchange((what) => what === "axis" && both.forEach((each) => each.redraw()));
     return h("div", { class: "columns" }, both.map((each, k) => h("div", {}, h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`), each)));

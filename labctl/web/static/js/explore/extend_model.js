@@ -7,6 +7,7 @@ import { number, idText } from "../core/format.js";
 import { button, selectField, labelledField, cardWithHeader, notice, table, toast } from "../core/components.js";
 import { navigate } from "../core/router.js";
 import { selectedRows } from "./residual_map.js";
+import { shownText } from "./dataset_rows.js";
 
 const ERRORS = [["raw_rms_dps", "As the unit is"], ["rms_dps", "Left after the fit"], ["heldout_rms_dps", "At unseen temperatures"], ["noise_floor_dps", "Noise floor"]];
 
@@ -84,7 +85,7 @@ function residualFigure(state, found, floor) {
     const line = (y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: colour("border-strong"), dash: "dash", width: 1 } });
     return {
       data: [dots(rows.residual, "before", { size: 5, color: colour("border-strong"), symbol: "circle-open" }), dots(after, "after", { size: 6, color: axisColour(state.axis) })],
-      layout: { xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: "residual, deg/s" } }, shapes: Number.isFinite(floor) ? [line(2 * floor), line(-2 * floor)] : [] },
+      layout: { title: shownText(state.criticism) ? { text: shownText(state.criticism), font: { size: 11 } } : undefined, xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: "residual, deg/s" } }, shapes: Number.isFinite(floor) ? [line(2 * floor), line(-2 * floor)] : [] },
     };
   };
   return figure("Residual before and after", "Dashed: two noise floors.", draw, { height: "18rem" });

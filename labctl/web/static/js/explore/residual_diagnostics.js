@@ -5,16 +5,17 @@ import { axisColour, colour, figure } from "../core/figure.js";
 import { number } from "../core/format.js";
 import { selectField, cardWithHeader, table } from "../core/components.js";
 import { query, updateQuery } from "../core/router.js";
-import { residualMap, selectedRows, colourLimit, datasetsUnder } from "./residual_map.js";
-import { channelName, channelTitle, scaled } from "./dataset_rows.js";
+import { cellsText, residualMap, selectedRows, colourLimit, datasetsUnder, mapsOf } from "./residual_map.js";
+import { channelName, channelTitle, scaled, shownText } from "./dataset_rows.js";
 
-const DEFAULT_CHANNELS = ["table_rate_dps", "temperature_c", "t_s"];
+/** What there is of these is drawn at first: time where it is known, else the order of the data sets. */
+const DEFAULT_CHANNELS = ["table_rate_dps", "temperature_c", "t_s", "order"];
 const MAX_LISTED = 12;
 
 export function residualDiagnostics(state) {
   const rows = () => selectedRows(state);
-  const picture = residualMap("Residual over floor", "Each cell is the mean residual of its data sets over the noise floor. Faded cells are within two floors of zero: by themselves they mean nothing. Drag over cells to pick them, press one to pick it.",
-    () => ({ rows: rows(), limit: colourLimit(rows()), pick: state.pick }));
+  const picture = residualMap("Residual over floor", `Every measured cell: the mean residual of its data sets over the noise floor. ${cellsText(state.criticism)} Faded cells are within two floors of zero: by themselves they mean nothing. Drag over cells to pick them, press one to pick it.`,
+    () => ({ maps: mapsOf(state.criticism, state.axis), limit: colourLimit(mapsOf(state.criticism, state.axis)), pick: state.pick }));
   bindSelection(picture, datasetsUnder, state);
 
   const channels = Object.keys(rows().channels);
@@ -40,6 +41,7 @@ export function residualDiagnostics(state) {
     }
   });
   return cardWithHeader("See where it fails", h("span", { class: "muted small" }, "a pick in one picture shows in all"),
+    h("p", { class: "muted small" }, `Judged: the model of version ${state.version} refitted to recording ${state.recording}, so that only what it cannot describe remains. The version as it is stands under Compare.`),
     picture, h("div", { class: "columns", style: "--column-min: 19rem" }, against), list);
 }
 
@@ -66,7 +68,9 @@ function residualScatter(state, channel) {
     if (state.overlay) {
       data.push({ type: "scatter", mode: "markers", name: "explained", x, y: state.overlay.values, customdata: rows.dataset, marker: { size: 5, symbol: "diamond", color: colour("text") }, hovertemplate: "%{y:.3g} deg/s<extra></extra>" });
     }
-    return { data, layout: { dragmode: "select", xaxis: { title: { text: channelTitle(channel()) } }, yaxis: { title: { text: "residual, deg/s" } }, showlegend: Boolean(state.overlay), margin: { l: 62, r: 8, t: state.overlay ? 34 : 8, b: 44 } } };
+    const shown = shownText(state.criticism);
+    const annotations = shown ? [{ text: shown, showarrow: false, xref: "paper", yref: "paper", x: 1, y: 1, xanchor: "right", yanchor: "bottom", font: { size: 11 } }] : [];
+    return { data, layout: { annotations, dragmode: "select", xaxis: { title: { text: channelTitle(channel()) } }, yaxis: { title: { text: "residual, deg/s" } }, showlegend: Boolean(state.overlay), margin: { l: 62, r: 8, t: state.overlay ? 34 : shown ? 20 : 8, b: 44 } } };
   };
   const element = figure("Residual against a channel", null, draw, { height: "16rem" });
   bindSelection(element, (event) => (event.points ?? []).map((point) => point.customdata), state);

@@ -12,8 +12,8 @@ const VERDICTS = {
   unexplained: ["Unexplained", "warn"],
   insufficient_data: ["Too little data", "bad"],
 };
-/** Evidence at which the meter is full, nats. */
-const CERTAIN_NATS = 40;
+/** Evidence at which the meter is full, nats; its length is the logarithm, so that 70 and 20 000 differ. */
+const FULL_NATS = 1e5;
 
 export function verdictCard(state) {
   const { criticism } = state;
@@ -69,15 +69,16 @@ export function suspectList(state, { onadd, explain }) {
 const evidenceItem = (title, ...children) => h("div", { class: "suspect-value" }, h("span", { class: "muted small" }, title), ...children);
 
 function evidenceMeter(nats) {
-  const share = Math.max(0, Math.min(nats / CERTAIN_NATS, 1));
+  const share = Math.max(0, Math.min(Math.log1p(Math.max(nats, 0)) / Math.log1p(FULL_NATS), 1));
   return h("div", { class: "evidence" }, h("span", { class: "number" }, `${nats < 1000 ? nats.toFixed(1) : Math.round(nats)} nats`),
-    h("div", { class: "meter", role: "img", "aria-label": `evidence ${nats.toFixed(1)} nats` }, h("i", { style: `width: ${100 * share}%` })));
+    h("div", { class: "meter", role: "img", "aria-label": `evidence ${nats.toFixed(1)} nats, on a logarithmic scale` }, h("i", { style: `width: ${100 * share}%` })));
 }
 
 function coefficientText(suspect, axis) {
   const own = suspect.coefficients[axis] ?? Object.values(suspect.coefficients)[0] ?? {};
-  return Object.entries(own).slice(0, 2).map(([name, { value, u, unit }]) =>
-    h("div", { class: "small" }, h("span", { class: "muted" }, idText(name)), " ", unbroken(withUncertainty(value, 2 * u, unit))));
+  return Object.entries(own).map(([name, { value, u, unit }]) =>
+    h("div", { class: "small" }, h("span", { class: "muted" }, idText(name)), " ", unbroken(withUncertainty(value, u === null ? null : 2 * u, unit))))
+    .concat(h("div", { class: "muted small" }, suspect.coefficients_from === "comparison" ? "beside the judged model; no fit with it was made" : "as a version with it would have"));
 }
 
 /** A value with no line break before its uncertainty and its power of ten; only the unit may wrap. */

@@ -6,7 +6,7 @@ import { count } from "../core/format.js";
 import { busyIndicator, button, card, selectField, emptyState, pageHeader, notice, toggleGroup, errorPage } from "../core/components.js";
 import { navigate, query } from "../core/router.js";
 import { extendModel, inDatasetOrder } from "../explore/extend_model.js";
-import { errorComparison } from "../explore/error_comparison.js";
+import { errorComparison } from "../explore/compare/error_comparison.js";
 import { residualDiagnostics } from "../explore/residual_diagnostics.js";
 import { suspectList, verdictCard } from "../explore/suspects.js";
 import { selectedRows } from "../explore/residual_map.js";

@@ -1,7 +1,8 @@
 // Plots of a recording without times: mean output over table rate, and temperature in the order of measurement.
 
 import { h } from "../core/elements.js";
-import { axisColour, colour, figure, temperatureColour } from "../core/figure.js";
+import { temperatureColours } from "../core/colour_scales.js";
+import { axisColour, colour, figure } from "../core/figure.js";
 import { plainNumber } from "../core/format.js";
 import { card } from "../core/components.js";
 import { channelUnit } from "./channels.js";
@@ -11,17 +12,16 @@ export function meanPlots(state) {
   const { sets, output } = state;
   const gyros = Object.keys(sets.channels).filter((name) => name.startsWith("gyro_"));
   const warm = sets.channels.temperature_c?.mean;
-  const [low, high] = warm ? [Math.min(...warm), Math.max(...warm)] : [0, 1];
-  const scale = [0, 0.25, 0.5, 0.75, 1].map((share) => [share, temperatureColour(share)]);
+  const coloraxis = warm ? temperatureColours(warm.filter((value) => value !== null)).axis : undefined;
   const tips = sets.number.map((number, k) => `data set ${number}: ${plainNumber(sets.table_rate_dps[k], 6)} deg/s${warm ? ` at ${plainNumber(warm[k])} deg C` : ""}, ${sets.position[k]} up`);
   const spot = (k) => (sets.number[k] === state.dataset ? 13 : 5);
   const rim = () => ({ width: sets.number.map((number) => (number === state.dataset ? 2.5 : 0)), color: colour("text") });
   const drawRate = () => ({
-    data: gyros.map((name, g) => ({
+    data: gyros.map((name) => ({
       type: "scatter", mode: "markers", name: `axis ${name.slice(5)}`, x: sets.table_rate_dps, y: sets.channels[name].mean, customdata: sets.number, text: tips, hovertemplate: `%{y:.6~g} ${channelUnit(name, output)}<br>%{text}<extra></extra>`,
-      marker: { size: sets.number.map((_, k) => spot(k)), line: rim(), ...(warm ? { color: warm, colorscale: scale, cmin: low, cmax: high, showscale: g === 0, colorbar: { title: { text: "deg C" }, thickness: 12, outlinewidth: 0 } } : { color: axisColour(name.slice(5)) }) },
+      marker: { size: sets.number.map((_, k) => spot(k)), line: rim(), ...(warm ? { color: warm, coloraxis: "coloraxis" } : { color: axisColour(name.slice(5)) }) },
     })),
-    layout: { showlegend: false, margin: { l: 66, r: 12, t: 8, b: 46 }, xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: `output, ${channelUnit(gyros[0], output)}` } } },
+    layout: { coloraxis, showlegend: false, margin: { l: 66, r: 12, t: 8, b: 46 }, xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: `output, ${channelUnit(gyros[0], output)}` } } },
   });
   const drawWarm = () => ({
     data: [{ type: "scatter", mode: "lines+markers", name: "gyro temperature", x: sets.number, y: warm, customdata: sets.number, text: tips, hovertemplate: "%{text}<extra></extra>", line: { color: colour("accent"), width: 1 }, marker: { size: sets.number.map((_, k) => spot(k) - 2), line: rim(), color: colour("accent") } }],

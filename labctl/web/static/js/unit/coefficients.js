@@ -2,7 +2,7 @@
 
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
-import { number, unitText, idText } from "../core/format.js";
+import { number, resultTexts, unitText, idText, withUncertainty } from "../core/format.js";
 import { factList, table } from "../core/components.js";
 
 const ERRORS = [["rms_dps", "RMS"], ["heldout_rms_dps", "at unseen temperatures"], ["noise_floor_dps", "noise floor"]];
@@ -51,15 +51,21 @@ function overTemperature(first, second) {
   }));
 }
 
+/** A coefficient with its expanded uncertainty: texts of the same place, and the unit. */
+function shownResult({ value, u, unit }) {
+  const { middle, half, power, suffix } = resultTexts(value, u === null ? null : K * u, unit);
+  return { value: power ? `${middle} ${power}` : middle, u: half === null ? "–" : power ? `${half} ${power}` : half, unit: suffix || "–" };
+}
+
 function list(first, second) {
-  const rows = Object.entries(first.axes).flatMap(([axis, { coefficients: own }]) => Object.entries(own ?? {}).map(([name, found]) => ({ axis, name, ...found, beside: second?.axes[axis]?.coefficients?.[name] })));
+  const rows = Object.entries(first.axes).flatMap(([axis, { coefficients: own }]) => Object.entries(own ?? {}).map(([name, found]) => ({ axis, name, ...found, shown: shownResult(found), beside: second?.axes[axis]?.coefficients?.[name] })));
   return table([
     { title: "Axis", cell: (row) => row.axis },
     { title: "Coefficient", cell: (row) => h("code", {}, row.name) },
-    { title: "Value", number: true, cell: (row) => number(row.value, 5) },
-    { title: "Expanded uncertainty, k = 2", number: true, cell: (row) => (row.u === null ? "–" : number(K * row.u, 2)) },
-    second ? { title: `Version ${second.version}`, number: true, cell: (row) => (row.beside ? number(row.beside.value, 5) : "–") } : null,
+    { title: "Value", number: true, cell: (row) => row.shown.value },
+    { title: "Expanded uncertainty, k = 2", number: true, cell: (row) => row.shown.u },
+    { title: "Unit", cell: (row) => row.shown.unit },
+    second ? { title: `Version ${second.version}`, number: true, cell: (row) => (row.beside ? withUncertainty(row.beside.value, row.beside.u === null ? null : K * row.beside.u, row.beside.unit) : "–") } : null,
     second ? { title: "Differs by", number: true, cell: (row) => (row.beside && row.u !== null && row.beside.u !== null ? `${number(Math.abs(row.value - row.beside.value) / Math.hypot(row.u, row.beside.u), 2)} u` : "–") } : null,
-    { title: "Unit", cell: (row) => (row.unit === "1" ? "–" : row.unit) },
   ].filter(Boolean), rows, { dense: true, label: "Coefficients" });
 }

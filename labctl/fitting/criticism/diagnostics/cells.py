@@ -1,0 +1,46 @@
+"""The residual map: every measured cell of rate, temperature and position."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.criticism.residuals import Residuals
+from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows, widest
+
+
+def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
+    """Return residual over floor in rate x temperature, one map per axis and position: lists of equal length.
+
+    `rate_level_dps` and `temperature_level_c` are the centre of the cell that a data set is drawn in, the same in all
+    maps of an axis; `level_width_c` is how far the temperatures of one row are apart at most, deg C.
+    """
+    rate = data.at_sets(data.nodes.table_rate_dps())
+    position = np.asarray(data.nodes["position"]).reshape(len(data), -1)[:, 0].astype(np.str_)
+    column = rate_levels(rate)
+    rate_level = level_centres(rate, column)
+    found = []
+    for axis, residuals in left.items():
+        warm = data.at_sets(data.nodes.temperature_c(axis))
+        row = temperature_rows(warm, position, column)
+        temperature_level, width = level_centres(warm, row), widest(warm, row)
+        for there in np.unique(position):
+            rows = np.flatnonzero(position == there)
+            found.append(
+                {
+                    "axis": axis,
+                    "position": str(there),
+                    "dataset": data.dataset[rows].tolist(),
+                    "table_rate_dps": rate[rows].tolist(),
+                    "temperature_c": warm[rows].tolist(),
+                    "rate_level_dps": rate_level[rows].tolist(),
+                    "temperature_level_c": temperature_level[rows].tolist(),
+                    "level_width_c": width,
+                    "residual_dps": residuals.means[rows].tolist(),
+                    "over_floor": residuals.score[rows].tolist(),
+                }
+            )
+    return found

@@ -1,0 +1,36 @@
+"""The error of a fitted model at given true rates, for laws of the true rate and for laws of the output alike."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.inversion import NotConverged
+from labctl.fitting.numeric.arrays import Array
+
+#: Rounds in which a law of the output is solved for the output; each shrinks the rest a hundredfold or so.
+ROUNDS, CLOSE_DPS = 100, 1e-12
+
+
+def errors_at_true_rates(fitted: FittedModel, here: Channels) -> dict[str, Array]:
+    """Return the modelled error of every axis, axis -> (n,) deg/s, where `here` has the true rates.
+
+    For a law of the output these are the outputs that it corrects to the true rates, minus those. Raises NotConverged
+    where there are none.
+    """
+    if fitted.model.argument == "rate":
+        return {axis: fitted.error_dps(here, axis) for axis in fitted.axes}
+    errors: dict[str, Array] = {axis: np.zeros(len(here)) for axis in fitted.axes}
+    fastest = max(float(np.max(np.abs(rate), initial=0.0)) for rate in here.rates.values())
+    for _ in range(ROUNDS):
+        seen = here.with_rates({**here.rates, **{axis: here.rates[axis] + errors[axis] for axis in errors}})
+        found = {axis: fitted.error_dps(seen, axis) for axis in errors}
+        change = max(float(np.max(np.abs(found[axis] - errors[axis]), initial=0.0)) for axis in errors)
+        errors = found
+        if change < CLOSE_DPS * max(1.0, fastest):
+            return errors
+    raise NotConverged(
+        f"model {fitted.model.name!r} has no output for some true rates within its validity: the last round still "
+        f"changed it by {change:.3g} deg/s; fit it in the forward form (`labctl improve`)"
+    )

@@ -1,0 +1,45 @@
+"""A result rounded to its uncertainty (GUM 7.2.6): the uncertainty to two significant digits, the value to its place.
+
+The pages round by the same rule (`labctl/web/static/js/core/rounding.js`); a test compares the two.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+#: Results below 10^-4 or from 10^6 on are written with a power of ten.
+LEAST_POWER, MOST_POWER = -4, 5
+MOST_DECIMALS = 12
+#: Significant digits of a value without an uncertainty.
+DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Rounded:
+    """A value and its uncertainty as texts that count in units of 10^exponent; `u` is None where it is unknown."""
+
+    value: str
+    u: str | None
+    exponent: int
+
+    @property
+    def power(self) -> str:
+        """The power of ten as a suffix: "e-7", or nothing."""
+        return f"e{self.exponent}" if self.exponent else ""
+
+
+def rounded_to_uncertainty(value: float, uncertainty: float | None) -> Rounded:
+    """Return a value rounded to its uncertainty; without a known one (None, 0 or not finite) to four digits."""
+    known = uncertainty is not None and math.isfinite(uncertainty) and uncertainty > 0
+    u = float(f"{uncertainty:.1e}") if known else 0.0  # two significant digits, so 0.0999 is 0.10
+    largest = max(abs(value), u)
+    size = math.floor(math.log10(largest)) if largest > 0 else 0
+    exponent = size if size < LEAST_POWER or size > MOST_POWER else 0
+    if not known:
+        return Rounded(f"{float(f'{value / 10.0**exponent:.{DIGITS}g}'):.12g}", None, exponent)
+    place = int(f"{u:.1e}".split("e")[1]) - exponent - 1  # of the second significant digit
+    decimals, unit = min(max(-place, 0), MOST_DECIMALS), 10.0 ** max(place, 0)
+    texts = [f"{round(number / 10.0**exponent / unit) * unit:.0f}" if place > 0 else
+             f"{number / 10.0**exponent:.{decimals}f}" for number in (value, u)]  # fmt: skip
+    return Rounded(texts[0], texts[1], exponent)

@@ -1,0 +1,32 @@
+"""The colour of a temperature, in every figure: blue is cold, red is hot. The pages have the same colours.
+
+`labctl/web/static/js/core/temperature_scale.js` holds them for the pages; a test compares the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from plotly.colors import sample_colorscale
+
+#: Share of the temperature range, colour.
+TEMPERATURE_SCALE = [
+    [0.0, "#2d5fbe"],
+    [0.25, "#50aabe"],
+    [0.5, "#beaa5a"],
+    [0.75, "#d27a3a"],
+    [1.0, "#bf1a20"],
+]
+
+
+def temperature_colour(temperature_c: float, low_c: float, high_c: float) -> str:
+    """Return the colour of a temperature in a range, as `rgb(r,g,b)`; the middle of the scale where it has no width."""
+    share = (temperature_c - low_c) / (high_c - low_c) if high_c > low_c else 0.5
+    (colour,) = sample_colorscale(TEMPERATURE_SCALE, [min(max(share, 0.0), 1.0)])
+    return str(colour).replace(" ", "")
+
+
+def temperature_marker(temperature_c: Sequence[float], low_c: float, high_c: float, **more: Any) -> dict[str, Any]:
+    """Return a Plotly marker coloured by temperature, of a range from low_c to high_c shared by a figure's traces."""
+    return {"color": list(temperature_c), "colorscale": TEMPERATURE_SCALE, "cmin": low_c, "cmax": high_c, **more}

@@ -1,0 +1,107 @@
+"""A calibration version as it is, beside a recording: measured and modelled error, and the model as lines on a grid.
+
+Nothing is fitted here: points, lines, what remains and the error per turn all come from the version's own model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.calibration import Calibration, read_calibration
+from labctl.errors import BadInput, LabctlError
+from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows
+from labctl.fitting.numeric.arrays import Array
+from labctl.services.criticism.model_lines import lines_over
+from labctl.services.criticism.verification import applied_errors
+from labctl.services.recordings.loading import newest_row, points_of
+from labctl.services.schemas.comparison import ComparisonColumns, ComparisonResponse
+from labctl.store import Store
+from labctl.turn_error import AT_REST_DPS, LEAST_RATE_DPS, bias_at_rest, turn_errors
+
+
+def compare_version(
+    store: Store, serial: str, version: int, recording: int | None, *, other_unit: bool = False
+) -> ComparisonResponse:
+    """Return a version's model beside a recording; `other_unit` allows a recording of another unit.
+
+    Raises NotFound, BadInput, NotEnoughData, NotConverged.
+    """
+    row = store.calibrations.get(store.units.get(serial).serial, version)
+    measured = newest_row(store, serial, recording, other_unit=other_unit)
+    calibration = read_calibration(row.document)
+    points = points_of(store, measured)
+    data, (errors, _) = fit_data_of(points), applied_errors(calibration, points)
+    if lacking := data.channels.missing(calibration.fitted.model.needs):
+        raise BadInput(
+            f"{serial} version {version} needs {', '.join(lacking)}, which recording {measured.id} does not have"
+        )
+    held = {
+        name: float(np.mean(np.asarray(data.channels[name], dtype=np.float64)))
+        for name in calibration.fitted.model.needs
+    }
+    over_rate, over_temperature = lines_over(calibration.fitted, data, held, up_rate_dps(data.info))
+    return ComparisonResponse(
+        serial=serial, version=version, recording=measured.id, fitted_to=row.recording,
+        source=_source(calibration, row.recording, measured.id),
+        held=held, left_out=list(calibration.document["left_out"]),
+        least_turn_rate_dps=LEAST_RATE_DPS, at_rest_dps=AT_REST_DPS,
+        columns=_columns(data, errors), over_rate=over_rate, over_temperature=over_temperature,
+    )  # fmt: skip
+
+
+def comparison_json(store: Store, serial: str, version: int, recording: int) -> dict[str, Any] | None:
+    """Return the comparison as JSON; None where the version cannot be applied to the recording."""
+    try:
+        return compare_version(store, serial, version, recording, other_unit=True).model_dump(mode="json")
+    except LabctlError:
+        return None
+
+
+def _source(calibration: Calibration, fitted_to: int | None, recording: int) -> str:
+    own = "which it was fitted to" if fitted_to == recording else "which it was not fitted to"
+    return f"version {calibration.version} as it is, nothing refitted, beside recording {recording}, {own}"
+
+
+def _columns(data: FitData, errors: Mapping[str, Array]) -> ComparisonColumns:
+    """Return the rows of all output axes; `errors` are axis -> (m,) corrected minus true rate, deg/s."""
+    position = np.asarray(data.channels["position"]).astype(np.str_)
+    rate = data.channels.table_rate_dps()
+    level = rate_levels(rate)
+    parts = [_axis(data, axis, errors[axis], position, level_centres(rate, level), level) for axis in errors]
+    names = ComparisonColumns.model_fields
+    return ComparisonColumns(**{name: [value for part in parts for value in part[name]] for name in names})
+
+
+def _axis(
+    data: FitData, axis: str, residual: Array, position: NDArray[np.str_], rate_level: Array, level: NDArray[np.int64]
+) -> dict[str, list[Any]]:
+    """Return the rows of one output axis."""
+    channels = data.channels
+    rate, own, warm = channels.table_rate_dps(), channels.rate_dps(axis), channels.temperature_c(axis)
+    measured = data.outputs[axis] - own
+    own_turn = np.char.lstrip(position, "-") == axis
+    before, after = (
+        turn_errors(error - bias_at_rest(error, rate, warm, position), np.where(own_turn, rate, 0.0))
+        for error in (measured, residual)
+    )
+    return {
+        "dataset": np.asarray(channels["dataset"], dtype=np.int64).tolist(),
+        "axis": [axis] * len(data),
+        "position": position.tolist(),
+        "table_rate_dps": rate.tolist(),
+        "own_rate_dps": own.tolist(),
+        "temperature_c": warm.tolist(),
+        "temperature_level_c": level_centres(warm, temperature_rows(warm, position, level)).tolist(),
+        "rate_level_dps": rate_level.tolist(),
+        "measured_error_dps": measured.tolist(),
+        "modelled_error_dps": (measured - residual).tolist(),
+        "residual_dps": residual.tolist(),
+        "turn_before_deg": before,
+        "turn_after_deg": after,
+    }
