@@ -113,6 +113,7 @@ class Effect(ABC):
     aliases: ClassVar[tuple[str, ...]] = ()  #: ids whose columns are the same whatever the schedule
     experiment: ClassVar[str] = ""  #: what would distinguish it from similar effects
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
+    shows_at_rest: bool = False  #: whether it is an error of the bias, at least in part: then it takes no rate to see
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 
     @abstractmethod
@@ -121,7 +122,7 @@ class Effect(ABC):
 
     def least(self, term: Term) -> tuple[int, int]:
         """Return how many different (rates, temperatures) tell this effect's coefficients apart."""
-        return 2, 1
+        return (1 if self.shows_at_rest else 2), 1
 
     def options(self, span: Span) -> list[Term]:
         """Return the shapes in which this effect competes for a recording: orders, and a grid of its parameters."""

@@ -8,12 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.earth import turning_columns
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.effects import Column
 from labctl.fitting.models.error_model import ErrorModel
 
 #: A column is a combination of others when less than this share of its length is left beside them.
 DEPENDENT_SHARE = 1e-9
+#: Different rates that an error in proportion to the rate takes to be told from one that is always there.
+TOLD_APART = 2
 
 
 @dataclass(frozen=True)
@@ -27,10 +31,10 @@ class AxisDesign:
 
 
 def axis_design(data: FitData, model: ErrorModel, axis: str) -> AxisDesign:
-    """Return the design of one axis. Columns that are zero throughout were never exercised and are left out."""
+    """Return the design of one axis. Columns that the recording does not exercise are left out."""
     channels = data.channels if model.argument == "rate" else data.channels.with_rates(data.outputs)
     steady = model.steady
-    found = [(owner, column) for owner, column in model.columns(channels, axis) if np.any(column.values)]
+    found = [(owner, column) for owner, column in _exercised(data, model, channels, axis) if np.any(column.values)]
     basis = model.temperature.basis(data.channels.temperature_c(axis))
     nodes = basis.shape[1]
     columns, spread, names = [np.zeros((len(data), 0))], [], []
@@ -47,6 +51,21 @@ def axis_design(data: FitData, model: ErrorModel, axis: str) -> AxisDesign:
         names,
         turning_columns(data.info, data.channels, axis),
     )
+
+
+def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) -> list[tuple[str, Column]]:
+    """Return (effect id, regressor) without those that multiply the rate of an axis that had one rate throughout.
+
+    At one rate the part of an effect that grows with the rate is the same as its part at rest, so only that is claimed.
+    """
+    found = model.columns(channels, axis)
+    still = {name for name in channels.rates if data.distinct_rates(name) < TOLD_APART}
+    if not still:
+        return found
+    none = np.zeros(len(data))
+    stopped = channels.with_rates({name: none if name in still else v for name, v in channels.rates.items()})
+    at_rest = model.columns(stopped, axis)
+    return [seen for seen, left in zip(found, at_rest, strict=True) if np.any(left[1].values)]
 
 
 def _is_dependent(columns: NDArray[np.float64], added: NDArray[np.float64]) -> bool:
