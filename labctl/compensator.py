@@ -16,6 +16,7 @@ from labctl.fitting.data.channels import Channels
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
+from labctl.fitting.models.sine_form import sine_form_of
 
 Array = NDArray[np.float64]
 Outside = Literal["clamp", "refuse"]
@@ -141,6 +142,10 @@ def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
     linear: Linear | None = linear_of(fitted, axes)
     if linear is not None:
         return lambda raw, warm, _: linear.correct(raw, warm)
+
+    sine = sine_form_of(fitted, axes)
+    if sine is not None:
+        return lambda raw, warm, _: sine.correct(raw, warm)
 
     def general(raw: Array, temperature_c: Array, channels: Mapping[str, Array]) -> Array:
         n = len(raw)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_SHARE
 from labctl.errors import BadInput
+from labctl.exports.c_sine import sine_body
+from labctl.exports.c_tables import c_table
+from labctl.fitting.models.matrix_form import LINEAR as LINEAR_EFFECTS
 from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
+from labctl.fitting.models.sine_form import SINE, sine_form_of
 from labctl.fitting.models.temperature import LagrangeTable
+from labctl.fitting.numeric.arrays import Array
 
 HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * Hash of the calibration: {hash}
@@ -138,14 +142,19 @@ def c_header(calibration: Calibration) -> bytes:
     name = "gyro_" + re.sub(r"[^0-9A-Za-z]+", "_", calibration.serial).lower()
     surface = surface_of(calibration.fitted, calibration.axes)
     linear = linear_of(calibration.fitted, calibration.axes)
+    sine = sine_form_of(calibration.fitted, calibration.axes)
     if surface is not None:
         body = _surface(name, surface)
     elif linear is not None:
         body = _linear(name, linear, calibration.temperature_c)
+    elif sine is not None:
+        body = sine_body(name, sine, *_nodes(sine.linear, calibration.temperature_c))
     else:
+        effects = calibration.fitted.model.effect_ids
+        blocking = [effect for effect in effects if effect not in LINEAR_EFFECTS | {SINE}] or effects
         raise BadInput(
             f"format c: model {calibration.fitted.model.name} has effects without a closed form in C "
-            f"({', '.join(calibration.fitted.model.effect_ids)}); use the JSON file with labctl's Compensator"
+            f"({', '.join(blocking)}); use the JSON file with labctl's Compensator"
         )
     return (_head(name, calibration) + body + TAIL).encode()
 
@@ -179,29 +188,27 @@ def _head(name: str, calibration: Calibration) -> str:
 def _surface(name: str, surface: Surface) -> str:
     _, rows, columns = surface.coefficients.shape
     return SURFACE.format(
-        name=name, rows=rows, columns=columns, reference=surface.reference_c, table=_table(surface.coefficients)
+        name=name, rows=rows, columns=columns, reference=surface.reference_c, table=c_table(surface.coefficients)
     )
 
 
-def _linear(name: str, linear: Linear, span_c: tuple[float, float]) -> str:
+def _nodes(linear: Linear, span_c: tuple[float, float]) -> tuple[Array, int]:
+    """Return the temperatures (n,) at which a model is tabulated, and over how many of them it is interpolated."""
     basis = linear.fitted.model.temperature
     if isinstance(basis, LagrangeTable) and not any("temperature" in e for e in linear.fitted.model.effect_ids):
-        nodes, points = np.array(basis.nodes_c), basis.points
-    else:
-        low, high = span_c
-        nodes, points = np.linspace(low, max(high, low + 1.0), POLYNOMIAL_NODES), POLYNOMIAL_NODES
+        return np.array(basis.nodes_c), basis.points
+    low, high = span_c
+    return np.linspace(low, max(high, low + 1.0), POLYNOMIAL_NODES), POLYNOMIAL_NODES
+
+
+def _linear(name: str, linear: Linear, span_c: tuple[float, float]) -> str:
+    nodes, points = _nodes(linear, span_c)
     k, b = linear.k_and_b(nodes)
     return LINEAR.format(
         name=name,
         points=points,
         nodes=len(nodes),
-        node_table=_table(nodes),
-        k_table=_table(k),
-        b_table=_table(b),
+        node_table=c_table(nodes),
+        k_table=c_table(k),
+        b_table=c_table(b),
     )
-
-
-def _table(values: NDArray[np.float64]) -> str:
-    if values.ndim == 1:
-        return "{" + ", ".join(f"{value:.17g}" for value in values) + "}"
-    return "{" + ",\n ".join(_table(row) for row in values) + "}"

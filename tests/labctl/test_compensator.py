@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -44,7 +45,25 @@ def mems(triaxial: Callable[[int], Any]) -> Calibration:
     return calibrated(triaxial(2).campaign(2), "yang2018")
 
 
-@pytest.fixture(params=["fog", "mems", "plain"])
+@pytest.fixture
+def open_loop(make_points: Callable[..., Recording], grid_11_by_11: Grid) -> Calibration:
+    rate, warm = 3 * grid_11_by_11[0], grid_11_by_11[1]
+    optical = np.rad2deg(np.sin(0.12 * np.deg2rad(rate)) / 0.12)
+    output = optical + rate * (0.01 + 1e-4 * (warm - 30)) + 0.1 + 0.01 * (warm - 30)
+    return calibrated(make_points(rate, warm, output), "bias_scale", ["sine_response"])
+
+
+@pytest.fixture
+def open_loops(triaxial: Callable[[int], Any]) -> Calibration:
+    recording = triaxial(2).campaign(2)
+    columns = dict(recording.columns)
+    for axis, k in zip("xyz", (0.02, 0.05, 0.1), strict=True):
+        own = np.where(columns["position"] == axis, columns["table_rate_dps"], 0.0)
+        columns[f"gyro_{axis}"] = columns[f"gyro_{axis}"] + np.rad2deg(np.sin(k * np.deg2rad(own)) / k) - own
+    return calibrated(replace(recording, columns=columns), "yang2018", ["sine_response"])
+
+
+@pytest.fixture(params=["fog", "mems", "plain", "open_loop", "open_loops"])
 def any_calibration(request: pytest.FixtureRequest) -> Calibration:
     if request.param == "plain":
         make, (rate, warm) = request.getfixturevalue("make_points"), request.getfixturevalue("grid_11_by_11")
@@ -184,6 +203,7 @@ def test_the_c_header_computes_the_same(
         "main.c",
         "-o",
         "main",
+        "-lm",
     ]
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     raw, warm = inside(any_calibration, 200)
@@ -196,6 +216,15 @@ def test_the_c_header_computes_the_same(
     assert table[:, 1:] == pytest.approx(expected.rate_dps, abs=tolerance)
     assert table[:-1, 0].sum() == 0
     assert table[-1, 0] == 1
+
+
+def test_what_has_no_closed_form_in_c_is_named_alone(
+    make_points: Callable[..., Recording], grid_11_by_11: Grid
+) -> None:
+    rate, warm = grid_11_by_11
+    bent = calibrated(make_points(rate, warm, rate * 1.01 + 0.1), effects=["bias", "scale_factor", "dead_band"])
+    with pytest.raises(BadInput, match=r"without a closed form in C \(dead_band\)"):
+        export_calibration(bent.to_bytes(), "c")
 
 
 def test_unknown_formats_are_named(fog: Calibration) -> None:

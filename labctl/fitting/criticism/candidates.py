@@ -90,8 +90,11 @@ def options_of(
 ) -> list[Option]:
     """Return every shape of every testable effect on one axis, and a smooth function of every channel."""
     span, absent = span_of(data), untestable_channels(data, catalogue)
+    turning = bool(np.any(data.nodes.table_rate_dps()))
     found = []
     for kind in catalogue.values():
+        if not turning and not kind.shows_at_rest:
+            continue
         if kind.id in absent or kind.id in ONLY_BASE or _is_known(data, kind.id):
             continue
         options = (option_of(data, axis, reference, kind, term) for term in kind.options(span))

@@ -17,6 +17,7 @@ from labctl.fitting.criticism.evidence.gains import reproduced_and_size, solve_o
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.effects import Term
+from labctl.fitting.effects.derived import with_derived
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
 
@@ -187,8 +188,9 @@ def coefficients_of(comparison: Comparison, candidate: Candidate) -> dict[str, d
         option = comparison.designs[axis].options[index]
         values, covariance = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
         u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        found[axis] = {
+        plain = {
             name: {"value": float(value), "u": float(error), "unit": unit}
             for name, unit, value, error in zip(option.names, option.units, values, u, strict=True)
         }
+        found[axis] = with_derived(plain)
     return found

@@ -72,7 +72,12 @@ class FitData:
         )
 
     def distinct_rates(self, axis: str) -> int:
-        """Return how many different rates an axis was turned at, to a thousandth of the fastest."""
+        """Return how many different rates an axis was turned at, to a thousandth of the fastest.
+
+        The Earth's rate, which differs from position to position, is none of them: at rest the answer is 1.
+        """
+        if not np.any(self.channels.table_rate_dps()):
+            return 1
         rates = self.true_rate_dps(axis)
         step = max(float(np.max(np.abs(rates), initial=0.0)) * 1e-3, 1e-9)
         return len(np.unique(np.round(rates / step)))

@@ -61,6 +61,7 @@ def _axis_json(noise: Allan, is_prior: bool) -> dict[str, Any]:
         "high_dps": plain_list(noise.high_dps),
         "model_dps": plain_list(noise.model_dps),
         **{letter: asdict(figure) for letter, figure in noise.figures.items()},
+        "trend_dps": plain(noise.trend_dps),
         "replaces_datasheet": is_prior,
     }
 

@@ -17,6 +17,7 @@ class _Acceleration(Effect):
     origin: ClassVar[Origin] = "sensor"
     in_use = False  # on the bench gravity is known from the position; a robot would need an accelerometer
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
 
 
 def force_g(channels: Channels, axis: str) -> Array:
@@ -78,6 +79,7 @@ class CentripetalAcceleration(_Acceleration):
     term = "Centripetal acceleration with g-sensitivity (eccentric mounting)"
     sentence = "The unit sits off the table's axis, and feels the pull of turning as rate."
     origin: ClassVar[Origin] = "fixture"
+    shows_at_rest = False
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
     aliases = ("scale_factor_even",)
     parameters = (Parameter("by_position", "1", 0, 1),)

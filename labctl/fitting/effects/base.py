@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -41,17 +41,36 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Law:
+    """An error that is not proportional to its coefficient: both functions map coefficients (n,) to (n,)."""
+
+    error_dps: Callable[[Array], Array]
+    slope: Callable[[Array], Array]  #: derivative of the error along the coefficient
+
+
+@dataclass(frozen=True)
 class Column:
     """One regressor: what its coefficient is called, the coefficient's unit, and the values (n,).
 
     values x coefficient is an error in deg/s of the output, gyro minus true rate. With a `carrier`, a wave and how
-    often it comes per turn of the table, the values are its size: it goes round far faster than they change.
+    often it comes per turn of the table, the values are its size: it goes round far faster than they change. With a
+    `law` the error is that law of the coefficient; the values are then its shape, whose product is right at `start`.
     """
 
     name: str
     unit: str
     values: Array
     carrier: Carrier | None = None
+    law: Law | None = None
+    start: float = 0.0
+
+    def error_dps(self, coefficient: Array) -> Array:
+        """Return the error in deg/s, (n,), of coefficients (n,)."""
+        return self.values * coefficient if self.law is None else self.law.error_dps(coefficient)
+
+    def slope(self, coefficient: Array) -> Array:
+        """Return the derivative of the error along the coefficient, (n,), at coefficients (n,)."""
+        return self.values if self.law is None else self.law.slope(coefficient)
 
     def mean(self, channels: Channels) -> Array:
         """Return the regressor as each row of the channels sees it on average, (n,)."""
@@ -113,15 +132,20 @@ class Effect(ABC):
     aliases: ClassVar[tuple[str, ...]] = ()  #: ids whose columns are the same whatever the schedule
     experiment: ClassVar[str] = ""  #: what would distinguish it from similar effects
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
+    shows_at_rest: bool = False  #: whether it is an error of the bias, at least in part: then it takes no rate to see
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 
     @abstractmethod
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the regressors of this effect for one output axis; none where it does not touch the axis."""
 
+    def shaped_by(self, term: Term, coefficients: Mapping[str, float]) -> Term:
+        """Return a term whose columns have the shape of a fit: axis -> its first coefficient, at the nodes' mean."""
+        return term
+
     def least(self, term: Term) -> tuple[int, int]:
         """Return how many different (rates, temperatures) tell this effect's coefficients apart."""
-        return 2, 1
+        return (1 if self.shows_at_rest else 2), 1
 
     def options(self, span: Span) -> list[Term]:
         """Return the shapes in which this effect competes for a recording: orders, and a grid of its parameters."""

@@ -18,15 +18,13 @@ class Bias(Effect):
     sentence = "The gyro reports a constant rate while it stands still."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 3.0), "piezo": (0.0, 5.0)}
     experiment = "input axis up, then down, table clamped: half the sum is bias, half the difference is not"
     draws = ("map",)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [Column("bias", "deg/s", np.ones(len(channels)))]
-
-    def least(self, term: Term) -> tuple[int, int]:
-        return 1, 1
 
 
 class BiasTemperature(Effect):
@@ -37,6 +35,7 @@ class BiasTemperature(Effect):
     sentence = "The output at rest changes with the gyro's temperature."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     default_order = 2
     max_order = 5
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.005, 0.08), "piezo": (0.05, 0.63)}

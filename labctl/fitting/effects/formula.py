@@ -34,6 +34,8 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
 }
 #: What a formula may call the rate along the gyro's own axis, besides the names of logged columns.
 OWN_RATE = "rate_dps"
+#: Names of rates: a formula without any of them is an error of the bias.
+RATES = frozenset({OWN_RATE, "table_rate_dps", "previous_rate_dps"})
 LONGEST = 500
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
@@ -51,6 +53,7 @@ class Formula(Effect):
         self.sentence = sentence or f"The error follows {text}."
         self._tree = _parsed(name, text)
         self.needs = tuple(sorted(_names(self._tree) - {OWN_RATE, "table_rate_dps", "temperature_c"}))
+        self.shows_at_rest = _names(self._tree).isdisjoint(RATES)
         names = {"table_rate_dps" if name == OWN_RATE else name for name in _names(self._tree)}
         self.draws = tuple("time" if name == "t_s" else name for name in sorted(names))
 

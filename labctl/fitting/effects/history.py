@@ -19,6 +19,7 @@ class BiasDrift(Effect):
     sentence = "The bias creeps in one direction through the whole campaign."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     needs = ("t_s",)
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.5)}
     experiment = "the first temperature again at the end; a long record at rest"
@@ -31,6 +32,7 @@ class BiasDrift(Effect):
 class _Shift(Effect):
     counted: ClassVar[str]
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         later = channels.history.numbers(self.counted)[1:]
@@ -128,6 +130,7 @@ class SupplySensitivity(Effect):
     sentence = "The bias follows the supply voltage."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     needs = ("supply_v",)
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.2), "piezo": (0.0, 50.0)}
     experiment = "steps of 5 % in the supply, at rest and at one rate"

@@ -18,6 +18,7 @@ class EarthRate(Effect):
     sentence = "The bench turns with the Earth; along the table axis that is a constant rate."
     origin: ClassVar[Origin] = "environment"
     rows: ClassVar[Rows] = "own"
+    shows_at_rest = True
     ranges: ClassVar = {"fog": (0.0, 0.0042), "mems": (0.0, 0.0042), "piezo": (0.0, 0.0042)}
     experiment = "axis up and axis down; and state the bench's latitude, which fixes it"
     draws = ("map",)
@@ -29,6 +30,7 @@ class EarthRate(Effect):
 class _OncePerTurn(Effect):
     needs = ("table_angle_deg",)
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     harmonics: ClassVar[tuple[int, ...]] = (1,)
     mark: ClassVar[str]
 

@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Span, Term, by_parameter, powers
+from labctl.fitting.effects.base import (
+    Column,
+    Effect,
+    Law,
+    Origin,
+    Parameter,
+    Reference,
+    Span,
+    Term,
+    by_parameter,
+    powers,
+)
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.open_loop_sine import sine_ratio, sine_ratio_slope
+
+#: Parameter of a sine response whose size was fitted beside K: calibrations until 0.1 hold such.
+FREE_AMPLITUDE = "free_amplitude"
+#: Below this K^2 the law is its tangent.
+LEAST_K_SQUARED = 1e-6
 
 
 class ScaleFactor(Effect):
@@ -119,21 +139,42 @@ class ScaleFactorOdd(_Power):
 
 
 class SineResponse(Effect):
-    """Sine response of an open-loop interferometer."""
+    """Sine response of an open-loop interferometer: error = sin(K w) / K - w, with one constant K per axis.
+
+    The coefficient that a fit estimates is the square of K, in which the law is smooth through 0 and its uncertainty
+    close to normal; K follows from it. The shape's parameter is where the law is looked at by what competes linearly.
+    """
 
     id = "sine_response"
     term = "Sine response (open-loop interferometer)"
     sentence = "The output follows the sine of the optical phase, so it falls behind at high rates."
     origin: ClassVar[Origin] = "sensor"
-    parameters = (Parameter("k", "s/rad", 0.05, 1.0, logarithmic=True),)
-    ranges: ClassVar = {"fog": (0.0, 1.5), "mems": (0.0, 0.0), "piezo": (0.0, 0.0)}
+    parameters = (Parameter("k", "rad/(rad/s)", 0.05, 1.0, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 2.25), "mems": (0.0, 0.0), "piezo": (0.0, 0.0)}
     experiment = "more rates in the top third of the range"
     draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        k = term.parameters.get("k", 0.3)
-        rate_rad_s = np.deg2rad(channels.rate_dps(axis))
-        return [Column("sine_response", "1", np.rad2deg(np.sin(k * rate_rad_s) / k - rate_rad_s))]
+        rate = np.deg2rad(channels.rate_dps(axis))
+        if FREE_AMPLITUDE in term.parameters:
+            k = term.parameters["k"]
+            return [Column("sine_response", "1", np.rad2deg(np.sin(k * rate) / k - rate))]
+        at = term.parameters.get(f"k_squared_{axis}", term.parameters.get("k", 0.0) ** 2)
+        cube = np.rad2deg(rate**3)
+
+        def error_dps(k_squared: Array) -> Array:
+            return np.rad2deg(rate) * (sine_ratio(k_squared * rate**2) - 1.0)
+
+        def slope(k_squared: Array) -> Array:
+            return cube * sine_ratio_slope(k_squared * rate**2)
+
+        there = np.full(len(rate), at)
+        shape = error_dps(there) / at if abs(at) > LEAST_K_SQUARED else slope(there)
+        return [Column("k_squared", "(rad/(rad/s))^2", shape, law=Law(error_dps, slope), start=at)]
+
+    def shaped_by(self, term: Term, coefficients: Mapping[str, float]) -> Term:
+        shapes = {f"k_squared_{axis}": value for axis, value in coefficients.items()}
+        return replace(term, parameters={**term.parameters, **shapes})
 
 
 class Saturation(Effect):

@@ -19,6 +19,7 @@ class TemperatureRate(Effect):
     sentence = "The bias shifts while the temperature changes, in proportion to how fast."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     needs = ("t_s",)
     parameters = (Parameter("of_gradient", "1", 0, 1), Parameter("over_s", "s", 40.0, 600.0, logarithmic=True))
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.5)}
@@ -48,6 +49,7 @@ class ThermalLag(Effect):
     sentence = "The part that matters follows the thermometer late, so the correction comes for another temperature."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     needs = ("t_s",)
     parameters = (Parameter("tau_s", "s", 60.0, 3600.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.1), "piezo": (0.0, 0.6)}
@@ -74,6 +76,7 @@ class ThermalHysteresis(Effect):
     sentence = "The bias depends on whether the temperature was reached from below or from above."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     needs = ("t_s",)
     parameters = (Parameter("width_k", "K", 1.0, 15.0, logarithmic=True), Parameter("bowed", "1", 0, 1))
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.2), "piezo": (0.0, 0.2)}
@@ -102,6 +105,7 @@ class WarmUp(Effect):
     sentence = "After power-on the bias settles over minutes to an hour."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     needs = ("power_s",)
     parameters = (Parameter("tau_s", "s", 100.0, 7200.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.1), "mems": (0.0, 0.5), "piezo": (0.0, 2.0)}
@@ -124,6 +128,7 @@ class SelfHeating(Effect):
     sentence = "The unit's own power warms the sensing part above its thermometer, more and more after power-on."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     needs = ("power_s",)
     parameters = (Parameter("tau_s", "s", 300.0, 3600.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.5), "piezo": (0.0, 5.0)}
@@ -151,6 +156,7 @@ class ThermometerError(Effect):
     sentence = "The thermometer is off; while calibrating this hides in the temperature terms, in use it does not."
     origin: ClassVar[Origin] = "bench"
     rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
     ranges: ClassVar = {"fog": (-2.0, 2.0), "mems": (-2.0, 2.0), "piezo": (-2.0, 2.0)}
     experiment = "calibrate and use with the same thermometer; try a ramp that was not calibrated"
     draws = ("temperature_c", "map")

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.earth import turning_columns
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.effects import Column
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.numeric.arrays import Array
 
 #: A column is a combination of others when less than this share of its length is left beside them.
 DEPENDENT_SHARE = 1e-9
+#: Different rates that an error in proportion to the rate takes to be told from one that is always there.
+TOLD_APART = 2
 
 
 @dataclass(frozen=True)
@@ -24,18 +30,32 @@ class AxisDesign:
     spread: NDArray[np.float64]  #: (k * nodes, c): from the estimated columns to the coefficients of the table
     names: list[tuple[str, str, str]]  #: (effect, name, unit) of the k
     turning: NDArray[np.float64]  #: (m, e): the Earth's rate that goes round with the table
+    offset_dps: Array  #: (m,): what a law at its present coefficients differs by from its tangent; 0 without laws
+    laws: tuple[str, ...] = ()  #: names of the coefficients that enter by a law
 
 
-def axis_design(data: FitData, model: ErrorModel, axis: str) -> AxisDesign:
-    """Return the design of one axis. Columns that are zero throughout were never exercised and are left out."""
+def axis_design(
+    data: FitData, model: ErrorModel, axis: str, at: Mapping[str, NDArray[np.float64]] | None = None
+) -> AxisDesign:
+    """Return the design of one axis. Columns that the recording does not exercise are left out.
+
+    A column with a law is its tangent at the coefficients `at`, name -> (nodes,), or where it starts.
+    """
     channels = data.channels if model.argument == "rate" else data.channels.with_rates(data.outputs)
     steady = model.steady
-    found = [(owner, column) for owner, column in model.columns(channels, axis) if np.any(column.values)]
+    found = [(owner, column) for owner, column in _exercised(data, model, channels, axis) if np.any(column.values)]
     basis = model.temperature.basis(data.channels.temperature_c(axis))
     nodes = basis.shape[1]
-    columns, spread, names = [np.zeros((len(data), 0))], [], []
+    columns, spread, names, laws = [np.zeros((len(data), 0))], [], [], []
+    offset = np.zeros(len(data))
     for owner, column in found:
-        added = column.values[:, None] if owner in steady else column.values[:, None] * basis
+        values = column.values
+        if column.law is not None:
+            here = basis @ at[column.name] if at and column.name in at else np.full(len(data), column.start)
+            values = column.slope(here)
+            offset += column.error_dps(here) - values * here
+            laws.append(column.name)
+        added = values[:, None] if owner in steady else values[:, None] * basis
         if owner in steady and _is_dependent(np.concatenate(columns, axis=1), added):
             continue  # an added polynomial repeats the powers that the model has already
         columns.append(added)
@@ -46,7 +66,24 @@ def axis_design(data: FitData, model: ErrorModel, axis: str) -> AxisDesign:
         block_diag(*spread) if spread else np.zeros((0, 0)),
         names,
         turning_columns(data.info, data.channels, axis),
+        offset,
+        tuple(laws),
     )
+
+
+def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) -> list[tuple[str, Column]]:
+    """Return (effect id, regressor) without those that multiply the rate of an axis that had one rate throughout.
+
+    At one rate the part of an effect that grows with the rate is the same as its part at rest, so only that is claimed.
+    """
+    found = model.columns(channels, axis)
+    still = {name for name in channels.rates if data.distinct_rates(name) < TOLD_APART}
+    if not still:
+        return found
+    none = np.zeros(len(data))
+    stopped = channels.with_rates({name: none if name in still else v for name, v in channels.rates.items()})
+    at_rest = model.columns(stopped, axis)
+    return [seen for seen, left in zip(found, at_rest, strict=True) if np.any(left[1].values)]
 
 
 def _is_dependent(columns: NDArray[np.float64], added: NDArray[np.float64]) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size
@@ -15,6 +16,9 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.least_squares import Solution, rank_of, solve
+
+#: Steps after which a nonlinear coefficient is taken as it is.
+GAUSS_NEWTON_STEPS = 30
 
 
 @dataclass(frozen=True)
@@ -33,12 +37,32 @@ def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] |
     """
     fits, solutions, turning = {}, {}, {}
     for axis in data.outputs:
-        design = axis_design(data, model, axis)
-        solution = _solve_axis(data, model, axis, design, fixed[axis] if fixed else None)
+        design, solution = _converged(data, model, axis, fixed[axis] if fixed else None)
         k = design.columns.shape[1]
         fits[axis] = _axis_fit(design, solution)
         solutions[axis], turning[axis] = replace(solution, white_dps=data.white_dps(axis)), solution.values[k:]
     return AxisSolutions(fits, solutions, turning)
+
+
+def _converged(data: FitData, model: ErrorModel, axis: str, fixed: Solution | None) -> tuple[AxisDesign, Solution]:
+    """Return the design at the solution, and the solution: laws by Gauss-Newton steps at one drift, then once more."""
+    design = axis_design(data, model, axis)
+    solution = _solve_axis(data, model, axis, design, fixed)
+    if not design.laws:
+        return design, solution
+    for _ in range(GAUSS_NEWTON_STEPS):
+        before = solution.values
+        design = axis_design(data, model, axis, _law_coefficients(design, solution))
+        solution = _solve_axis(data, model, axis, design, fixed or solution)
+        if np.allclose(solution.values, before, rtol=1e-7, atol=1e-14):
+            break
+    return design, _solve_axis(data, model, axis, design, fixed)
+
+
+def _law_coefficients(design: AxisDesign, solution: Solution) -> dict[str, NDArray[np.float64]]:
+    """Return name -> (nodes,) of the coefficients that enter by a law."""
+    table = (design.spread @ solution.values[: design.columns.shape[1]]).reshape(len(design.names), -1)
+    return {name: row for (_, name, _), row in zip(design.names, table, strict=True) if name in design.laws}
 
 
 def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign, fixed: Solution | None) -> Solution:
@@ -47,7 +71,7 @@ def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign,
             f"{data.info.serial}, axis {axis}: the recording exercises no effect of model {model.name} "
             f"({', '.join(model.effect_ids)}); turn the unit about its other axes too"
         )
-    y = data.outputs[axis] - data.true_rate_dps(axis)
+    y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
     columns, y, scatter = with_known_size(
         design.columns, design.turning, y, data.scatter(axis), turning_size_dps(data.info)
     )

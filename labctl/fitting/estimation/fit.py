@@ -10,13 +10,15 @@ import numpy as np
 from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.temperature_channel import is_chambers
+from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.coefficient_tables import from_coefficients
 from labctl.fitting.estimation.error_metrics import ErrorFigures, floor_from_repeats, rms
 from labctl.fitting.estimation.held_out import held_out_errors
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
-from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.presets import Preset, preset_for
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
@@ -46,7 +48,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     used = data.take(rows)
     require_enough_data(used, model)
     found = solve_axes(used, model)
-    fitted = FittedModel(model, found.fits)
+    fitted = FittedModel(_with_shapes(model, found.fits), found.fits)
     residual = residuals(fitted, data, found.turning)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
     floor, source = _noise_floor(data, found.solutions, residual)
@@ -61,6 +63,18 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         _environment(data, found.turning),
         residual,
     )
+
+
+def _with_shapes(model: ErrorModel, fits: Mapping[str, AxisFit]) -> ErrorModel:
+    """Return the model whose effects have the shape that they were fitted with, for what looks at it linearly."""
+
+    def shaped(term: Term) -> Term:
+        first = {
+            a: float(f.values[f.effects.index(term.effect)].mean()) for a, f in fits.items() if term.effect in f.effects
+        }
+        return kind_of(term).shaped_by(term, first)
+
+    return model.with_terms(tuple(map(shaped, model.terms)))
 
 
 def _noise_floor(

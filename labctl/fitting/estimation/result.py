@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from labctl.fitting.effects.derived import with_derived
 from labctl.fitting.estimation.error_metrics import ErrorFigures
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
@@ -55,8 +56,9 @@ def coefficients_json(model: ErrorModel, fit: AxisFit) -> dict[str, Any]:
         table: dict[str, Any] = {"temperature_c": list(model.temperature.nodes_c)}
         for name, unit, values, us in zip(fit.names, fit.units, fit.values, u, strict=True):
             table[name] = {"value": values.tolist(), "u": us, "unit": unit}
-        return table
-    return {
+        return with_derived(table)
+    plain = {
         name: {"value": float(values[0]), "u": us[0], "unit": unit}
         for name, unit, values, us in zip(fit.names, fit.units, fit.values, u, strict=True)
     }
+    return with_derived(plain)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.effects import kind_of
+from labctl.fitting.effects import Term, kind_of
+from labctl.fitting.effects.scale_factor import FREE_AMPLITUDE
 from labctl.fitting.models.error_model import ErrorModel, is_exported
 from labctl.fitting.models.inversion import invert
 from labctl.fitting.numeric.arrays import Array
@@ -49,7 +50,7 @@ class FittedModel:
         by_name = dict(zip(fit.names, at_temperature, strict=True))
         for _, column in self.model.columns(channels, axis):
             if column.name in by_name:
-                error += column.values * by_name[column.name]
+                error += column.error_dps(by_name[column.name])
         return error
 
     def compensate(self, outputs: Mapping[str, Array], channels: Channels) -> dict[str, Array]:
@@ -98,6 +99,8 @@ class FittedModel:
     def from_dict(record: Mapping[str, Any]) -> FittedModel:
         """Return the model that `to_dict` described."""
         model = ErrorModel.from_dict(record)
+        if any("sine_response" in fit["names"] for fit in record["axes"].values()):
+            model = model.with_terms(tuple(map(_with_free_amplitude, model.terms)))
         axes = {
             axis: AxisFit(
                 tuple(fit["effects"]),
@@ -109,6 +112,19 @@ class FittedModel:
             for axis, fit in record["axes"].items()
         }
         return FittedModel(model, axes)
+
+
+def _with_free_amplitude(term: Term) -> Term:
+    """Return the term of a calibration of version 0.1, whose sine response has a size beside its K."""
+    if term.effect != "sine_response":
+        return term
+    return replace(term, parameters={"k": term.parameters.get("k", 0.3), FREE_AMPLITUDE: 1.0})
+
+
+def without(fitted: FittedModel, effect_id: str) -> FittedModel:
+    """Return a fitted model without one of its effects, the others as they were fitted beside it."""
+    model = fitted.model.with_terms(tuple(t for t in fitted.model.terms if t.effect != effect_id))
+    return FittedModel(model, {axis: _only(fit, set(model.effect_ids)) for axis, fit in fitted.axes.items()})
 
 
 def _only(fit: AxisFit, effects: set[str]) -> AxisFit:

@@ -15,6 +15,8 @@ ErrorOfRates = Callable[[Mapping[str, Array], str], Array]
 FIXED_POINT_STEPS, FIXED_POINT_STEP_DPS = 60, 1e-12
 #: The fixed-point iteration diverges when a step is this many times the one before.
 DIVERGING = 3.0
+#: Newton's method: steps, the step of its numerical derivative in deg/s, and the least slope of output over rate.
+NEWTON_STEPS, SLOPE_STEP_DPS, LEAST_SLOPE = 40, 1e-4, 1e-3
 #: Bisection: rounds over the axes, halvings of an interval, and the step in deg/s at which the rounds have converged.
 ROUNDS, HALVINGS, ROUND_STEP_DPS = 8, 50, 1e-9
 #: Half of the first interval of a bisection: this share of the largest output, plus this many deg/s.
@@ -31,7 +33,8 @@ def invert(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: str) -> 
     """Return rates with output = rate + error(rates), axis -> (n,) deg/s, for outputs axis -> (n,) deg/s.
 
     By fixed-point iteration, which converges because a gyro's error changes far less than its rate; where it does not,
-    by bisection. `name` is the model's, for the message of NotConverged, which is raised when neither converges.
+    by Newton's method, and where that fails by bisection. `name` is the model's, for the message of NotConverged, which
+    is raised when none of them converges.
     """
     rates, change = dict(outputs), 0.0
     for _ in range(FIXED_POINT_STEPS):
@@ -42,7 +45,25 @@ def invert(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: str) -> 
             return rates
         if before and change > DIVERGING * before:
             break
-    return _by_bisection(outputs, error_dps, name)
+    return _by_newton(outputs, error_dps) or _by_bisection(outputs, error_dps, name)
+
+
+def _by_newton(outputs: Mapping[str, Array], error_dps: ErrorOfRates) -> dict[str, Array] | None:
+    """Solve by Newton's method along each own axis, for laws that bend far from a line; None where it fails."""
+    rates = dict(outputs)
+    for _ in range(NEWTON_STEPS):
+        nearer = {}
+        for axis, output in outputs.items():
+            here = error_dps(rates, axis)
+            slope = (error_dps({**rates, axis: rates[axis] + SLOPE_STEP_DPS}, axis) - here) / SLOPE_STEP_DPS
+            if not np.all(slope > LEAST_SLOPE - 1.0):
+                return None
+            nearer[axis] = rates[axis] - (rates[axis] + here - output) / (1.0 + slope)
+        change = _largest_change(nearer, rates)
+        rates = nearer
+        if change < ROUND_STEP_DPS:
+            return rates
+    return None
 
 
 def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: str) -> dict[str, Array]:

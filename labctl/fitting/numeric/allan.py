@@ -6,73 +6,44 @@ a chi-square with equivalent degrees of freedom (NIST SP 1065, table 5) that dep
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from scipy.special import chdtri
 
+from labctl.fitting.numeric.allan_terms import (
+    BESIDE,
+    DEG_PER_HOUR,
+    KINDS,
+    REPORTED,
+    design_of,
+    fit_terms,
+    freedom_of,
+)
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.slow_trend import slow_trend
 
 #: Fewer readings than this say nothing about noise.
 LEAST_READINGS = 300
 #: The longest averaging time is this share of the record.
 LONGEST_SHARE = 0.25
 CONFIDENCE = 0.95
-#: A term is shown when the record's deviance rises by this without it (about 99.5 %, as octaves share readings) ...
-SHOWN_DEVIANCE = 9.0
-#: ... and when it is this share of the variance at some averaging time.
+#: A term is shown only where it is this share of the variance at some averaging time.
 SHOWN_SHARE = 0.3
+#: The longest averaging times of a record whose trend was taken off: the trend has taken some of the noise there along.
+LONGEST_SHARE_TRENDLESS = 0.125
+#: A random walk counts where it prevails over this many octaves and more: it is read beyond the record.
+PREVAILING_OCTAVES = 3
+#: A figure has a value when it is this many of its standard uncertainties; of what is less sure there is a bound.
+KNOWN = 3.0
+#: Where a term shows, the fitted curve lies within intervals that hold such noise at all octaves with this chance.
+FAMILY_CONFIDENCE = 0.99
+#: Chance that a bound on a term which has no value is above the truth; smaller alternatives at several octaves compete.
+BOUND_CONFIDENCE = 0.995
 #: Variances at neighbouring octaves of one record share readings; found by simulation, it makes u cover as it should.
 NEIGHBOURS = 1.6
-ROUNDS = 30
-DEG_PER_ROOT_HOUR = 60.0
-DEG_PER_HOUR = 3600.0
-
-
-@dataclass(frozen=True)
-class Kind:
-    """One term of the standard: variance = coefficient^2 x shape(tau), and its degrees of freedom (n phases, m)."""
-
-    letter: str
-    word: str
-    unit: str
-    scale: float  #: from deg/s and s to the unit
-    shape: Callable[[Array], Array]
-    freedom: Callable[[float, Array], Array]
-    region: str  #: where it shows
-
-
-def _white(n: float, m: Array) -> Array:
-    return (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m**2 / (4 * m**2 + 5)
-
-
-def _flicker(n: float, m: Array) -> Array:
-    return np.where(m == 1, 2 * (n - 2) ** 2 / (2.3 * n - 4.9), 5 * n**2 / (4 * m * (n + 3 * m)))
-
-
-def _walk(n: float, m: Array) -> Array:
-    return (n - 2) / m * ((n - 1) ** 2 - 3 * m * (n - 1) + 4 * m**2) / (n - 3) ** 2
-
-
-def _angle(n: float, m: Array) -> Array:
-    return (n + 1) * (n - 2 * m) / (2 * (n - m))
-
-
-KINDS: tuple[Kind, ...] = (
-    Kind("Q", "quantization", "deg", 1.0, lambda tau: 3 / tau**2, _angle, "slope -1 at the shortest"),
-    Kind("N", "angle random walk", "deg/sqrt(h)", DEG_PER_ROOT_HOUR, lambda tau: 1 / tau, _white,
-         "slope -1/2 at short"),
-    Kind("B", "bias instability", "deg/h", DEG_PER_HOUR, lambda tau: np.full_like(tau, 2 * np.log(2) / np.pi), _flicker,
-         "flat part at middle"),
-    Kind("K", "rate random walk", "deg/h/sqrt(h)", DEG_PER_HOUR * DEG_PER_ROOT_HOUR, lambda tau: tau / 3, _walk,
-         "slope +1/2 at long"),
-    Kind("R", "rate ramp", "deg/h/h", DEG_PER_HOUR**2, lambda tau: tau**2 / 2, _walk, "slope +1 at the longest"),
-)  # fmt: skip
-#: The figures that are reported; the others are only kept from spoiling them.
-REPORTED = ("N", "B", "K")
 
 
 @dataclass(frozen=True)
@@ -97,6 +68,7 @@ class Allan:
     model_dps: Array  #: the fitted sum of terms
     figures: Mapping[str, Figure]  #: N, B, K
     duration_s: float
+    trend_dps: float = 0.0  #: size of the slow trend (warm-up) that is no noise, from its lowest to its highest
 
     @property
     def instability_dps(self) -> float | None:
@@ -113,89 +85,107 @@ def overlapping_variance(rate_dps: Array, m: int) -> float:
 
 
 def allan(rate_dps: Array, period_s: float) -> Allan | None:
-    """Return the Allan deviation of evenly spaced rates (n,) deg/s; None where they are too few or do not scatter."""
+    """Return the Allan deviation of evenly spaced rates (n,) deg/s; None where they are too few or do not scatter.
+
+    The deviation is that of the record as it is. The terms are those of the record without its slow trend, whose own
+    deviation is added to the fitted curve.
+    """
     n = len(rate_dps)
     if n < LEAST_READINGS or not np.ptp(rate_dps) > 0:
         return None
     m = np.exp2(np.arange(int(np.log2(n * LONGEST_SHARE)) + 1, dtype=np.float64))
     tau = np.asarray(m * period_s, dtype=np.float64)
-    variance = np.array([overlapping_variance(rate_dps, int(k)) for k in m])
+    variance = _variances(rate_dps, m)
     if not np.all(variance > 0):
         return None
-    terms, freedom = _terms(variance, tau, m, n + 1.0)
+    trend = slow_trend(rate_dps)
+    still = variance if trend is None else _variances(rate_dps - trend, m)
+    kept = slice(None) if trend is None else slice(int(np.sum(m <= n * LONGEST_SHARE_TRENDLESS)))
+    terms, shows, seen = fit_terms(still[kept], tau[kept], m[kept], n + 1.0)
+    freedom = freedom_of(terms, tau, m, n + 1.0)
+    model = design_of(tau) @ terms + (0.0 if trend is None else _variances(trend, m))
     tail = (1 - CONFIDENCE) / 2
-    model = _design(tau) @ terms
+    fitted = _Fitted(terms, shows, tau[kept], still[kept], seen, _bounds(variance, tau, m, n + 1.0))
     return Allan(
         tau,
         np.sqrt(variance),
         np.sqrt(variance * freedom / chdtri(freedom, tail)),
         np.sqrt(variance * freedom / chdtri(freedom, 1 - tail)),
         np.sqrt(model),
-        {k.letter: _figure(j, terms, tau, freedom) for j, k in enumerate(KINDS) if k.letter in REPORTED},
+        {k.letter: _figure(j, fitted) for j, k in enumerate(KINDS) if k.letter in REPORTED},
         n * period_s,
+        0.0 if trend is None else float(np.ptp(trend)),
     )
 
 
-def _design(tau: Array) -> NDArray[np.float64]:
-    return np.column_stack([kind.shape(tau) for kind in KINDS])
+@dataclass(frozen=True)
+class _Fitted:
+    """Squared coefficients (5,), and the averaging times, variances and degrees of freedom that they were fitted to."""
+
+    terms: Array
+    shows: NDArray[np.bool_]  #: (5,) whether the record cannot be explained without the term
+    tau: Array
+    variance: Array
+    freedom: Array
+    bounds: Array  #: (5,) largest coefficient that each term may have by the record as it is
+
+    @property
+    def model(self) -> Array:
+        return design_of(self.tau) @ self.terms
+
+    def share(self, j: int) -> Array:
+        """Return the share of a term in the fitted variance, (k,)."""
+        return design_of(self.tau)[:, j] * self.terms[j] / self.model
+
+    def is_followed(self, shown: NDArray[np.bool_]) -> bool:
+        """Return whether the fitted curve lies within the data's intervals at the octaves where a term shows."""
+        tail = (1 - FAMILY_CONFIDENCE) / 2 / len(self.tau)
+        ratio = self.freedom * self.variance / self.model
+        inside = (ratio > chdtri(self.freedom, 1 - tail)) & (ratio < chdtri(self.freedom, tail))
+        return bool(np.all(inside[shown]))
 
 
-def _terms(variance: Array, tau: Array, m: Array, phases: float) -> tuple[Array, Array]:
-    """Return the squared coefficients (5,), those that do not show at 0, and the degrees of freedom (k,)."""
-    design = _design(tau)
-    freedom = np.maximum(_white(phases, m), 1.0)
-    terms = np.zeros(len(KINDS))
-    for _ in range(2):  # the terms say which noise prevails where, and that says how sure each variance is
-        terms = _fewest(design, variance, freedom)
-        prevailing = np.argmax(design * terms, axis=1)
-        table = np.column_stack([kind.freedom(phases, m) for kind in KINDS])
-        freedom = np.maximum(table[np.arange(len(m)), prevailing], 1.0)
-    return terms, freedom
+def _variances(rate_dps: Array, m: Array) -> Array:
+    return np.array([overlapping_variance(rate_dps, int(k)) for k in m])
 
 
-def _fewest(design: NDArray[np.float64], variance: Array, freedom: Array) -> Array:
-    """Return the terms after leaving out, one by one, those that the record does not show."""
-    kept = list(range(len(KINDS)))
-    terms, deviance = _fit(design, variance, freedom, kept)
-    while len(kept) > 1:
-        tried = [(_fit(design, variance, freedom, [j for j in kept if j != out]), out) for out in kept]
-        (fewer, without), out = min(tried, key=lambda pair: pair[0][1])
-        if without - deviance > SHOWN_DEVIANCE:
-            break
-        kept.remove(out)
-        terms, deviance = fewer, without
-    return terms
+def _bounds(variance: Array, tau: Array, m: Array, phases: float) -> Array:
+    """Return the largest coefficient of each term, (5,), that alone would not exceed the record at any octave."""
+    found = []
+    for kind in KINDS:
+        freedom = np.maximum(kind.freedom(phases, m), 1.0)
+        highest = variance * freedom / chdtri(freedom, BOUND_CONFIDENCE)
+        found.append(float(np.sqrt(np.min(highest / kind.shape(tau)))))
+    return np.array(found)
 
 
-def _fit(design: NDArray[np.float64], variance: Array, freedom: Array, kept: list[int]) -> tuple[Array, float]:
-    """Return squared coefficients >= 0 that make chi-square distributed variances likeliest, and their deviance."""
-    terms = np.zeros(design.shape[1])
-    model = variance
-    for _ in range(ROUNDS):
-        weight = np.sqrt(freedom / 2) / model
-        columns = design[:, kept] * weight[:, None]
-        size = np.linalg.norm(columns, axis=0)
-        found, _ = nnls(columns / size, variance * weight)
-        before = model
-        model = np.maximum(design[:, kept] @ (found / size), 1e-12 * variance)
-        terms[kept] = found / size
-        if np.allclose(model, before, rtol=1e-8):
-            break
-    ratio = variance / model
-    return terms, float(np.sum(freedom * (ratio - np.log(ratio) - 1.0)))
-
-
-def _figure(j: int, terms: Array, tau: Array, freedom: Array) -> Figure:
-    kind, design = KINDS[j], _design(tau)
-    model = design @ terms
-    value = float(np.sqrt(terms[j]))
-    if value > 0 and float(np.max(design[:, j] * terms[j] / model)) >= SHOWN_SHARE:
-        u_squared = _u_squared(j, np.flatnonzero(terms), design, model, freedom)
-        return Figure(kind.scale * value, kind.scale * u_squared / (2 * value), kind.unit)
-    # beside everything that may have taken its place
-    u_squared = _u_squared(j, np.arange(len(KINDS)), design, model, freedom)
-    why = f"no {kind.region} averaging times of {tau[0]:.3g} to {tau[-1]:.3g} s: other noise covers it"
-    return Figure(None, None, kind.unit, kind.scale * float(np.sqrt(terms[j] + 1.645 * u_squared)), why)
+def _figure(j: int, fitted: _Fitted) -> Figure:
+    kind, design, model = KINDS[j], design_of(fitted.tau), fitted.model
+    value, bound = float(np.sqrt(fitted.terms[j])), kind.scale * float(fitted.bounds[j])
+    span = f"averaging times of {fitted.tau[0]:.3g} to {fitted.tau[-1]:.3g} s"
+    share = fitted.share(j)
+    shown = share >= SHOWN_SHARE
+    if not (fitted.shows[j] and shown.any()):
+        return Figure(None, None, kind.unit, bound, f"no {kind.region} {span}: other noise covers it")
+    if kind.letter == "K" and int(np.sum(share >= 0.5)) < PREVAILING_OCTAVES:
+        why = (
+            f"slope +1/2 at fewer than {PREVAILING_OCTAVES} octaves of {span}: too short a record to tell a random walk"
+        )
+        return Figure(None, None, kind.unit, bound, why)
+    if not fitted.is_followed(shown):
+        return Figure(
+            None, None, kind.unit, bound, f"no {kind.region} {span}: the deviation does not follow that slope"
+        )
+    # beside those that the record does not show and that may be there all the same
+    beside = np.union1d(np.flatnonzero(fitted.terms), BESIDE)
+    u_squared = _u_squared(j, beside, design, model, fitted.freedom)
+    u = u_squared / (2 * value)
+    if value < KNOWN * u:
+        why = (
+            f"no clear {kind.region} {span}: {kind.scale * value:.3g} {kind.unit}, uncertain by {100 * u / value:.0f} %"
+        )
+        return Figure(None, None, kind.unit, bound, why)
+    return Figure(kind.scale * value, kind.scale * u, kind.unit)
 
 
 def _u_squared(j: int, kept: NDArray[np.int64], design: NDArray[np.float64], model: Array, freedom: Array) -> float:

@@ -75,8 +75,13 @@ def _of_axis(
     basis = fitted.model.temperature.basis(np.array([temperature_c]))[0]
     here = _channels(axis, np.array([rate_dps, rate_dps + STEP_DPS]), temperature_c)
     slope = float(np.diff(fitted.error_dps(here, axis))[0] / STEP_DPS) if fitted.model.argument == "rate" else 0.0
-    by_name = {column.name: float(column.values[0]) for _, column in fitted.model.columns(here, axis)}
-    gradient = np.concatenate([by_name.get(name, 0.0) * basis for name in fit.names])
+    columns = {column.name: column for _, column in fitted.model.columns(here, axis)}
+    gradient = np.concatenate(
+        [
+            (float(columns[name].slope(np.full(2, at @ basis))[0]) if name in columns else 0.0) * basis
+            for name, at in zip(fit.names, fit.values, strict=True)
+        ]
+    )
     coefficients = math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0)) / abs(1.0 + slope)
     combined = math.hypot(coefficients, beyond or 0.0)
     return RateUncertainty(coefficients, beyond, combined, COVERAGE * combined)

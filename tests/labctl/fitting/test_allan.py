@@ -15,7 +15,8 @@ from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.static_record import LONG_S, longest_stretch, static_record
 from labctl.fitting.models.presets import preset_for
-from labctl.fitting.numeric.allan import DEG_PER_HOUR, DEG_PER_ROOT_HOUR, Allan, allan, overlapping_variance
+from labctl.fitting.numeric.allan import Allan, allan, overlapping_variance
+from labctl.fitting.numeric.allan_terms import DEG_PER_HOUR, DEG_PER_ROOT_HOUR
 from tests.helpers.static_recordings import PERIOD_S, noise, resting, with_record_at_rest
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -61,6 +62,52 @@ def test_flicker_and_random_walk_show_their_sizes() -> None:
         assert figure.u is not None
         assert abs(figure.value - true) < 3 * figure.u, letter
         assert figure.u < 0.2 * true, letter
+
+
+@pytest.mark.parametrize("hours", [1, 8])
+def test_a_warm_up_is_taken_off_and_not_read_as_a_random_walk(hours: int) -> None:
+    """What a first hour says of longer times does not contradict what the later hours show."""
+    t_s = PERIOD_S * np.arange(int(hours * 3600 / PERIOD_S))
+    for seed in range(3):
+        still = noise(seed, len(t_s), n_walk=0.01, instability=1.5e-3)
+        found = figures(still + 0.12 * np.exp(-t_s / 900))
+        assert found.trend_dps == pytest.approx(0.12 if hours > 1 else 0.118, abs=0.02)
+        assert found.figures["K"].value is None
+        assert found.figures["K"].at_most is not None
+        walk, flat = found.figures["N"], found.figures["B"]
+        assert walk.value == pytest.approx(0.01 * DEG_PER_ROOT_HOUR, rel=0.03)
+        assert flat.value == pytest.approx(1.5e-3 * DEG_PER_HOUR, rel=0.3)
+        assert figures(still).trend_dps == 0.0
+
+
+@pytest.mark.parametrize("warm_up_dps", [0.0, 0.12])
+def test_values_are_within_their_intervals_and_bounds_above_the_truth(warm_up_dps: float) -> None:
+    true = {"N": 2e-3 * DEG_PER_ROOT_HOUR, "B": 3e-4 * DEG_PER_HOUR, "K": 3e-5 * K_UNIT}
+    within: dict[str, list[bool]] = {letter: [] for letter in true}
+    above = []
+    t_s = np.arange(28_800.0)  # readings of a second each; noise() speaks of tenths
+    for seed in range(40):
+        rates = noise(seed, len(t_s), 2e-3 * math.sqrt(PERIOD_S), 3e-4, 3e-5 / math.sqrt(PERIOD_S))
+        found = allan(rates + warm_up_dps * np.exp(-t_s / 900), 1.0)
+        assert found is not None
+        for letter, figure in found.figures.items():
+            if figure.value is not None:
+                assert figure.u is not None
+                within[letter].append(abs(figure.value - true[letter]) <= 2 * figure.u)
+            else:
+                assert figure.at_most is not None
+                above.append(figure.at_most >= true[letter])
+    assert all(np.mean(hits) >= 0.85 for hits in within.values())
+    assert len(within["K"]) > 30
+    assert np.mean(above) >= 0.95
+
+
+def test_a_deviation_that_follows_no_slope_of_the_standard_has_a_bound_and_no_value() -> None:
+    t_s = PERIOD_S * np.arange(72_000)
+    wave = 5e-3 * np.sin(2 * np.pi * t_s / 600.0)
+    figure = figures(noise(1, len(t_s), n_walk=1e-3) + wave).figures["K"]
+    assert figure.value is None
+    assert figure.at_most is not None
 
 
 def test_the_interval_holds_the_truth_at_95_percent_of_averaging_times() -> None:
