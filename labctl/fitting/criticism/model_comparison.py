@@ -40,8 +40,8 @@ class Comparison:
     candidates: tuple[Candidate, ...]  #: best first
 
     def leader(self, *, smooth: bool) -> Candidate | None:
-        """Return the best catalogue effect, or the best smooth channel."""
-        return next((c for c in self.candidates if c.smooth == smooth), None)
+        """Return the best catalogue effect of a physical size, or the best smooth channel."""
+        return next((c for c in self.candidates if c.smooth == smooth and c.physical), None)
 
 
 def design_of(
@@ -121,7 +121,7 @@ def compare_models(
         data, model, designs, axes,
         {axis: one.white_var for axis, one in found.items()},
         {axis: one.scale for axis, one in found.items()},
-        rank_candidates(designs, axes),
+        rank_candidates(designs, axes, data.info.technology or ""),
     )  # fmt: skip
 
 

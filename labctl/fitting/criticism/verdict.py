@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -67,6 +67,9 @@ class Verdict:
     depends_on: tuple[str, ...] = ()
     reason: str = ""
     terms: Mapping[str, Term] = field(default_factory=dict)  #: effect id -> the shape that fits best
+    confounded: tuple[str, ...] = ()  #: channels that this schedule cannot tell from the first of `depends_on`
+    not_physical: tuple[str, ...] = ()  #: effects alike in these data, at a size that this technology cannot have
+    remainder: Mapping[str, Any] | None = None  #: share of the excess that what is named leaves, and its channels
 
     @property
     def named(self) -> tuple[str, ...]:

@@ -13,9 +13,14 @@ from scipy.special import logsumexp
 
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
 from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
+from labctl.fitting.criticism.evidence.gains import visible_share
 from labctl.fitting.criticism.evidence.noise_grid import Noise
 from labctl.fitting.criticism.option import slices_of
 from labctl.fitting.numeric.arrays import Array
+
+#: An effect of which the base leaves less than this share does not compete: what is left of it is any other shape's too,
+#: and an absurd coefficient would make it as large as the residual.
+LEAST_COMPETING = 0.05
 
 
 @dataclass(frozen=True)
@@ -50,8 +55,13 @@ def evidence(
     log_bf = 0.5 * gain * g / (1 + g) - 0.5 * k * np.log1p(g)
     total = logsumexp(log_p[:, None] + log_bf, axis=0) - logsumexp(log_p)
     best = int(np.argmax(log_p))
+    left = WhitenedBase(design, white_var, noises[best]).eliminate_from(everything[0], others)
+    competes = [
+        option.smooth or visible_share(left, where) >= LEAST_COMPETING
+        for option, where in zip(design.options, slices, strict=True)
+    ]
     return AxisEvidence(
-        np.where(k[best] > 0, total, -np.inf),
-        WhitenedBase(design, white_var, noises[best]).eliminate_from(everything[0], others),
+        np.where((k[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
+        left,
         gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows, design.base.shape[2],
     )  # fmt: skip

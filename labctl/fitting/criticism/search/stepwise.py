@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
 from labctl.fitting.criticism.ranking import Candidate
-from labctl.fitting.criticism.refinement import refined_term, with_refined_leaders
+from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
 from labctl.fitting.criticism.verdict import (
     ALIKE,
     ENOUGH,
@@ -167,7 +167,7 @@ def _judged(comparison: Comparison, catalogue: Mapping[str, Effect], *, first: b
 
 def _has_rival(comparison: Comparison) -> bool:
     """Return whether the evidence for another effect is so near the leader's that its shape may decide."""
-    effects = [c for c in comparison.candidates if not c.smooth][:2]
+    effects = [c for c in comparison.candidates if not c.smooth and c.physical][:2]
     return len(effects) == 2 and effects[1].log_bf > max(NOTICED, effects[0].log_bf - FAR)
 
 
@@ -178,7 +178,7 @@ def _pair(first: Comparison, initial: Comparison, catalogue: Mapping[str, Effect
     """
     smooth = initial.leader(smooth=True)
     pairs = []
-    for leader in [c for c in initial.candidates if not c.smooth and c.log_bf >= ENOUGH][:LEADERS]:
+    for leader in [c for c in initial.candidates if not c.smooth and c.physical and c.log_bf >= ENOUGH][:LEADERS]:
         if leader.term is None:
             continue
         one = Finding((leader.id,), refined_term(initial, leader), leader.log_bf)
