@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.fitting.criticism.option import Option
 from labctl.fitting.criticism.reduction import ReducedRecording
@@ -44,7 +45,7 @@ def channel_options(data: ReducedRecording, axis: str) -> list[Option]:
     for name, values in smooth_channels(data, axis).items():
         distinct = np.unique(np.round(values, 9))
         for number in KNOTS:
-            found += _smooth(data, axis, name, values, np.unique(np.quantile(distinct, np.linspace(0, 1, number))))
+            found += _smooth(data, axis, name, values, number)
         if name not in NO_SURROUNDINGS and len(distinct) > max(KNOTS):
             found += _steps(data, name, values, np.quantile(distinct, STEPS_AT))
             found += _waves(data, name, values)
@@ -71,16 +72,31 @@ def _waves(data: ReducedRecording, name: str, values: Array) -> list[Option]:
     ]
 
 
-def _smooth(data: ReducedRecording, axis: str, name: str, values: Array, knots: Array) -> list[Option]:
-    """Return a piecewise linear function of a channel as bias, as scale factor, and as both."""
+def hats(values: Array, number: int) -> NDArray[np.float64] | None:
+    """Return piecewise linear functions of a channel (n,) with so many knots but one, (n, k); None with too few values.
+
+    The first knot's is left out: the sum of all is a constant.
+    """
+    knots = _knots(values, number)
     if len(knots) < 3:
+        return None
+    return np.column_stack([np.interp(values, knots, np.eye(len(knots))[k]) for k in range(1, len(knots))])
+
+
+def _knots(values: Array, number: int) -> Array:
+    return np.unique(np.quantile(np.unique(np.round(values, 9)), np.linspace(0, 1, number)))
+
+
+def _smooth(data: ReducedRecording, axis: str, name: str, values: Array, number: int) -> list[Option]:
+    """Return a piecewise linear function of a channel as bias, as scale factor, and as both."""
+    functions = hats(values, number)
+    if functions is None:
         return []
-    hats = np.column_stack([np.interp(values, knots, np.eye(len(knots))[k]) for k in range(1, len(knots))])
-    names = tuple(f"{name}@{knot:.6g}" for knot in knots[1:])
-    bias = Option(name, None, data.rows_of(hats), names, ("deg/s",) * len(names))
+    names = tuple(f"{name}@{knot:.6g}" for knot in _knots(values, number)[1:])
+    bias = Option(name, None, data.rows_of(functions), names, ("deg/s",) * len(names))
     if name == "table_rate_dps":
         return [bias]
-    scaled = data.rows_of(hats * data.nodes.rate_dps(axis)[:, None])
+    scaled = data.rows_of(functions * data.nodes.rate_dps(axis)[:, None])
     scale = Option(name, None, scaled, tuple(f"{each} x rate" for each in names), ("1",) * len(names))
     both = np.concatenate([bias.rows, scale.rows], axis=2)
     return [bias, scale, Option(name, None, both, bias.names + scale.names, bias.units + scale.units)]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.candidates import base_rows, options_of
 from labctl.fitting.criticism.evidence.axis_comparison import compare_axis
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
-from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.design import Design, Discrepancy
 from labctl.fitting.criticism.evidence.elimination import eliminate_base
 from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.option import Option
@@ -63,14 +63,27 @@ def design_of(
 
 
 def compare_beside(
-    comparison: Comparison, model: ErrorModel, catalogue: Mapping[str, Effect] = CATALOGUE
+    comparison: Comparison,
+    model: ErrorModel,
+    catalogue: Mapping[str, Effect] = CATALOGUE,
+    discrepancy: Mapping[str, Discrepancy] | None = None,
 ) -> Comparison:
-    """Compare again beside a model with other terms: the same candidates, another base."""
+    """Compare again beside a model with other terms, and their discrepancy by axis: same candidates, another base."""
+    return compare_models(comparison.data, model, catalogue, designs_beside(comparison, model, discrepancy or {}))
+
+
+def designs_beside(
+    comparison: Comparison, model: ErrorModel, discrepancy: Mapping[str, Discrepancy]
+) -> dict[str, Design]:
+    """Return the designs of a comparison with another model, and its discrepancy, as their base."""
     designs = {}
     for axis, design in comparison.designs.items():
         base, _, precision = base_rows(comparison.data, model, axis)
+        if axis in discrepancy:
+            base = np.concatenate([base, discrepancy[axis].rows], axis=2)
+            precision = np.concatenate([precision, discrepancy[axis].precision])
         designs[axis] = replace(design, base=base, precision=precision)
-    return compare_models(comparison.data, model, catalogue, designs)
+    return designs
 
 
 def constant_coordinates(base: NDArray[np.float64], data: ReducedRecording) -> NDArray[np.float64] | None:

@@ -35,7 +35,8 @@ class AxisEvidence:
     weights: Array  #: (noises,) posterior probability of each noise
     noises: list[Noise]
     rows: int  #: number of coordinates
-    base_columns: int
+    base_columns: int  #: without a prior
+    log_p: float  #: restricted log likelihood of the base, averaged over the noise, its priors normalised
 
 
 def evidence(
@@ -63,5 +64,6 @@ def evidence(
     return AxisEvidence(
         np.where((k[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
         left,
-        gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows, design.base.shape[2],
+        gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows,
+        int((design.precision == 0).sum()), float(logsumexp(log_p) + 0.5 * np.log(design.precision[design.precision > 0]).sum()),
     )  # fmt: skip

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.evidence.design import Discrepancy
 from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
 from labctl.fitting.criticism.ranking import Candidate
+from labctl.fitting.criticism.search.discrepancy import discrepancies, together
+from labctl.fitting.criticism.search.held_out import held_out_rises
 from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
+from labctl.fitting.criticism.search.remainder import is_better_than_smooth, remainder_of
 from labctl.fitting.criticism.verdict import (
     ALIKE,
     ENOUGH,
@@ -20,6 +24,7 @@ from labctl.fitting.criticism.verdict import (
     Form,
     Step,
     Verdict,
+    alias_group,
     channels_behind,
     judge,
     overlap,
@@ -39,6 +44,8 @@ NEXT_SHARE = 0.04
 NEXT_SHARE_AMBIGUOUS = 0.08
 #: Least share of an effect that is assumed within data sets, and between them.
 LEAST_PART = 0.05
+#: Where what is named leaves more than this share of the excess, it is not the cause.
+MOST_LEFT = 0.5
 
 
 @dataclass(frozen=True)
@@ -48,6 +55,7 @@ class Finding:
     group: tuple[str, ...]  #: ids, the leader first
     term: Term
     log_bf: float
+    discrepancy: Mapping[str, Discrepancy] = field(default_factory=dict)  #: by axis
 
 
 def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:
@@ -55,19 +63,38 @@ def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple
     depends = channels_behind(first)
     initial, step = _judged(first, catalogue)
     if step.form == "unexplained":
-        findings = _pair(first, initial, catalogue)
-        form, final = _form(findings) if findings else step.form, initial
-        depends = depends or step.depends_on
+        step = _explained_but_for_shape(first, initial, step)
+    if step.form == "unexplained":
+        findings, final = _pair(first, initial, catalogue), initial
+        form: Form = _form(findings) if findings else step.form
     else:
         findings, final = _one_by_one(first, initial, step, catalogue)
         form = _form(findings) if len(findings) > 1 else step.form
+    if not findings and form in {"missing", "ambiguous"}:  # what would be named predicts worse than nothing
+        form = "unexplained"
+    depends = depends or step.depends_on
+    remainder = remainder_of(first, final, tuple(f.term for f in findings), catalogue) if findings else None
+    if remainder is not None and remainder["share"] > MOST_LEFT:
+        return Verdict("unexplained", (), tuple(remainder["depends_on"])), initial, initial
     terms = {finding.term.effect: finding.term for finding in findings}
     kept = depends if findings or form == "unexplained" else ()
-    return Verdict(form, tuple(finding.group for finding in findings), kept, terms=terms), initial, final
+    groups = tuple(finding.group for finding in findings)
+    return Verdict(form, groups, kept, terms=terms, remainder=remainder), initial, final
 
 
 def _form(findings: Sequence[Finding]) -> Form:
     return "missing" if all(len(finding.group) == 1 for finding in findings) else "ambiguous"
+
+
+def _explained_but_for_shape(first: Comparison, initial: Comparison, step: Step) -> Step:
+    """Return a judgement that names the leading effect where it, a few per cent wrong in shape, beats all else."""
+    effect, smooth = initial.leader(smooth=False), initial.leader(smooth=True)
+    if effect is None or smooth is None or effect.log_bf < ENOUGH:
+        return step
+    if not is_better_than_smooth(first, initial, effect, smooth, discrepancies(initial, effect)):
+        return step
+    group = alias_group(initial, effect)
+    return Step("missing" if len(group) == 1 else "ambiguous", group, effect, step.depends_on)
 
 
 def _one_by_one(
@@ -75,7 +102,7 @@ def _one_by_one(
 ) -> tuple[list[Finding], Comparison]:
     """Return the findings one after the other, each sought beside those before, and the comparison beside all."""
     findings: list[Finding] = []
-    while (finding := _finding(comparison, step)) is not None and len(findings) < STEPS:
+    while (finding := _finding(comparison, step, catalogue)) is not None and len(findings) < STEPS:
         findings.append(finding)
         before = (comparison, step)
         comparison, step = _compared_beside(first, findings, catalogue)
@@ -85,12 +112,26 @@ def _one_by_one(
     return findings, comparison
 
 
-def _finding(comparison: Comparison, step: Step) -> Finding | None:
-    """Return what one step found missing; None where that is no effect of the catalogue."""
-    leader = step.leader
-    if step.form not in {"missing", "ambiguous"} or leader is None or leader.term is None:
+def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]) -> Finding | None:
+    """Return what one step found missing; None where that is no effect of the catalogue, or none predicts.
+
+    An effect with which left-out data sets are predicted worse is not named: then another of its group is.
+    """
+    if step.form not in {"missing", "ambiguous"} or step.leader is None:
         return None
-    return Finding(step.group, refined_term(comparison, leader), leader.log_bf)
+    known = {c.id: c for c in comparison.candidates if not c.smooth}
+    left: list[str] = []
+    for name in step.group:
+        if left:
+            left.append(name)
+            continue
+        term = refined_term(comparison, known[name])
+        if not held_out_rises(comparison, (term,), catalogue):
+            left, chosen = [name], known[name]
+            found = term
+    if not left:
+        return None
+    return Finding(tuple(left), found, chosen.log_bf, discrepancies(comparison, chosen))
 
 
 def _compared_beside(
@@ -98,12 +139,14 @@ def _compared_beside(
 ) -> tuple[Comparison, Step]:
     """Return the comparison beside effects that were found, and its judgement."""
     terms = (*first.model.terms, *(replace(finding.term, steady=True) for finding in findings))
-    return _judged(compare_beside(first, first.model.with_terms(terms), catalogue), catalogue, first=False)
+    discrepancy = together([finding.discrepancy for finding in findings])
+    beside = compare_beside(first, first.model.with_terms(terms), catalogue, discrepancy)
+    return _judged(beside, catalogue, first=False)
 
 
 def _finding_beside(first: Comparison, findings: Sequence[Finding], catalogue: Mapping[str, Effect]) -> Finding | None:
     """Return what is found missing beside other findings; None where that is no effect of the catalogue."""
-    return _finding(*_compared_beside(first, findings, catalogue))
+    return _finding(*_compared_beside(first, findings, catalogue), catalogue)
 
 
 def _refined_findings(first: Comparison, findings: Sequence[Finding], catalogue: Mapping[str, Effect]) -> list[Finding]:
