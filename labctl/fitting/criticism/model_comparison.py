@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.candidates import base_rows, options_of
+from labctl.fitting.criticism.candidates import base_rows, options_of, thermometer_options
 from labctl.fitting.criticism.evidence.axis_comparison import compare_axis
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
@@ -57,7 +57,7 @@ def design_of(
     level = constant_coordinates(base, data)
     options = [
         orthogonalised(centred(option, level), base[:, :, precision == 0])
-        for option in options_of(data, axis, model.reference, catalogue)
+        for option in (*options_of(data, axis, model.reference, catalogue), *thermometer_options(data, model, axis))
     ]
     return Design(base, precision, options, data.present, t_s, np.rint(run).astype(np.int64))
 

@@ -41,8 +41,10 @@ SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
 LEAST_SHARE = 0.3
 #: Columns that are the same up to rounding have the same evidence within this.
 SAME = 0.02
-#: At most this many effects beside exact aliases in an ambiguous answer.
+#: At most this many effects in a group of an ambiguous answer, beside exact aliases of the first.
 MOST = 4
+#: A channel of which another explains more than this share cannot be told from it.
+CONFOUNDED = 0.9
 
 
 @dataclass(frozen=True)
@@ -109,17 +111,50 @@ def _is_unexplained(comparison: Comparison, effect: Candidate, smooth: Candidate
 
 
 def alias_group(comparison: Comparison, leader: Candidate) -> tuple[str, ...]:
-    """Return the leader and the effects that the data cannot distinguish from it, best first."""
-    near = []
-    for rival in comparison.candidates:
-        if rival.smooth or rival.id == leader.id:
-            continue
-        close = rival.log_bf > leader.log_bf - LEAD
-        if close or (rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival)):
-            near.append(rival)
+    """Return the leader and the effects that the data cannot distinguish from it, best first.
+
+    At most `MOST`, and beyond them those whose columns are the same as the leader's.
+    """
+    near = _alike(comparison, leader, physical=True)
     exact = [r for r in near if abs(r.log_bf - leader.log_bf) < SAME]
-    others = [r for r in near if r not in exact][:MOST]
+    others = [r for r in near if r not in exact][: MOST - 1]
     return (leader.id, *(r.id for r in exact), *(r.id for r in others))
+
+
+def not_physical_group(comparison: Comparison, leader: Candidate) -> tuple[str, ...]:
+    """Return the effects that are alike in these data, but at a size that the unit's technology cannot have."""
+    return tuple(rival.id for rival in _alike(comparison, leader, physical=False))
+
+
+def _alike(comparison: Comparison, leader: Candidate, *, physical: bool) -> list[Candidate]:
+    return [
+        rival
+        for rival in comparison.candidates
+        if not rival.smooth
+        and rival.physical == physical
+        and rival.id != leader.id
+        and (
+            rival.log_bf > leader.log_bf - LEAD
+            or (rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival))
+        )
+    ]
+
+
+def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
+    """Return the channels that this schedule cannot tell from one on which the residual depends.
+
+    A step in time is a temperature where temperatures only rose.
+    """
+    smooth = [c for c in comparison.candidates if c.smooth and c.log_bf >= ENOUGH]
+    first = next((c for c in smooth if c.id == channel), None)
+    if first is None:
+        return ()
+    return tuple(
+        c.id
+        for c in smooth
+        if c.id != channel
+        and (c.log_bf > first.log_bf - FAR or overlap(comparison, first, c) > CONFOUNDED)
+    )
 
 
 def _is_indistinguishable(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:

@@ -15,12 +15,14 @@ from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
 from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
 from labctl.fitting.criticism.evidence.gains import visible_share
 from labctl.fitting.criticism.evidence.noise_grid import Noise
-from labctl.fitting.criticism.option import slices_of
+from labctl.fitting.criticism.option import Option, slices_of
+from labctl.fitting.effects import kind_of
 from labctl.fitting.numeric.arrays import Array
 
-#: An effect of which the base leaves less than this share does not compete: what is left of it is any other shape's too,
-#: and an absurd coefficient would make it as large as the residual.
-LEAST_COMPETING = 0.05
+#: What follows another channel than the base's own (rate and temperature) does not compete where the base leaves less
+#: than this share of it: no shape is known so exactly that the rest of it would tell.
+LEAST_COMPETING = 0.1
+OF_BASE = frozenset({"temperature_c", "table_rate_dps"})
 
 
 @dataclass(frozen=True)
@@ -58,12 +60,20 @@ def evidence(
     best = int(np.argmax(log_p))
     left = WhitenedBase(design, white_var, noises[best]).eliminate_from(everything[0], others)
     competes = [
-        option.smooth or visible_share(left, where) >= LEAST_COMPETING
+        _is_of_base(option) or visible_share(left, where) >= LEAST_COMPETING
         for option, where in zip(design.options, slices, strict=True)
     ]
     return AxisEvidence(
         np.where((k[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
         left,
         gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows,
-        int((design.precision == 0).sum()), float(logsumexp(log_p) + 0.5 * np.log(design.precision[design.precision > 0]).sum()),
+        int((design.precision == 0).sum()),
+        float(logsumexp(log_p) + 0.5 * np.log(design.precision[design.precision > 0]).sum()),
     )  # fmt: skip
+
+
+def _is_of_base(option: Option) -> bool:
+    """Return whether an option is a law of rate and temperature alone."""
+    if option.term is None:
+        return option.candidate in OF_BASE
+    return not kind_of(option.term).needs

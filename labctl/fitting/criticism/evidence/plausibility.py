@@ -36,7 +36,9 @@ def log_size_prior(option: Option, found: AxisEvidence, index: int, technology: 
     if span is None or not least[0] > 0:
         return 0.0
     largest = max(abs(span[0]), abs(span[1]))
-    return -float(np.log(max(least[0] / largest, 1.0))) if least[0] <= FARTHEST * largest else -np.inf
+    if least[0] > FARTHEST * largest:
+        return -np.inf
+    return -float(np.log(max(least[0] / largest, 1.0)))
 
 
 def _is_beyond_all(option: Option, least: Array) -> bool:

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.evidence.design import Discrepancy
 from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
 from labctl.fitting.criticism.ranking import Candidate
-from labctl.fitting.criticism.search.discrepancy import discrepancies, together
+from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
 from labctl.fitting.criticism.search.held_out import held_out_rises
 from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
 from labctl.fitting.criticism.search.remainder import is_better_than_smooth, remainder_of
@@ -26,10 +27,12 @@ from labctl.fitting.criticism.verdict import (
     Verdict,
     alias_group,
     channels_behind,
+    confounded_with,
     judge,
+    not_physical_group,
     overlap,
 )
-from labctl.fitting.effects import Effect, Term
+from labctl.fitting.effects import CATALOGUE, Effect, Term
 
 #: How many effects may be found missing one after the other.
 STEPS = 4
@@ -46,6 +49,10 @@ NEXT_SHARE_AMBIGUOUS = 0.08
 LEAST_PART = 0.05
 #: Where what is named leaves more than this share of the excess, it is not the cause.
 MOST_LEFT = 0.5
+
+
+#: An effect whose shape may be wrong by a few per cent explains at least this share of what a smooth function does.
+MOSTLY = 0.8
 
 
 @dataclass(frozen=True)
@@ -72,24 +79,41 @@ def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple
         form = _form(findings) if len(findings) > 1 else step.form
     if not findings and form in {"missing", "ambiguous"}:  # what would be named predicts worse than nothing
         form = "unexplained"
-    depends = depends or step.depends_on
+    depends = depends or step.depends_on or _driver_of(initial, step)
     remainder = remainder_of(first, final, tuple(f.term for f in findings), catalogue) if findings else None
     if remainder is not None and remainder["share"] > MOST_LEFT:
-        return Verdict("unexplained", (), tuple(remainder["depends_on"])), initial, initial
+        channels = tuple(remainder["depends_on"])
+        return Verdict("unexplained", (), channels, confounded=_confounded(initial, channels)), initial, initial
     terms = {finding.term.effect: finding.term for finding in findings}
     kept = depends if findings or form == "unexplained" else ()
     groups = tuple(finding.group for finding in findings)
-    return Verdict(form, groups, kept, terms=terms, remainder=remainder), initial, final
+    alike = not_physical_group(initial, step.leader) if step.leader is not None and findings else ()
+    confounded = _confounded(initial, kept) if form == "unexplained" else ()
+    verdict = Verdict(
+        form, groups, kept, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder
+    )
+    return verdict, initial, final
+
+
+def _confounded(comparison: Comparison, channels: tuple[str, ...]) -> tuple[str, ...]:
+    return confounded_with(comparison, channels[0]) if channels else ()
 
 
 def _form(findings: Sequence[Finding]) -> Form:
     return "missing" if all(len(finding.group) == 1 for finding in findings) else "ambiguous"
 
 
+def _driver_of(comparison: Comparison, step: Step) -> tuple[str, ...]:
+    """Return the channel that drives the leader of a step."""
+    kind = CATALOGUE.get(step.leader.id) if step.leader is not None else None
+    channels = frozenset(smooth_channels(comparison.data, comparison.data.info.axes[0]))
+    return tuple(drivers(kind, channels)[-1:])
+
+
 def _explained_but_for_shape(first: Comparison, initial: Comparison, step: Step) -> Step:
     """Return a judgement that names the leading effect where it, a few per cent wrong in shape, beats all else."""
     effect, smooth = initial.leader(smooth=False), initial.leader(smooth=True)
-    if effect is None or smooth is None or effect.log_bf < ENOUGH:
+    if effect is None or smooth is None or effect.log_bf < ENOUGH or overlap(initial, smooth, effect) < MOSTLY:
         return step
     if not is_better_than_smooth(first, initial, effect, smooth, discrepancies(initial, effect)):
         return step
