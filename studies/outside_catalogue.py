@@ -14,6 +14,8 @@ from labctl.recording import Recording
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
+
+
 @dataclass(frozen=True)
 class Kind:
     """One error: its law, of unit size, and the channels that an honest answer names."""
@@ -52,8 +54,9 @@ def _step(columns: Columns) -> Array:
     return (_elapsed(columns) > 0.6).astype(np.float64)
 
 
-def _spline(columns: Columns, seed: int) -> Array:
+def _spline(columns: Columns, rate: Array, seed: int) -> Array:
     """Return a random cubic spline of temperature through seven knots, of unit size."""
+    del rate
     warm = np.asarray(columns["temperature_c"], dtype=np.float64)
     knots = np.random.default_rng([seed, 71]).normal(size=7)
     values = CubicSpline(np.linspace(warm.min(), warm.max(), 7), knots)(warm)
@@ -72,22 +75,45 @@ def _field(columns: Columns, rate: Array, seed: int) -> Array:
     return np.asarray(values / np.abs(values).max())
 
 
+def _etalon(columns: Columns, rate: Array, seed: int) -> Array:
+    del rate, seed
+    return np.asarray(np.sin(2 * np.pi * np.asarray(columns["temperature_c"]) / 13 + 0.4))
+
+
+def _bump(columns: Columns, rate: Array, seed: int) -> Array:
+    del seed
+    warm = np.asarray(columns["temperature_c"], dtype=np.float64)
+    return np.asarray(np.exp(-(((warm - warm.mean()) / 5) ** 2)) * rate)
+
+
+def _of(shape: Callable[[Columns], Array], *, scaled: bool = False) -> Callable[[Columns, Array, int], Array]:
+    """Return a law of the columns alone, as bias or, times the rate, as scale factor."""
+
+    def law(columns: Columns, rate: Array, seed: int) -> Array:
+        del seed
+        return shape(columns) * rate if scaled else shape(columns)
+
+    return law
+
+
+def _scaled_spline(columns: Columns, rate: Array, seed: int) -> Array:
+    return _spline(columns, rate, seed) * rate
+
+
 KINDS: dict[str, Kind] = {
-    "humidity_bias": Kind(lambda c, r, s: np.tanh(2 * _unit(c, "humidity_pct")), ("humidity_pct",)),
-    "humidity_scale": Kind(lambda c, r, s: _unit(c, "humidity_pct") * r, ("humidity_pct",)),
-    "supply_cubic": Kind(lambda c, r, s: _unit(c, "supply_v") ** 3, ("supply_v",)),
-    "supply_scale": Kind(lambda c, r, s: _unit(c, "supply_v") * r, ("supply_v",)),
-    "chamber_scale": Kind(lambda c, r, s: _unit(c, "chamber_c") * r, ("chamber_c",)),
-    "time_step_bias": Kind(lambda c, r, s: _step(c), ("t_s",)),
-    "time_step_scale": Kind(lambda c, r, s: _step(c) * r, ("t_s",)),
-    "daily_wave": Kind(lambda c, r, s: _hours(c, 24.0), ("t_s",)),
-    "two_hour_wave": Kind(lambda c, r, s: _hours(c, 2.0), ("t_s",)),
-    "etalon": Kind(lambda c, r, s: np.sin(2 * np.pi * c["temperature_c"] / 13 + 0.4), ("temperature_c",)),
-    "bump_scale": Kind(
-        lambda c, r, s: np.exp(-(((c["temperature_c"] - c["temperature_c"].mean()) / 5) ** 2)) * r, ("temperature_c",)
-    ),
-    "power_scale": Kind(lambda c, r, s: np.exp(-c["power_s"] / 7200) * r, ("power_s", "t_s")),
-    "spline_bias": Kind(lambda c, r, s: _spline(c, s), ("temperature_c",)),
-    "spline_scale": Kind(lambda c, r, s: _spline(c, s) * r, ("temperature_c",)),
-    "field": Kind(lambda c, r, s: _field(c, r, s), ("table_rate_dps", "temperature_c")),
+    "humidity_bias": Kind(_of(lambda c: np.asarray(np.tanh(2 * _unit(c, "humidity_pct")))), ("humidity_pct",)),
+    "humidity_scale": Kind(_of(lambda c: _unit(c, "humidity_pct"), scaled=True), ("humidity_pct",)),
+    "supply_cubic": Kind(_of(lambda c: _unit(c, "supply_v") ** 3), ("supply_v",)),
+    "supply_scale": Kind(_of(lambda c: _unit(c, "supply_v"), scaled=True), ("supply_v",)),
+    "chamber_scale": Kind(_of(lambda c: _unit(c, "chamber_c"), scaled=True), ("chamber_c",)),
+    "time_step_bias": Kind(_of(_step), ("t_s",)),
+    "time_step_scale": Kind(_of(_step, scaled=True), ("t_s",)),
+    "daily_wave": Kind(_of(lambda c: _hours(c, 24.0)), ("t_s",)),
+    "two_hour_wave": Kind(_of(lambda c: _hours(c, 2.0)), ("t_s",)),
+    "etalon": Kind(_etalon, ("temperature_c",)),
+    "bump_scale": Kind(_bump, ("temperature_c",)),
+    "power_scale": Kind(_of(lambda c: np.asarray(np.exp(-c["power_s"] / 7200)), scaled=True), ("power_s", "t_s")),
+    "spline_bias": Kind(_spline, ("temperature_c",)),
+    "spline_scale": Kind(_scaled_spline, ("temperature_c",)),
+    "field": Kind(_field, ("table_rate_dps", "temperature_c")),
 }

@@ -15,11 +15,12 @@ KNOTS = (5, 9)
 #: evidence would not carry a smooth function of nine.
 STEPS_AT = (0.2, 0.35, 0.5, 0.65, 0.8)
 WAVES_OVER_RANGE = (1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
+STEPS_IN_TIME = tuple(float(at) for at in np.arange(0.1, 0.91, 0.05))
 #: The same over time: an hour of a campaign of a day.
 WAVES_OVER_TIME = tuple(float(n) for n in np.arange(1.5, 12.1, 0.5))
 #: A jump is spread over this share of the range.
 SPREAD = 0.1
-SHARP = 0.01
+SHARP = 0.03
 #: Columns that are no physical channel: counters, the gyro's own output, and places within a data set.
 NO_CHANNELS = frozenset(
     {
@@ -60,7 +61,9 @@ def channel_options(data: ReducedRecording, axis: str) -> list[Option]:
             found += _smooth(data, axis, name, values, number)
         distinct = np.unique(np.round(values, 9))
         if name not in NO_SURROUNDINGS and len(distinct) > max(KNOTS):
-            found += _steps(data, axis, name, values, np.quantile(distinct, STEPS_AT))
+            found += _steps(
+                data, axis, name, values, np.quantile(distinct, STEPS_IN_TIME if name in TIMES else STEPS_AT)
+            )
             found += _waves(data, name, values, WAVES_OVER_TIME if name in TIMES else WAVES_OVER_RANGE)
     return found
 

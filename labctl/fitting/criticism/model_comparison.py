@@ -138,6 +138,16 @@ def compare_models(
     )  # fmt: skip
 
 
+def on_axis(comparison: Comparison, axis: str) -> Comparison:
+    """Return a comparison of one axis alone."""
+    designs, axes = {axis: comparison.designs[axis]}, {axis: comparison.axes[axis]}
+    return replace(
+        comparison, designs=designs, axes=axes, white_var={axis: comparison.white_var[axis]},
+        scales={axis: comparison.scales[axis]},
+        candidates=rank_candidates(designs, axes, comparison.data.info.technology or ""),
+    )  # fmt: skip
+
+
 def with_noise_of(comparison: Comparison, fuller: Comparison) -> Comparison:
     """Return a comparison with the noise that a fuller model of the same data leaves.
 

@@ -72,11 +72,13 @@ class Verdict:
     confounded: tuple[str, ...] = ()  #: channels that this schedule cannot tell from the first of `depends_on`
     not_physical: tuple[str, ...] = ()  #: effects alike in these data, at a size that this technology cannot have
     remainder: Mapping[str, Any] | None = None  #: share of the excess that what is named leaves, and its channels
+    further: tuple[tuple[str, ...], ...] = ()  #: of an adequate model: what would take off noise, and is not missing
+    axes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: leading effect id -> the axes that show it
 
     @property
     def named(self) -> tuple[str, ...]:
         """The ids of all effects that the verdict names."""
-        return tuple(name for group in self.groups for name in group)
+        return tuple(dict.fromkeys(name for group in self.groups for name in group))
 
     @property
     def indistinguishable(self) -> tuple[str, ...]:
@@ -98,7 +100,7 @@ def judge(comparison: Comparison, *, first: bool = True) -> Step:
         return Step("unexplained", (), smooth, depends)
     share = share_removed(comparison, effect)
     group = alias_group(comparison, effect)
-    if len(group) == 1 and first and share < LEAST_SHARE:
+    if len(group) == 1 and first and 0.0 < share < LEAST_SHARE:
         return Step("ambiguous", group, effect, depends, share)
     return Step("missing" if len(group) == 1 else "ambiguous", group, effect, depends, share)
 
@@ -140,6 +142,12 @@ def _alike(comparison: Comparison, leader: Candidate, *, physical: bool) -> list
     ]
 
 
+def axes_of(comparison: Comparison, candidate: Candidate) -> tuple[str, ...]:
+    """Return the axes on which there is evidence for a candidate; all of its axes where no single one has enough."""
+    shown = [axis for axis, i in candidate.option.items() if comparison.axes[axis].log_bf[i] >= LEAD]
+    return tuple(shown or candidate.option)
+
+
 def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
     """Return the channels that this schedule cannot tell from one on which the residual depends.
 
@@ -152,8 +160,7 @@ def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
     return tuple(
         c.id
         for c in smooth
-        if c.id != channel
-        and (c.log_bf > first.log_bf - FAR or overlap(comparison, first, c) > CONFOUNDED)
+        if c.id != channel and (c.log_bf > first.log_bf - FAR or overlap(comparison, first, c) > CONFOUNDED)
     )
 
 
@@ -187,14 +194,14 @@ def overlap(comparison: Comparison, leader: Candidate, rival: Candidate) -> floa
 
 
 def share_removed(comparison: Comparison, candidate: Candidate) -> float:
-    """Return the share of the excess chi2, over all axes, that a candidate removes, 0 to 1."""
+    """Return the share of the excess chi2, over all axes, that a candidate removes, 0 to 1; 0 without any excess."""
     removed, excess = 0.0, 0.0
     for axis, found in comparison.axes.items():
         freedom = found.rows - found.base_columns
         excess += max(found.best.chi2 - freedom, 0.0)
         if axis in candidate.option:
             removed += float(found.gain[candidate.option[axis]])
-    return removed / max(excess, removed, 1e-12)
+    return removed / max(excess, removed) if excess > 0 and removed > 0 else 0.0
 
 
 def channels_behind(comparison: Comparison) -> tuple[str, ...]:

@@ -80,9 +80,7 @@ def _beside_base(comparison: Comparison, axis: str, means: Array) -> Array:
     return np.asarray(means - base / size @ taken)
 
 
-def _moved(
-    comparison: Comparison, axis: str, kind: Effect, term: Term, values: Array
-) -> list[NDArray[np.float64]]:
+def _moved(comparison: Comparison, axis: str, kind: Effect, term: Term, values: Array) -> list[NDArray[np.float64]]:
     """Return what each parameter of the shape moves, one column each."""
     found = []
     for name, at in term.parameters.items():

@@ -69,7 +69,7 @@ class _Axis:
         """Return an axis with the columns of the terms, and the width of the prior from the fit to all data sets."""
         data, reference = comparison.data, comparison.model.reference
         scale = comparison.scales[axis].copy()
-        scale[0] = np.sqrt(comparison.white_var[axis] + comparison.axes[axis].best.noise.size_dps**2)
+        scale[0] = np.sqrt(comparison.white_var[axis] + comparison.axes[axis].best.noise.size_dps ** 2)
         options = [option_of(data, axis, reference, catalogue[term.effect], term) for term in terms]
         rows = [option.rows for option in options if option is not None]
         added = np.concatenate([np.zeros((*scale.shape, 0)), *rows], axis=2) / scale[:, :, None]

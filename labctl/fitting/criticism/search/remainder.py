@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtrc
 
 from labctl.fitting.criticism.evidence.bayes_factors import evidence
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
@@ -18,6 +19,8 @@ from labctl.fitting.effects import Effect, Term
 
 #: Excess chi2 over its own scatter from which on something is said to remain.
 SIGNIFICANT = 5.0
+#: From this probability on that noise alone leaves more, what is left is noise, whatever resembles it.
+SURELY_NOISE = 0.995
 
 
 def remainder_of(
@@ -50,6 +53,15 @@ def remainder_of(
         "over_floor": float(np.sqrt(1.0 + after / freedom)),
         "depends_on": list(channels_behind(plain)),
     }
+
+
+def is_within_noise(first: Comparison) -> bool:
+    """Return whether a model leaves clearly less than the noise that it is held against: nothing can be missing."""
+    chi2 = freedom = 0.0
+    for axis, design in first.designs.items():
+        excess, number = _excess(first, first, axis, replace(design, options=[]))
+        chi2, freedom = chi2 + excess + number, freedom + number
+    return bool(chdtrc(max(freedom, 1.0), chi2) > SURELY_NOISE)
 
 
 def _excess(first: Comparison, final: Comparison, axis: str, design: Design) -> tuple[float, float]:
@@ -88,6 +100,8 @@ def is_better_than_smooth(
         found = evidence(replace(first.designs[axis], options=rivals), y, white, scale, noises, rows)
         of = dict(zip([c.smooth for c in (effect, smooth) if axis in c.option], found.log_bf, strict=True))
         narrow = replace(wide, base=wide.base[:, :, wide.precision == 0], precision=wide.precision[wide.precision == 0])
-        shape = evidence(wide, y, white, scale, noises, rows).log_p - evidence(narrow, y, white, scale, noises, rows).log_p
+        shape = (
+            evidence(wide, y, white, scale, noises, rows).log_p - evidence(narrow, y, white, scale, noises, rows).log_p
+        )
         lead += max(of.get(False, 0.0), 0.0) + shape - max(of.get(True, 0.0), 0.0)
     return lead > LEAD

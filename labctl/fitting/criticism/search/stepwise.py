@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.evidence.design import Discrepancy
 from labctl.fitting.criticism.evidence.gains import solve_option
-from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
+from labctl.fitting.criticism.model_comparison import Comparison, compare_beside, on_axis
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
 from labctl.fitting.criticism.search.held_out import held_out_rises
 from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
-from labctl.fitting.criticism.search.remainder import is_better_than_smooth, remainder_of
+from labctl.fitting.criticism.search.remainder import is_better_than_smooth, is_within_noise, remainder_of
 from labctl.fitting.criticism.verdict import (
     ALIKE,
     ENOUGH,
@@ -26,6 +26,7 @@ from labctl.fitting.criticism.verdict import (
     Step,
     Verdict,
     alias_group,
+    axes_of,
     channels_behind,
     confounded_with,
     judge,
@@ -63,10 +64,45 @@ class Finding:
     term: Term
     log_bf: float
     discrepancy: Mapping[str, Discrepancy] = field(default_factory=dict)  #: by axis
+    axes: tuple[str, ...] = ()  #: that show it
 
 
 def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:
-    """Return the verdict, the first comparison with its leaders' shapes refined, and the last step's comparison."""
+    """Return the verdict, the first comparison with its leaders' shapes refined, and the last step's comparison.
+
+    Where nothing is found over all axes together, each axis is searched by itself: they may have different causes.
+    """
+    verdict, initial, final = _searched(first, catalogue)
+    if verdict.form in {"missing", "ambiguous"} and is_within_noise(first):
+        return Verdict("adequate", further=verdict.groups), initial, initial
+    if verdict.form == "unexplained" and len(first.axes) > 1:
+        apart = {axis: _searched(on_axis(first, axis), catalogue)[0] for axis in first.axes}
+        return _merged(apart, verdict), initial, final
+    return verdict, initial, final
+
+
+def _merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
+    """Return the verdict of the axes, each with causes of its own; the joint one where an axis stays unexplained."""
+    if any(verdict.form == "unexplained" for verdict in apart.values()):
+        return joint
+    axes: dict[tuple[str, ...], tuple[str, ...]] = {}
+    for axis, verdict in apart.items():
+        for group in verdict.groups:
+            same = next((known for known in axes if known[0] == group[0]), group)
+            axes[same] = (*axes.get(same, ()), axis)
+    if not axes:
+        return joint
+    terms = {name: term for verdict in apart.values() for name, term in verdict.terms.items()}
+    remainders = [verdict.remainder for verdict in apart.values() if verdict.remainder is not None]
+    return Verdict(
+        "missing" if all(len(group) == 1 for group in axes) else "ambiguous", tuple(axes), joint.depends_on,
+        terms={group[0]: terms[group[0]] for group in axes if group[0] in terms},
+        remainder=max(remainders, key=lambda each: float(each["share"]), default=None),
+        axes={group[0]: where for group, where in axes.items()},
+    )  # fmt: skip
+
+
+def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:
     depends = channels_behind(first)
     initial, step = _judged(first, catalogue)
     if step.form == "unexplained":
@@ -90,8 +126,9 @@ def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple
     alike = not_physical_group(initial, step.leader) if step.leader is not None and findings else ()
     confounded = _confounded(initial, kept) if form == "unexplained" else ()
     verdict = Verdict(
-        form, groups, kept, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder
-    )
+        form, groups, kept, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder,
+        axes={finding.group[0]: finding.axes for finding in findings},
+    )  # fmt: skip
     return verdict, initial, final
 
 
@@ -155,7 +192,8 @@ def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]
             found = term
     if not left:
         return None
-    return Finding(tuple(left), found, chosen.log_bf, discrepancies(comparison, chosen))
+    axes = axes_of(comparison, chosen)
+    return Finding(tuple(left), found, chosen.log_bf, discrepancies(comparison, chosen), axes)
 
 
 def _compared_beside(
