@@ -15,6 +15,9 @@ from labctl.fitting.criticism.option import Option
 from labctl.fitting.effects import Term
 from labctl.fitting.numeric.arrays import Array
 
+#: From this evidence on, nats, a candidate that has none at a physical size is listed as not physical.
+UNPHYSICAL_FROM = 4.5
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -38,11 +41,20 @@ def rank_candidates(
         for option in design.options:
             names[option.candidate, option.smooth] = None
     priors = {axis: _size_priors(design, axes[axis], technology) for axis, design in designs.items()}
-    found = [
-        _candidate(name, smooth, designs, axes, priors) or _candidate(name, smooth, designs, axes, None)
-        for name, smooth in names
-    ]
+    found = [_physical_or_not(name, smooth, designs, axes, priors) for name, smooth in names]
     return tuple(sorted((c for c in found if c is not None), key=lambda c: -c.log_bf))
+
+
+def _physical_or_not(
+    name: str, smooth: bool, designs: Mapping[str, Design], axes: Mapping[str, AxisEvidence],
+    priors: Mapping[str, Array],
+) -> Candidate | None:  # fmt: skip
+    """Return a candidate at its physical sizes; where these have no evidence, at those that it is fitted with."""
+    physical = _candidate(name, smooth, designs, axes, priors)
+    whatever = _candidate(name, smooth, designs, axes, None)
+    if physical is None or whatever is None:
+        return whatever
+    return whatever if physical.log_bf <= 0 and whatever.log_bf > UNPHYSICAL_FROM else physical
 
 
 def _size_priors(design: Design, found: AxisEvidence, technology: str) -> Array:

@@ -15,7 +15,7 @@ SPARE_U = 2.0
 #: A first coefficient this many times its technology's span is not physical.
 FARTHEST = 1e4
 #: Largest physical coefficient by its unit, whatever the technology: an error of many times the rate itself is none.
-LARGEST = {"1": 30.0}
+LARGEST = {"1": 3.0}
 #: Evidence on an axis, nats, from which on the size there counts.
 SUPPORTED = 2.0
 

@@ -24,12 +24,12 @@ from labctl.fitting.criticism.search.refinement import CHOICES
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.numeric.arrays import Array
 
-#: Standard deviation of the discrepancy over the signal.
+#: Standard deviation of the discrepancy over the signal: where it is multiplied, and over its peak where it is added.
 SHAPE_ERROR = 0.05
 #: Standard deviation of a parameter of the shape, in its logarithm, and the step by which its column is computed.
 PARAMETER_ERROR, STEP = 0.2, 0.05
-#: Knots of a smooth function of a driver.
-KNOTS = 9
+#: Knots of a smooth function of a driver; of the rate, which is given exactly, about one at each rate.
+KNOTS, KNOTS_OF_RATE = 9, 21
 #: Drivers of every effect.
 DRIVERS = ("table_rate_dps", "temperature_c")
 
@@ -51,10 +51,10 @@ def _of_signal(
 ) -> Discrepancy:
     data = comparison.data
     kind = CATALOGUE.get(term.effect) if term is not None else None
-    size_dps = float(np.sqrt(np.mean(_beside_base(comparison, axis, signal[0]) ** 2)))
+    size_dps = float(np.max(np.abs(_beside_base(comparison, axis, signal[0]))))
     rows = []
     for name in drivers(kind, frozenset(smooth_channels(data, axis))):
-        functions = hats(smooth_channels(data, axis)[name], KNOTS)
+        functions = hats(smooth_channels(data, axis)[name], KNOTS_OF_RATE if name == "table_rate_dps" else KNOTS)
         if functions is None:
             continue
         at_sets = np.column_stack([data.at_sets(column) for column in functions.T])
