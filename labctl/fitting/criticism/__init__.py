@@ -13,7 +13,12 @@ from labctl.fitting.criticism.criticism import (
 from labctl.fitting.criticism.diagnostics import residual_maps
 from labctl.fitting.criticism.effect_size import SizeReference, size_for_z, size_in_noise_units, size_reference
 from labctl.fitting.criticism.reduction import ReducedRecording, decimate
-from labctl.fitting.criticism.residuals import Residuals, where_it_fails, worst_data_sets
+from labctl.fitting.criticism.residuals import (
+    Residuals,
+    has_one_rising_leg,
+    where_it_fails,
+    worst_data_sets,
+)
 from labctl.fitting.criticism.separation import (
     SEPARATED_CHI2,
     LeadingSignal,
@@ -41,6 +46,7 @@ __all__ = [
     "criticise",
     "decimate",
     "effect_visibilities",
+    "has_one_rising_leg",
     "leading_signal",
     "residual_maps",
     "residuals_beside_missing",

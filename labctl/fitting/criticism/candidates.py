@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,11 @@ from labctl.fitting.numeric.arrays import Array
 
 #: Effects that contain several others: a model starts from them, and they are never what is missing.
 ONLY_BASE = frozenset({"rate_temperature_surface"})
+
+#: Candidate that is a drift of the thermometer: it depends on the temperature as it is logged.
+THERMOMETER = "temperature_c"
+#: Step by which the base's slope over temperature is computed, K.
+SHIFT_K = 0.25
 
 
 def span_of(data: ReducedRecording) -> Span:
@@ -109,6 +115,29 @@ def option_of(data: ReducedRecording, axis: str, reference: Reference, kind: Eff
         return None
     rows = np.stack([data.rows(column) for column in columns], axis=2)
     return Option(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
+
+
+def thermometer_options(data: ReducedRecording, model: ErrorModel, axis: str) -> list[Option]:
+    """Return what a thermometer that drifts in time would do: the base's own slope over temperature, times time."""
+    name = f"temperature_{axis}_c" if f"temperature_{axis}_c" in data.nodes else "temperature_c"
+    if "t_s" not in data.nodes or name not in data.nodes:
+        return []
+    base, _, precision = base_rows(data, model, axis)
+    size = np.maximum(np.linalg.norm(base[0], axis=0), 1e-300)
+    values, *_ = np.linalg.lstsq(base[0] / size, data.error_dps(axis)[0], rcond=1e-9)
+    ends = []
+    for shift_k in (SHIFT_K, -SHIFT_K):
+        columns = {**data.nodes.columns, name: np.asarray(data.nodes[name], dtype=np.float64) + shift_k}
+        moved, _, other = base_rows(replace(data, nodes=replace(data.nodes, columns=columns)), model, axis)
+        if len(other) != len(precision):
+            return []
+        ends.append(moved @ (values / size))
+    slope = (ends[0] - ends[1]) / (2 * SHIFT_K)
+    t_s = data.at_sets(np.asarray(data.nodes["t_s"], dtype=np.float64))
+    if not np.ptp(t_s) > 0 or not np.any(slope):
+        return []
+    elapsed = (t_s - t_s.min()) / np.ptp(t_s)
+    return [Option(THERMOMETER, None, (slope * elapsed)[:, :, None], ("thermometer drift",), ("K",))]
 
 
 def _is_known(data: ReducedRecording, effect_id: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.fitting.criticism.option import Option
 from labctl.fitting.criticism.reduction import ReducedRecording
@@ -14,8 +15,12 @@ KNOTS = (5, 9)
 #: evidence would not carry a smooth function of nine.
 STEPS_AT = (0.2, 0.35, 0.5, 0.65, 0.8)
 WAVES_OVER_RANGE = (1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
+STEPS_IN_TIME = tuple(float(at) for at in np.arange(0.1, 0.91, 0.05))
+#: The same over time: an hour of a campaign of a day.
+WAVES_OVER_TIME = tuple(float(n) for n in np.arange(1.5, 12.1, 0.5))
 #: A jump is spread over this share of the range.
 SPREAD = 0.1
+SHARP = 0.03
 #: Columns that are no physical channel: counters, the gyro's own output, and places within a data set.
 NO_CHANNELS = frozenset(
     {
@@ -24,7 +29,11 @@ NO_CHANNELS = frozenset(
     }
 )  # fmt: skip
 TIMES = frozenset({"t_s", "power_s"})
-NO_SURROUNDINGS = TIMES | {"table_rate_dps"}
+OF_TEMPERATURE_AND_TIME = TIMES | {"temperature_c"}
+#: Time since power-on is time where their difference changes by less than this.
+SAME_TIME_S = 1.0
+#: Channels without steps and waves: the rate, and the time since power-on, which is time again.
+NO_SURROUNDINGS = frozenset({"table_rate_dps", "power_s"})
 
 
 def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
@@ -39,41 +48,75 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
 
 
 def channel_options(data: ReducedRecording, axis: str) -> list[Option]:
-    """Return piecewise linear functions, steps and waves of every channel that varies, for one axis."""
+    """Return piecewise linear functions, steps and waves of every channel that varies, for one axis.
+
+    Each as bias and as scale factor; of temperature also as both. Time since power-on is left out where it is time.
+    """
     found = []
-    for name, values in smooth_channels(data, axis).items():
-        distinct = np.unique(np.round(values, 9))
+    channels = smooth_channels(data, axis)
+    if "t_s" in channels and "power_s" in channels and np.ptp(channels["t_s"] - channels["power_s"]) < SAME_TIME_S:
+        del channels["power_s"]
+    for name, values in channels.items():
         for number in KNOTS:
-            found += _smooth(data, name, values, np.unique(np.quantile(distinct, np.linspace(0, 1, number))))
+            found += _smooth(data, axis, name, values, number)
+        distinct = np.unique(np.round(values, 9))
         if name not in NO_SURROUNDINGS and len(distinct) > max(KNOTS):
-            found += _steps(data, name, values, np.quantile(distinct, STEPS_AT))
-            found += _waves(data, name, values)
+            found += _steps(
+                data, axis, name, values, np.quantile(distinct, STEPS_IN_TIME if name in TIMES else STEPS_AT)
+            )
+            found += _waves(data, name, values, WAVES_OVER_TIME if name in TIMES else WAVES_OVER_RANGE)
     return found
 
 
-def _steps(data: ReducedRecording, name: str, values: Array, places: Array) -> list[Option]:
-    half = SPREAD * np.ptp(values) / 2
-    return [
-        Option(
-            name, None, data.rows_of(np.clip((values - place) / half, -1.0, 1.0)[:, None]),
-            (f"{name}>{place:.6g}",), ("deg/s",),
-        )
-        for place in places
-    ]  # fmt: skip
+def _steps(data: ReducedRecording, axis: str, name: str, values: Array, places: Array) -> list[Option]:
+    """Return steps of a channel, of the bias, and in time, where a step is sharp, of the scale factor."""
+    half = (SHARP if name in TIMES else SPREAD) * np.ptp(values) / 2
+    found = []
+    for place in places:
+        step = np.clip((values - place) / half, -1.0, 1.0)[:, None]
+        found.append(Option(name, None, data.rows_of(step), (f"{name}>{place:.6g}",), ("deg/s",)))
+        if name in TIMES:
+            scaled = data.rows_of(step * data.nodes.rate_dps(axis)[:, None])
+            found.append(Option(name, None, scaled, (f"{name}>{place:.6g} x rate",), ("1",)))
+    return found
 
 
-def _waves(data: ReducedRecording, name: str, values: Array) -> list[Option]:
+def _waves(data: ReducedRecording, name: str, values: Array, over_range: tuple[float, ...]) -> list[Option]:
     phase = 2 * np.pi * (values - values.min()) / np.ptp(values)
     names, units = (f"cos {name}", f"sin {name}"), ("deg/s", "deg/s")
     return [
         Option(name, None, data.rows_of(np.column_stack([np.cos(n * phase), np.sin(n * phase)])), names, units)
-        for n in WAVES_OVER_RANGE
+        for n in over_range
     ]
 
 
-def _smooth(data: ReducedRecording, name: str, values: Array, knots: Array) -> list[Option]:
+def hats(values: Array, number: int) -> NDArray[np.float64] | None:
+    """Return piecewise linear functions of a channel (n,) with so many knots but one, (n, k); None with too few values.
+
+    The first knot's is left out: the sum of all is a constant.
+    """
+    knots = _knots(values, number)
     if len(knots) < 3:
+        return None
+    return np.column_stack([np.interp(values, knots, np.eye(len(knots))[k]) for k in range(1, len(knots))])
+
+
+def _knots(values: Array, number: int) -> Array:
+    return np.unique(np.quantile(np.unique(np.round(values, 9)), np.linspace(0, 1, number)))
+
+
+def _smooth(data: ReducedRecording, axis: str, name: str, values: Array, number: int) -> list[Option]:
+    """Return a piecewise linear function of a channel as bias, as scale factor, and as both."""
+    functions = hats(values, number)
+    if functions is None:
         return []
-    hats = np.column_stack([np.interp(values, knots, np.eye(len(knots))[k]) for k in range(1, len(knots))])
-    names = tuple(f"{name}@{knot:.6g}" for knot in knots[1:])
-    return [Option(name, None, data.rows_of(hats), names, ("deg/s",) * len(names))]
+    names = tuple(f"{name}@{knot:.6g}" for knot in _knots(values, number)[1:])
+    bias = Option(name, None, data.rows_of(functions), names, ("deg/s",) * len(names))
+    if name == "table_rate_dps" or (number == max(KNOTS) and name not in OF_TEMPERATURE_AND_TIME):
+        return [bias]
+    scaled = data.rows_of(functions * data.nodes.rate_dps(axis)[:, None])
+    scale = Option(name, None, scaled, tuple(f"{each} x rate" for each in names), ("1",) * len(names))
+    if name != "temperature_c":
+        return [bias, scale]
+    both = np.concatenate([bias.rows, scale.rows], axis=2)
+    return [bias, scale, Option(name, None, both, bias.names + scale.names, bias.units + scale.units)]

@@ -11,9 +11,9 @@ import numpy as np
 from labctl.fitting.criticism.diagnostics import views_of
 from labctl.fitting.criticism.model_comparison import Comparison, compare_models, with_noise_of
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
-from labctl.fitting.criticism.refinement import refined_term
 from labctl.fitting.criticism.residuals import Residuals, residuals_of
-from labctl.fitting.criticism.stepwise_search import search_stepwise
+from labctl.fitting.criticism.search.refinement import refined_term
+from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.suspects import Suspect, suspects_of
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import not_testable

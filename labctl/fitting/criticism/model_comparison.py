@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.candidates import base_rows, options_of
+from labctl.fitting.criticism.candidates import base_rows, options_of, thermometer_options
 from labctl.fitting.criticism.evidence.axis_comparison import compare_axis
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
-from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.design import Design, Discrepancy
 from labctl.fitting.criticism.evidence.elimination import eliminate_base
 from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.option import Option
@@ -40,8 +40,8 @@ class Comparison:
     candidates: tuple[Candidate, ...]  #: best first
 
     def leader(self, *, smooth: bool) -> Candidate | None:
-        """Return the best catalogue effect, or the best smooth channel."""
-        return next((c for c in self.candidates if c.smooth == smooth), None)
+        """Return the best catalogue effect of a physical size, or the best smooth channel."""
+        return next((c for c in self.candidates if c.smooth == smooth and c.physical), None)
 
 
 def design_of(
@@ -57,20 +57,33 @@ def design_of(
     level = constant_coordinates(base, data)
     options = [
         orthogonalised(centred(option, level), base[:, :, precision == 0])
-        for option in options_of(data, axis, model.reference, catalogue)
+        for option in (*options_of(data, axis, model.reference, catalogue), *thermometer_options(data, model, axis))
     ]
     return Design(base, precision, options, data.present, t_s, np.rint(run).astype(np.int64))
 
 
 def compare_beside(
-    comparison: Comparison, model: ErrorModel, catalogue: Mapping[str, Effect] = CATALOGUE
+    comparison: Comparison,
+    model: ErrorModel,
+    catalogue: Mapping[str, Effect] = CATALOGUE,
+    discrepancy: Mapping[str, Discrepancy] | None = None,
 ) -> Comparison:
-    """Compare again beside a model with other terms: the same candidates, another base."""
+    """Compare again beside a model with other terms, and their discrepancy by axis: same candidates, another base."""
+    return compare_models(comparison.data, model, catalogue, designs_beside(comparison, model, discrepancy or {}))
+
+
+def designs_beside(
+    comparison: Comparison, model: ErrorModel, discrepancy: Mapping[str, Discrepancy]
+) -> dict[str, Design]:
+    """Return the designs of a comparison with another model, and its discrepancy, as their base."""
     designs = {}
     for axis, design in comparison.designs.items():
         base, _, precision = base_rows(comparison.data, model, axis)
+        if axis in discrepancy:
+            base = np.concatenate([base, discrepancy[axis].rows], axis=2)
+            precision = np.concatenate([precision, discrepancy[axis].precision])
         designs[axis] = replace(design, base=base, precision=precision)
-    return compare_models(comparison.data, model, catalogue, designs)
+    return designs
 
 
 def constant_coordinates(base: NDArray[np.float64], data: ReducedRecording) -> NDArray[np.float64] | None:
@@ -121,7 +134,17 @@ def compare_models(
         data, model, designs, axes,
         {axis: one.white_var for axis, one in found.items()},
         {axis: one.scale for axis, one in found.items()},
-        rank_candidates(designs, axes),
+        rank_candidates(designs, axes, data.info.technology or ""),
+    )  # fmt: skip
+
+
+def on_axis(comparison: Comparison, axis: str) -> Comparison:
+    """Return a comparison of one axis alone."""
+    designs, axes = {axis: comparison.designs[axis]}, {axis: comparison.axes[axis]}
+    return replace(
+        comparison, designs=designs, axes=axes, white_var={axis: comparison.white_var[axis]},
+        scales={axis: comparison.scales[axis]},
+        candidates=rank_candidates(designs, axes, comparison.data.info.technology or ""),
     )  # fmt: skip
 
 

@@ -10,8 +10,13 @@ from scipy.special import logsumexp
 
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
 from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.plausibility import log_size_prior
 from labctl.fitting.criticism.option import Option
 from labctl.fitting.effects import Term
+from labctl.fitting.numeric.arrays import Array
+
+#: From this evidence on, nats, a candidate that has none at a physical size is listed as not physical.
+UNPHYSICAL_FROM = 4.5
 
 
 @dataclass(frozen=True)
@@ -20,28 +25,51 @@ class Candidate:
 
     id: str
     smooth: bool
-    log_bf: float  #: log Bayes factor against the base
+    log_bf: float  #: log Bayes factor against the base, with the prior of its size
     option: Mapping[str, int]  #: axis -> index of its option with the most evidence
     term: Term | None  #: the shape that fits all axes together best
     gain: float  #: chi2 that it removes, over all axes
+    physical: bool = True  #: whether the size that it is fitted with is one that the unit's technology can have
 
 
-def rank_candidates(designs: Mapping[str, Design], axes: Mapping[str, AxisEvidence]) -> tuple[Candidate, ...]:
+def rank_candidates(
+    designs: Mapping[str, Design], axes: Mapping[str, AxisEvidence], technology: str
+) -> tuple[Candidate, ...]:
     """Return every candidate of the designs, the one with the most evidence first."""
     names: dict[tuple[str, bool], None] = {}
     for design in designs.values():
         for option in design.options:
             names[option.candidate, option.smooth] = None
-    found = [_candidate(name, smooth, designs, axes) for name, smooth in names]
+    priors = {axis: _size_priors(design, axes[axis], technology) for axis, design in designs.items()}
+    found = [_physical_or_not(name, smooth, designs, axes, priors) for name, smooth in names]
     return tuple(sorted((c for c in found if c is not None), key=lambda c: -c.log_bf))
 
 
+def _physical_or_not(
+    name: str, smooth: bool, designs: Mapping[str, Design], axes: Mapping[str, AxisEvidence],
+    priors: Mapping[str, Array],
+) -> Candidate | None:  # fmt: skip
+    """Return a candidate at its physical sizes; where these have no evidence, at those that it is fitted with."""
+    physical = _candidate(name, smooth, designs, axes, priors)
+    whatever = _candidate(name, smooth, designs, axes, None)
+    if physical is None or whatever is None:
+        return whatever
+    return whatever if physical.log_bf <= 0 and whatever.log_bf > UNPHYSICAL_FROM else physical
+
+
+def _size_priors(design: Design, found: AxisEvidence, technology: str) -> Array:
+    """Return the log prior of the size of every option, (options,)."""
+    return np.array([log_size_prior(option, found, i, technology) for i, option in enumerate(design.options)])
+
+
 def _candidate(
-    name: str, smooth: bool, designs: Mapping[str, Design], axes: Mapping[str, AxisEvidence]
-) -> Candidate | None:
+    name: str, smooth: bool, designs: Mapping[str, Design], axes: Mapping[str, AxisEvidence],
+    priors: Mapping[str, Array] | None,
+) -> Candidate | None:  # fmt: skip
     """Return one candidate over all axes; None where no option of it has any direction beside the base.
 
-    It may be on all axes, or on a single one: both are averaged over with equal prior probability.
+    It may be on all axes, or on a single one: both are averaged over with equal prior probability. Options whose size
+    is not physical are left out; without `priors` of the sizes they count, and the candidate is marked.
     """
     per_axis: list[float] = []
     best: dict[str, int] = {}
@@ -50,9 +78,12 @@ def _candidate(
     for axis, design in designs.items():
         which = [i for i, o in enumerate(design.options) if (o.candidate, o.smooth) == (name, smooth)]
         values = axes[axis].log_bf[which] if which else np.zeros(0)
+        tried = np.isfinite(values).sum()
+        if priors is not None and len(values):
+            values = values + priors[axis][which]
         if not len(values) or not np.any(np.isfinite(values)):
             continue
-        per_axis.append(float(logsumexp(values) - np.log(np.isfinite(values).sum())))
+        per_axis.append(float(logsumexp(values) - np.log(tried)))
         best[axis] = which[int(np.argmax(values))]
         gain += float(axes[axis].gain[best[axis]])
         for i, value in zip(which, values, strict=True):
@@ -64,7 +95,7 @@ def _candidate(
     joint = sum(per_axis)
     alternatives = [joint - np.log(2.0), *(value - np.log(2.0 * n) for value in per_axis)] if n > 1 else [joint]
     term = max(terms.values(), key=lambda pair: pair[1])[0]
-    return Candidate(name, smooth, float(logsumexp(alternatives)), best, term, gain)
+    return Candidate(name, smooth, float(logsumexp(alternatives)), best, term, gain, priors is not None)
 
 
 def _key(option: Option) -> tuple[object, ...]:

@@ -15,6 +15,7 @@ from labctl.fitting.criticism.evidence.elimination import stack
 from labctl.fitting.criticism.evidence.noise_grid import factors
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.data.temperature_levels import ONE_LEVEL_SPAN_C
 from labctl.fitting.numeric.arrays import Array
 
 #: Bins of a channel over which residuals are averaged.
@@ -22,6 +23,8 @@ BINS = 8
 #: A bin is reported from this z on, and at most this many bins are.
 LEAST_Z = 3.0
 LINES = 12
+#: Temperatures went one way only when they came back by less than this share of their span.
+BACK_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,17 @@ def _bins(values: Array) -> list[tuple[float, float, NDArray[np.int64]]]:
         for k in range(len(edges) - 1)
         if len(rows := np.flatnonzero(which == k)) >= 4
     ]
+
+
+def has_one_rising_leg(data: ReducedRecording) -> bool:
+    """Return whether a recording's temperatures went one way only: then temperature and time are one variable."""
+    if "t_s" not in data.nodes:
+        return False
+    warm = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
+    order = np.argsort(data.at_sets(np.asarray(data.nodes["t_s"], dtype=np.float64)), kind="stable")
+    steps, span = np.diff(warm[order]), float(np.ptp(warm))
+    back = min(float(-steps[steps < 0].sum()), float(steps[steps > 0].sum()))
+    return span > ONE_LEVEL_SPAN_C and back < BACK_SHARE * span
 
 
 def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most: int = 10) -> list[dict[str, Any]]:

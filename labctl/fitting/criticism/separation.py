@@ -40,8 +40,14 @@ def leading_signal(comparison: Comparison, effect_id: str) -> LeadingSignal:
     )
 
 
-def separation_chi2(schedule: Schedule, signal: LeadingSignal, rival: str) -> float:
-    """Return the chi2, summed over the axes, that a rival effect leaves of a signal on a schedule."""
+def separation_chi2(
+    schedule: Schedule, signal: LeadingSignal, rival: str, floor_dps: Mapping[str, float] | None = None
+) -> float:
+    """Return the chi2, summed over the axes, that a rival effect leaves of a signal on a schedule.
+
+    `floor_dps` is the noise of a mean by axis, deg/s, as it was found; where it is larger than the schedule's own, it
+    counts.
+    """
     total = 0.0
     for axis, values in signal.coefficients.items():
         if axis not in schedule.designs:
@@ -61,8 +67,15 @@ def separation_chi2(schedule: Schedule, signal: LeadingSignal, rival: str) -> fl
             (reproduced(left, nearest, values, where) for option, where in options if option.candidate == rival),
             default=0.0,
         )
-        total += max(size - shared, 0.0)
+        total += max(size - shared, 0.0) * _noise_ratio(schedule, axis, (floor_dps or {}).get(axis, 0.0))
     return total
+
+
+def _noise_ratio(schedule: Schedule, axis: str, floor_dps: float) -> float:
+    """Return the variance of a mean on a schedule over that which was found, at most 1."""
+    white = schedule.data.white_var
+    own = schedule.left[axis].noise.size_dps ** 2 + (float(np.median(white[axis])) if white is not None else 0.0)
+    return min(1.0, own / floor_dps**2) if floor_dps > 0 else 1.0
 
 
 def separation_power(chi2: float) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -42,8 +42,10 @@ SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
 LEAST_SHARE = 0.3
 #: Columns that are the same up to rounding have the same evidence within this.
 SAME = 0.02
-#: At most this many effects beside exact aliases in an ambiguous answer.
+#: At most this many effects in a group of an ambiguous answer, beside exact aliases of the first.
 MOST = 4
+#: A channel of which another explains more than this share cannot be told from it.
+CONFOUNDED = 0.9
 
 
 @dataclass(frozen=True)
@@ -68,11 +70,16 @@ class Verdict:
     depends_on: tuple[str, ...] = ()
     reason: str = ""
     terms: Mapping[str, Term] = field(default_factory=dict)  #: effect id -> the shape that fits best
+    confounded: tuple[str, ...] = ()  #: channels that this schedule cannot tell from the first of `depends_on`
+    not_physical: tuple[str, ...] = ()  #: effects alike in these data, at a size that this technology cannot have
+    remainder: Mapping[str, Any] | None = None  #: share of the excess that what is named leaves, and its channels
+    further: tuple[tuple[str, ...], ...] = ()  #: of an adequate model: what would take off noise, and is not missing
+    axes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: leading effect id -> the axes that show it
 
     @property
     def named(self) -> tuple[str, ...]:
         """The ids of all effects that the verdict names."""
-        return tuple(name for group in self.groups for name in group)
+        return tuple(dict.fromkeys(name for group in self.groups for name in group))
 
     @property
     def indistinguishable(self) -> tuple[str, ...]:
@@ -94,7 +101,7 @@ def judge(comparison: Comparison, *, first: bool = True) -> Step:
         return Step("unexplained", (), smooth, depends)
     share = share_removed(comparison, effect)
     group = alias_group(comparison, effect)
-    if len(group) == 1 and first and share < LEAST_SHARE:
+    if len(group) == 1 and first and 0.0 < share < LEAST_SHARE:
         return Step("ambiguous", group, effect, depends, share)
     return Step("missing" if len(group) == 1 else "ambiguous", group, effect, depends, share)
 
@@ -107,17 +114,55 @@ def _is_unexplained(comparison: Comparison, effect: Candidate, smooth: Candidate
 
 
 def alias_group(comparison: Comparison, leader: Candidate) -> tuple[str, ...]:
-    """Return the leader and the effects that the data cannot distinguish from it, best first."""
-    near = []
-    for rival in comparison.candidates:
-        if rival.smooth or rival.id == leader.id:
-            continue
-        close = rival.log_bf > leader.log_bf - LEAD
-        if close or (rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival)):
-            near.append(rival)
+    """Return the leader and the effects that the data cannot distinguish from it, best first.
+
+    At most `MOST`, and beyond them those whose columns are the same as the leader's.
+    """
+    near = _alike(comparison, leader, physical=True)
     exact = [r for r in near if abs(r.log_bf - leader.log_bf) < SAME]
-    others = [r for r in near if r not in exact][:MOST]
+    others = [r for r in near if r not in exact][: MOST - 1]
     return (leader.id, *(r.id for r in exact), *(r.id for r in others))
+
+
+def not_physical_group(comparison: Comparison, leader: Candidate) -> tuple[str, ...]:
+    """Return the effects that are alike in these data, but at a size that the unit's technology cannot have."""
+    return tuple(rival.id for rival in _alike(comparison, leader, physical=False))
+
+
+def _alike(comparison: Comparison, leader: Candidate, *, physical: bool) -> list[Candidate]:
+    return [
+        rival
+        for rival in comparison.candidates
+        if not rival.smooth
+        and rival.physical == physical
+        and rival.id != leader.id
+        and (
+            rival.log_bf > leader.log_bf - LEAD
+            or (rival.log_bf > 0 and _is_indistinguishable(comparison, leader, rival))
+        )
+    ]
+
+
+def axes_of(comparison: Comparison, candidate: Candidate) -> tuple[str, ...]:
+    """Return the axes on which there is evidence for a candidate; all of its axes where no single one has enough."""
+    shown = [axis for axis, i in candidate.option.items() if comparison.axes[axis].log_bf[i] >= LEAD]
+    return tuple(shown or candidate.option)
+
+
+def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
+    """Return the channels that this schedule cannot tell from one on which the residual depends.
+
+    A step in time is a temperature where temperatures only rose.
+    """
+    smooth = [c for c in comparison.candidates if c.smooth and c.log_bf >= ENOUGH]
+    first = next((c for c in smooth if c.id == channel), None)
+    if first is None:
+        return ()
+    return tuple(
+        c.id
+        for c in smooth
+        if c.id != channel and (c.log_bf > first.log_bf - FAR or overlap(comparison, first, c) > CONFOUNDED)
+    )
 
 
 def _is_indistinguishable(comparison: Comparison, leader: Candidate, rival: Candidate) -> bool:
@@ -150,14 +195,14 @@ def overlap(comparison: Comparison, leader: Candidate, rival: Candidate) -> floa
 
 
 def share_removed(comparison: Comparison, candidate: Candidate) -> float:
-    """Return the share of the excess chi2, over all axes, that a candidate removes, 0 to 1."""
+    """Return the share of the excess chi2, over all axes, that a candidate removes, 0 to 1; 0 without any excess."""
     removed, excess = 0.0, 0.0
     for axis, found in comparison.axes.items():
         freedom = found.rows - found.base_columns
         excess += max(found.best.chi2 - freedom, 0.0)
         if axis in candidate.option:
             removed += float(found.gain[candidate.option[axis]])
-    return removed / max(excess, removed, 1e-12)
+    return removed / max(excess, removed) if excess > 0 and removed > 0 else 0.0
 
 
 def channels_behind(comparison: Comparison) -> tuple[str, ...]:

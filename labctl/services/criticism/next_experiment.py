@@ -48,8 +48,9 @@ def experiments_for(store: Store, campaign: int | None, found: Criticism) -> lis
     leader, *others = found.verdict.indistinguishable
     signal = leading_signal(found.comparison, leader)
     rivals = [name for name in others[:PAIRS] if name in effects]
+    floor_dps = {axis: float(np.median(left.floor_dps)) for axis, left in found.residuals.items()}
     tried = (
-        _experiment(text, changes, recipe, bench, signal, rivals, found.comparison.model)
+        _experiment(text, changes, recipe, bench, signal, rivals, found.comparison.model, floor_dps)
         for text, changes in menu(recipe)
     )
     ranked = [experiment for experiment in tried if experiment is not None]
@@ -58,7 +59,7 @@ def experiments_for(store: Store, campaign: int | None, found: Criticism) -> lis
 
 def _experiment(
     text: str, changes: Mapping[str, Any], recipe: Recipe, bench: BenchFile, signal: LeadingSignal, rivals: list[str],
-    model: ErrorModel,
+    model: ErrorModel, floor_dps: Mapping[str, float],
 ) -> dict[str, Any] | None:  # fmt: skip
     """Return a changed recipe with what it separates; None where it cannot be run on the bench or separates nothing."""
     try:
@@ -67,7 +68,7 @@ def _experiment(
         schedule = planned_schedule(plan, bench, model)
     except (LabctlError, ProcedureError, ValueError):
         return None
-    chi2 = {rival: separation_chi2(schedule, signal, rival) for rival in rivals}
+    chi2 = {rival: separation_chi2(schedule, signal, rival, floor_dps) for rival in rivals}
     separated = [rival for rival, value in chi2.items() if value > SEPARATED_CHI2]
     if not separated:
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,16 @@ from labctl.fitting.criticism import (
     Criticism,
     Suspect,
     Verdict,
+    has_one_rising_leg,
     residual_maps,
     where_it_fails,
     worst_data_sets,
 )
 from labctl.fitting.effects import CATALOGUE, kind_of
 from labctl.services.schemas.criticism import CriticismResponse
+
+#: Channels that run on while temperatures rise.
+HISTORY = frozenset({"t_s", "power_s"})
 
 
 def answer_of(
@@ -30,7 +35,7 @@ def answer_of(
         version=version,
         recording=recording,
         verdict=verdict.form,
-        text=sentences(found),
+        text=sentences(found, experiments),
         error={
             "rms_dps": base.error.rms_dps if base else None,
             "heldout_rms_dps": base.error.heldout_rms_dps if base else None,
@@ -45,6 +50,11 @@ def answer_of(
         suspects=[_suspect(suspect, found) for suspect in found.suspects],
         named=list(verdict.named),
         depends_on=list(verdict.depends_on),
+        confounded_with=list(verdict.confounded),
+        remainder=dict(verdict.remainder) if verdict.remainder is not None else None,
+        not_physical=list(verdict.not_physical),
+        named_axes={name: list(axes) for name, axes in verdict.axes.items()},
+        further=[list(group) for group in verdict.further],
         not_testable=[dict(line) for line in found.not_testable],
         experiments=experiments,
         worst=worst_data_sets(found.data, found.residuals) if found.comparison else [],
@@ -120,13 +130,27 @@ def _shape(suspect: Suspect) -> dict[str, float]:
     return dict(term.parameters) if term else {}
 
 
-def sentences(found: Criticism) -> list[str]:
-    """Return the verdict in words, one sentence each, the answer first."""
+def sentences(found: Criticism, experiments: Sequence[Mapping[str, Any]] = ()) -> list[str]:
+    """Return the verdict in words, one sentence each, the answer first; what to do next is the first experiment."""
     verdict = found.verdict
     said = [_first(found)]
-    if verdict.form == "ambiguous":
-        wanted = dict.fromkeys(CATALOGUE[e].experiment for e in verdict.indistinguishable[:3] if e in CATALOGUE)
+    if verdict.remainder is not None and verdict.groups:
+        said.append(_remainder(verdict))
+    if verdict.form == "unexplained" and verdict.confounded:
+        said.append(f"This schedule cannot tell {verdict.depends_on[0]} from {_list(verdict.confounded)}: confounded.")
+    if _leg(found) and (verdict.groups or verdict.form == "unexplained"):
+        said.append("That is as far as one rising leg of temperatures can show.")
+    if verdict.form == "ambiguous" and verdict.indistinguishable:
+        wanted = [str(experiment["do"]) for experiment in experiments[:1]]
+        if not wanted:
+            wanted = list(
+                dict.fromkeys(CATALOGUE[e].experiment for e in verdict.indistinguishable[:3] if e in CATALOGUE)
+            )
         said += [f"To tell: {experiment}." for experiment in wanted]
+    if verdict.not_physical:
+        technology = found.data.info.technology or "this technology"
+        said.append(f"Alike in these data, but not physical for {technology}: {_list(verdict.not_physical)}.")
+    said += _further(found)
     factor = found.drift_over_datasheet
     if verdict.form == "adequate" and factor is not None and factor >= LARGE_DRIFT:
         said.append(f"The drift is larger than specified: {factor:.1f} times what the data sheet lets expect.")
@@ -135,12 +159,48 @@ def sentences(found: Criticism) -> list[str]:
     return said
 
 
+def _remainder(verdict: Verdict) -> str:
+    left = verdict.remainder
+    assert left is not None
+    share, channels = float(left["share"]), left["depends_on"]
+    explained = f"{100 * (1 - share):.1f}".rstrip("0").rstrip(".")
+    follows = f", and follows {channels[0]}" if channels else ""
+    return (
+        f"{' and '.join(group[0] for group in verdict.groups)} {'explains' if len(verdict.groups) == 1 else 'explain'} "
+        f"{explained} % of the excess; what remains is {float(left['over_floor']):.1f} times the floor{follows}."
+    )
+
+
+def _further(found: Criticism) -> list[str]:
+    """Return what else could be tried beside an adequate model, and what it would be worth."""
+    names = {name for group in found.verdict.further for name in group}
+    fits = [suspect.after for suspect in found.suspects if suspect.candidate.id in names]
+    after = [fit.error.rms_dps for fit in fits if fit is not None and fit.error.rms_dps is not None]
+    if not names or found.base is None:
+        return []
+    worth = f": at best the error falls from {found.base.error.rms_dps:.4g} to {min(after):.4g} deg/s" if after else ""
+    return [f"Further suspects, within the noise{worth}: {_list(sorted(names))}."]
+
+
+def _leg(found: Criticism) -> bool:
+    """Return whether temperatures only rose, and the verdict hangs on what that cannot tell from time."""
+    kinds = [CATALOGUE[name] for name in found.verdict.named if name in CATALOGUE]
+    of_time = any(HISTORY & set(kind.needs) for kind in kinds) or bool(HISTORY & set(found.verdict.depends_on[:1]))
+    if not of_time and "temperature_c" not in found.verdict.depends_on[:1]:
+        return False
+    return has_one_rising_leg(found.data)
+
+
+def _list(names: Sequence[str]) -> str:
+    return ", ".join(names)
+
+
 def _first(found: Criticism) -> str:
     verdict = found.verdict
-    words = [" or ".join(map(_word, group)) for group in verdict.groups]
+    words = [" or ".join(map(_word, group)) + _on_axes(group, found) for group in verdict.groups]
     match verdict.form:
         case "adequate":
-            return "Nothing is missing: what is left is noise."
+            return "Adequate: nothing is missing, what is left is noise."
         case "missing":
             return f"Missing: {' and '.join(words)}."
         case "ambiguous":
@@ -150,6 +210,13 @@ def _first(found: Criticism) -> str:
             return f"Something that no effect of the catalogue describes hangs on {channel}."
         case _:
             return f"Too little data for a verdict: {verdict.reason}."
+
+
+def _on_axes(group: tuple[str, ...], found: Criticism) -> str:
+    """Return on which axes an effect was found, where it is not on all."""
+    axes = found.verdict.axes.get(group[0], ())
+    all_axes = found.data.info.axes
+    return f" on {_list(axes)}" if axes and len(axes) < len(all_axes) else ""
 
 
 def _ambiguous(verdict: Verdict, words: list[str]) -> str:

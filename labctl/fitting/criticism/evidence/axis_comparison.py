@@ -73,9 +73,11 @@ def _floor_squared(design: Design, y: NDArray[np.float64]) -> float:
 def _base_residual(design: Design, y: NDArray[np.float64], white: Array) -> NDArray[np.float64]:
     """Return what the base leaves of y (R, m) when its means are fitted with equal drift: good enough for scatter."""
     weight = 1.0 / np.sqrt(white)
-    columns = design.base[0] * weight[:, None]
+    prior = np.diag(np.sqrt(design.precision))[design.precision > 0]
+    columns = np.vstack([design.base[0] * weight[:, None], prior])
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    solution, *_ = np.linalg.lstsq(columns / size, y[0] * weight, rcond=1e-9)
+    wanted = np.concatenate([y[0] * weight, np.zeros(len(prior))])
+    solution, *_ = np.linalg.lstsq(columns / size, wanted, rcond=1e-9)
     return np.asarray(y - design.base @ (solution / size))
 
 

@@ -13,9 +13,16 @@ from scipy.special import logsumexp
 
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
 from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
+from labctl.fitting.criticism.evidence.gains import visible_share
 from labctl.fitting.criticism.evidence.noise_grid import Noise
-from labctl.fitting.criticism.option import slices_of
+from labctl.fitting.criticism.option import Option, slices_of
+from labctl.fitting.effects import kind_of
 from labctl.fitting.numeric.arrays import Array
+
+#: What follows another channel than the base's own (rate and temperature) does not compete where the base leaves less
+#: than this share of it: no shape is known so exactly that the rest of it would tell.
+LEAST_COMPETING = 0.1
+OF_BASE = frozenset({"temperature_c", "table_rate_dps"})
 
 
 @dataclass(frozen=True)
@@ -30,7 +37,8 @@ class AxisEvidence:
     weights: Array  #: (noises,) posterior probability of each noise
     noises: list[Noise]
     rows: int  #: number of coordinates
-    base_columns: int
+    base_columns: int  #: without a prior
+    log_p: float  #: restricted log likelihood of the base, averaged over the noise, its priors normalised
 
 
 def evidence(
@@ -50,8 +58,22 @@ def evidence(
     log_bf = 0.5 * gain * g / (1 + g) - 0.5 * k * np.log1p(g)
     total = logsumexp(log_p[:, None] + log_bf, axis=0) - logsumexp(log_p)
     best = int(np.argmax(log_p))
+    left = WhitenedBase(design, white_var, noises[best]).eliminate_from(everything[0], others)
+    competes = [
+        _is_of_base(option) or visible_share(left, where) >= LEAST_COMPETING
+        for option, where in zip(design.options, slices, strict=True)
+    ]
     return AxisEvidence(
-        np.where(k[best] > 0, total, -np.inf),
-        WhitenedBase(design, white_var, noises[best]).eliminate_from(everything[0], others),
-        gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows, design.base.shape[2],
+        np.where((k[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
+        left,
+        gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows,
+        int((design.precision == 0).sum()),
+        float(logsumexp(log_p) + 0.5 * np.log(design.precision[design.precision > 0]).sum()),
     )  # fmt: skip
+
+
+def _is_of_base(option: Option) -> bool:
+    """Return whether an option is a law of rate and temperature alone."""
+    if option.term is None:
+        return option.candidate in OF_BASE
+    return not kind_of(option.term).needs

@@ -25,6 +25,14 @@ class Design:
 
 
 @dataclass(frozen=True)
+class Discrepancy:
+    """What the shape of an effect may be wrong by on one axis, as columns of a base."""
+
+    rows: NDArray[np.float64]  #: (R, m, k)
+    precision: Array  #: (k,) prior precision of each coefficient
+
+
+@dataclass(frozen=True)
 class EliminatedBase:
     """Inner products of all K option columns and the data at one noise, with what the base explains removed."""
 

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.channel_functions import smooth_channels
+from labctl.fitting.criticism.evidence.design import Discrepancy
 from labctl.fitting.criticism.evidence.gains import solve_option
-from labctl.fitting.criticism.model_comparison import Comparison, compare_beside
+from labctl.fitting.criticism.model_comparison import Comparison, compare_beside, on_axis
 from labctl.fitting.criticism.ranking import Candidate
-from labctl.fitting.criticism.refinement import refined_term, with_refined_leaders
+from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
+from labctl.fitting.criticism.search.held_out import held_out_rises
+from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
+from labctl.fitting.criticism.search.remainder import is_better_than_smooth, is_within_noise, remainder_of
 from labctl.fitting.criticism.verdict import (
     ALIKE,
     ENOUGH,
@@ -20,11 +25,15 @@ from labctl.fitting.criticism.verdict import (
     Form,
     Step,
     Verdict,
+    alias_group,
+    axes_of,
     channels_behind,
+    confounded_with,
     judge,
+    not_physical_group,
     overlap,
 )
-from labctl.fitting.effects import Effect, Term
+from labctl.fitting.effects import CATALOGUE, Effect, Term
 
 #: How many effects may be found missing one after the other.
 STEPS = 4
@@ -39,6 +48,12 @@ NEXT_SHARE = 0.04
 NEXT_SHARE_AMBIGUOUS = 0.08
 #: Least share of an effect that is assumed within data sets, and between them.
 LEAST_PART = 0.05
+#: Where what is named leaves more than this share of the excess, it is not the cause.
+MOST_LEFT = 0.5
+
+
+#: An effect whose shape may be wrong by a few per cent explains at least this share of what a smooth function does.
+MOSTLY = 0.8
 
 
 @dataclass(frozen=True)
@@ -48,26 +63,99 @@ class Finding:
     group: tuple[str, ...]  #: ids, the leader first
     term: Term
     log_bf: float
+    discrepancy: Mapping[str, Discrepancy] = field(default_factory=dict)  #: by axis
+    axes: tuple[str, ...] = ()  #: that show it
 
 
 def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:
-    """Return the verdict, the first comparison with its leaders' shapes refined, and the last step's comparison."""
+    """Return the verdict, the first comparison with its leaders' shapes refined, and the last step's comparison.
+
+    Where nothing is found over all axes together, each axis is searched by itself: they may have different causes.
+    """
+    verdict, initial, final = _searched(first, catalogue)
+    if verdict.form in {"missing", "ambiguous"} and is_within_noise(first):
+        return Verdict("adequate", further=verdict.groups), initial, initial
+    if verdict.form == "unexplained" and len(first.axes) > 1:
+        apart = {axis: _searched(on_axis(first, axis), catalogue)[0] for axis in first.axes}
+        return _merged(apart, verdict), initial, final
+    return verdict, initial, final
+
+
+def _merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
+    """Return the verdict of the axes, each with causes of its own; the joint one where an axis stays unexplained."""
+    if any(verdict.form == "unexplained" for verdict in apart.values()):
+        return joint
+    axes: dict[tuple[str, ...], tuple[str, ...]] = {}
+    for axis, verdict in apart.items():
+        for group in verdict.groups:
+            same = next((known for known in axes if known[0] == group[0]), group)
+            axes[same] = (*axes.get(same, ()), axis)
+    if not axes:
+        return joint
+    terms = {name: term for verdict in apart.values() for name, term in verdict.terms.items()}
+    remainders = [verdict.remainder for verdict in apart.values() if verdict.remainder is not None]
+    return Verdict(
+        "missing" if all(len(group) == 1 for group in axes) else "ambiguous", tuple(axes), joint.depends_on,
+        terms={group[0]: terms[group[0]] for group in axes if group[0] in terms},
+        remainder=max(remainders, key=lambda each: float(each["share"]), default=None),
+        axes={group[0]: where for group, where in axes.items()},
+    )  # fmt: skip
+
+
+def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:
     depends = channels_behind(first)
     initial, step = _judged(first, catalogue)
     if step.form == "unexplained":
-        findings = _pair(first, initial, catalogue)
-        form, final = _form(findings) if findings else step.form, initial
-        depends = depends or step.depends_on
+        step = _explained_but_for_shape(first, initial, step)
+    if step.form == "unexplained":
+        findings, final = _pair(first, initial, catalogue), initial
+        form: Form = _form(findings) if findings else step.form
     else:
         findings, final = _one_by_one(first, initial, step, catalogue)
         form = _form(findings) if len(findings) > 1 else step.form
+    if not findings and form in {"missing", "ambiguous"}:  # what would be named predicts worse than nothing
+        form = "unexplained"
+    depends = depends or step.depends_on or _driver_of(initial, step)
+    remainder = remainder_of(first, final, tuple(f.term for f in findings), catalogue) if findings else None
+    if remainder is not None and remainder["share"] > MOST_LEFT:
+        channels = tuple(remainder["depends_on"])
+        return Verdict("unexplained", (), channels, confounded=_confounded(initial, channels)), initial, initial
     terms = {finding.term.effect: finding.term for finding in findings}
     kept = depends if findings or form == "unexplained" else ()
-    return Verdict(form, tuple(finding.group for finding in findings), kept, terms=terms), initial, final
+    groups = tuple(finding.group for finding in findings)
+    alike = not_physical_group(initial, step.leader) if step.leader is not None and findings else ()
+    confounded = _confounded(initial, kept) if form == "unexplained" else ()
+    verdict = Verdict(
+        form, groups, kept, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder,
+        axes={finding.group[0]: finding.axes for finding in findings},
+    )  # fmt: skip
+    return verdict, initial, final
+
+
+def _confounded(comparison: Comparison, channels: tuple[str, ...]) -> tuple[str, ...]:
+    return confounded_with(comparison, channels[0]) if channels else ()
 
 
 def _form(findings: Sequence[Finding]) -> Form:
     return "missing" if all(len(finding.group) == 1 for finding in findings) else "ambiguous"
+
+
+def _driver_of(comparison: Comparison, step: Step) -> tuple[str, ...]:
+    """Return the channel that drives the leader of a step."""
+    kind = CATALOGUE.get(step.leader.id) if step.leader is not None else None
+    channels = frozenset(smooth_channels(comparison.data, comparison.data.info.axes[0]))
+    return tuple(drivers(kind, channels)[-1:])
+
+
+def _explained_but_for_shape(first: Comparison, initial: Comparison, step: Step) -> Step:
+    """Return a judgement that names the leading effect where it, a few per cent wrong in shape, beats all else."""
+    effect, smooth = initial.leader(smooth=False), initial.leader(smooth=True)
+    if effect is None or smooth is None or effect.log_bf < ENOUGH or overlap(initial, smooth, effect) < MOSTLY:
+        return step
+    if not is_better_than_smooth(first, initial, effect, smooth, discrepancies(initial, effect)):
+        return step
+    group = alias_group(initial, effect)
+    return Step("missing" if len(group) == 1 else "ambiguous", group, effect, step.depends_on)
 
 
 def _one_by_one(
@@ -75,7 +163,7 @@ def _one_by_one(
 ) -> tuple[list[Finding], Comparison]:
     """Return the findings one after the other, each sought beside those before, and the comparison beside all."""
     findings: list[Finding] = []
-    while (finding := _finding(comparison, step)) is not None and len(findings) < STEPS:
+    while (finding := _finding(comparison, step, catalogue)) is not None and len(findings) < STEPS:
         findings.append(finding)
         before = (comparison, step)
         comparison, step = _compared_beside(first, findings, catalogue)
@@ -85,12 +173,27 @@ def _one_by_one(
     return findings, comparison
 
 
-def _finding(comparison: Comparison, step: Step) -> Finding | None:
-    """Return what one step found missing; None where that is no effect of the catalogue."""
-    leader = step.leader
-    if step.form not in {"missing", "ambiguous"} or leader is None or leader.term is None:
+def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]) -> Finding | None:
+    """Return what one step found missing; None where that is no effect of the catalogue, or none predicts.
+
+    An effect with which left-out data sets are predicted worse is not named: then another of its group is.
+    """
+    if step.form not in {"missing", "ambiguous"} or step.leader is None:
         return None
-    return Finding(step.group, refined_term(comparison, leader), leader.log_bf)
+    known = {c.id: c for c in comparison.candidates if not c.smooth}
+    left: list[str] = []
+    for name in step.group:
+        if left:
+            left.append(name)
+            continue
+        term = refined_term(comparison, known[name])
+        if not held_out_rises(comparison, (term,), catalogue):
+            left, chosen = [name], known[name]
+            found = term
+    if not left:
+        return None
+    axes = axes_of(comparison, chosen)
+    return Finding(tuple(left), found, chosen.log_bf, discrepancies(comparison, chosen), axes)
 
 
 def _compared_beside(
@@ -98,12 +201,14 @@ def _compared_beside(
 ) -> tuple[Comparison, Step]:
     """Return the comparison beside effects that were found, and its judgement."""
     terms = (*first.model.terms, *(replace(finding.term, steady=True) for finding in findings))
-    return _judged(compare_beside(first, first.model.with_terms(terms), catalogue), catalogue, first=False)
+    discrepancy = together([finding.discrepancy for finding in findings])
+    beside = compare_beside(first, first.model.with_terms(terms), catalogue, discrepancy)
+    return _judged(beside, catalogue, first=False)
 
 
 def _finding_beside(first: Comparison, findings: Sequence[Finding], catalogue: Mapping[str, Effect]) -> Finding | None:
     """Return what is found missing beside other findings; None where that is no effect of the catalogue."""
-    return _finding(*_compared_beside(first, findings, catalogue))
+    return _finding(*_compared_beside(first, findings, catalogue), catalogue)
 
 
 def _refined_findings(first: Comparison, findings: Sequence[Finding], catalogue: Mapping[str, Effect]) -> list[Finding]:
@@ -167,7 +272,7 @@ def _judged(comparison: Comparison, catalogue: Mapping[str, Effect], *, first: b
 
 def _has_rival(comparison: Comparison) -> bool:
     """Return whether the evidence for another effect is so near the leader's that its shape may decide."""
-    effects = [c for c in comparison.candidates if not c.smooth][:2]
+    effects = [c for c in comparison.candidates if not c.smooth and c.physical][:2]
     return len(effects) == 2 and effects[1].log_bf > max(NOTICED, effects[0].log_bf - FAR)
 
 
@@ -178,7 +283,7 @@ def _pair(first: Comparison, initial: Comparison, catalogue: Mapping[str, Effect
     """
     smooth = initial.leader(smooth=True)
     pairs = []
-    for leader in [c for c in initial.candidates if not c.smooth and c.log_bf >= ENOUGH][:LEADERS]:
+    for leader in [c for c in initial.candidates if not c.smooth and c.physical and c.log_bf >= ENOUGH][:LEADERS]:
         if leader.term is None:
             continue
         one = Finding((leader.id,), refined_term(initial, leader), leader.log_bf)

@@ -28,7 +28,7 @@ LEADERS = 5
 
 def with_refined_leaders(comparison: Comparison, catalogue: Mapping[str, Effect], least: float) -> Comparison:
     """Return the comparison with the leaders (log evidence at least `least`) also in their refined shapes."""
-    leaders = [c for c in comparison.candidates if not c.smooth and c.log_bf >= least][:LEADERS]
+    leaders = [c for c in comparison.candidates if not c.smooth and c.physical and c.log_bf >= least][:LEADERS]
     shapes = {c.id: refined_term(comparison, c) for c in leaders if c.term is not None}
     new = {c.id: shapes[c.id] for c in leaders if c.id in shapes and shapes[c.id] != c.term}
     if not new:

@@ -1,0 +1,45 @@
+"""Plausibility of a fitted size: the prior that a technology's spans put on the coefficients of an effect."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
+from labctl.fitting.criticism.evidence.gains import solve_option
+from labctl.fitting.criticism.option import Option
+from labctl.fitting.effects import CATALOGUE
+from labctl.fitting.numeric.arrays import Array
+
+#: A coefficient counts as what it is larger than with this many standard uncertainties to spare.
+SPARE_U = 2.0
+#: A first coefficient this many times its technology's span is not physical.
+FARTHEST = 1e4
+#: Largest physical coefficient by its unit, whatever the technology: an error of many times the rate itself is none.
+LARGEST = {"1": 3.0}
+#: Evidence on an axis, nats, from which on the size there counts.
+SUPPORTED = 2.0
+
+
+def log_size_prior(option: Option, found: AxisEvidence, index: int, technology: str) -> float:
+    """Return the log prior, nats <= 0, of the size that an option is fitted with; -inf where it is not physical.
+
+    The prior is flat inside the span of plausible sizes of `technology` and falls as its inverse beyond. A size that
+    is not significant is plausible.
+    """
+    if option.term is None or option.term.effect not in CATALOGUE or found.log_bf[index] < SUPPORTED:
+        return 0.0
+    values, covariance = solve_option(found.best, found.slices[index])
+    least = np.maximum(np.abs(values) - SPARE_U * np.sqrt(np.maximum(np.diag(covariance), 0.0)), 0.0)
+    if _is_beyond_all(option, least):
+        return -np.inf
+    span = CATALOGUE[option.term.effect].ranges.get(technology)
+    if span is None or not least[0] > 0:
+        return 0.0
+    largest = max(abs(span[0]), abs(span[1]))
+    if least[0] > FARTHEST * largest:
+        return -np.inf
+    return -float(np.log(max(least[0] / largest, 1.0)))
+
+
+def _is_beyond_all(option: Option, least: Array) -> bool:
+    return any(size > LARGEST.get(unit, np.inf) for size, unit in zip(least, option.units, strict=True))

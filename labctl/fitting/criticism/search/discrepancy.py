@@ -1,0 +1,109 @@
+"""Discrepancy of a named effect: what its shape may be wrong by, as columns of the base with a prior on their size.
+
+No shape is exact. Beside an effect that was found, the base also holds its signal times smooth functions of what drives
+it, smooth functions of these drivers, and what its parameters move, each with a Gaussian prior of a few per cent of the
+signal (model discrepancy: Kennedy and O'Hagan 2001, doi:10.1111/1467-9868.00294). So what is asked next is weighed
+against the remainder of what was named before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.criticism.candidates import option_of
+from labctl.fitting.criticism.channel_functions import hats, smooth_channels
+from labctl.fitting.criticism.evidence.design import Discrepancy
+from labctl.fitting.criticism.evidence.gains import solve_option
+from labctl.fitting.criticism.model_comparison import Comparison
+from labctl.fitting.criticism.ranking import Candidate
+from labctl.fitting.criticism.search.refinement import CHOICES
+from labctl.fitting.effects import CATALOGUE, Effect, Term
+from labctl.fitting.numeric.arrays import Array
+
+#: Standard deviation of the discrepancy over the signal: where it is multiplied, and over its peak where it is added.
+SHAPE_ERROR = 0.05
+#: Standard deviation of a parameter of the shape, in its logarithm, and the step by which its column is computed.
+PARAMETER_ERROR, STEP = 0.2, 0.05
+#: Knots of a smooth function of a driver; of the rate, which is given exactly, about one at each rate.
+KNOTS, KNOTS_OF_RATE = 9, 21
+#: Drivers of every effect.
+DRIVERS = ("table_rate_dps", "temperature_c")
+
+
+def discrepancies(comparison: Comparison, candidate: Candidate) -> dict[str, Discrepancy]:
+    """Return axis -> the discrepancy of a candidate as it is fitted in a comparison."""
+    found = {}
+    for axis, index in candidate.option.items():
+        option = comparison.designs[axis].options[index]
+        values, _ = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
+        signal = option.rows @ values
+        if np.any(signal):
+            found[axis] = _of_signal(comparison, axis, option.term, signal, values)
+    return found
+
+
+def _of_signal(
+    comparison: Comparison, axis: str, term: Term | None, signal: NDArray[np.float64], values: Array
+) -> Discrepancy:
+    data = comparison.data
+    kind = CATALOGUE.get(term.effect) if term is not None else None
+    size_dps = float(np.max(np.abs(_beside_base(comparison, axis, signal[0]))))
+    rows = []
+    for name in drivers(kind, frozenset(smooth_channels(data, axis))):
+        functions = hats(smooth_channels(data, axis)[name], KNOTS_OF_RATE if name == "table_rate_dps" else KNOTS)
+        if functions is None:
+            continue
+        at_sets = np.column_stack([data.at_sets(column) for column in functions.T])
+        rows += [SHAPE_ERROR * signal[:, :, None] * at_sets, SHAPE_ERROR * size_dps * data.rows_of(functions)]
+    if kind is not None and term is not None:
+        rows += _moved(comparison, axis, kind, term, values)
+    whole = np.concatenate(rows, axis=2) if rows else np.zeros((*signal.shape, 0))
+    return Discrepancy(whole, np.ones(whole.shape[2]))
+
+
+def drivers(kind: Effect | None, channels: frozenset[str]) -> list[str]:
+    """Return the channels on which an effect's shape may depend otherwise than its law says."""
+    needs, draws = (kind.needs, kind.draws) if kind is not None else ((), ())
+    wanted = dict.fromkeys((*DRIVERS, *needs, *draws))
+    return [name for name in wanted if name in channels]
+
+
+def _beside_base(comparison: Comparison, axis: str, means: Array) -> Array:
+    """Return what the base leaves of a signal's means (m,)."""
+    base = comparison.designs[axis].base[0]
+    size = np.maximum(np.linalg.norm(base, axis=0), 1e-300)
+    taken, *_ = np.linalg.lstsq(base / size, means, rcond=1e-9)
+    return np.asarray(means - base / size @ taken)
+
+
+def _moved(comparison: Comparison, axis: str, kind: Effect, term: Term, values: Array) -> list[NDArray[np.float64]]:
+    """Return what each parameter of the shape moves, one column each."""
+    found = []
+    for name, at in term.parameters.items():
+        if name in CHOICES or not at > 0:
+            continue
+        ends = []
+        for factor in (np.exp(STEP), np.exp(-STEP)):
+            moved = replace(term, parameters={**term.parameters, name: at * factor})
+            option = option_of(comparison.data, axis, comparison.model.reference, kind, moved)
+            if option is not None and option.rows.shape[2] == len(values):
+                ends.append(option.rows @ values)
+        if len(ends) == 2:
+            found.append((PARAMETER_ERROR / (2 * STEP) * (ends[0] - ends[1]))[:, :, None])
+    return found
+
+
+def together(parts: Sequence[Mapping[str, Discrepancy]]) -> dict[str, Discrepancy]:
+    """Return the discrepancies of several findings side by side, by axis."""
+    axes = dict.fromkeys(axis for part in parts for axis in part)
+    return {
+        axis: Discrepancy(
+            np.concatenate([part[axis].rows for part in parts if axis in part], axis=2),
+            np.concatenate([part[axis].precision for part in parts if axis in part]),
+        )
+        for axis in axes
+    }

@@ -1,0 +1,151 @@
+"""Cells of verdicts: recipe x starting model x what is hidden x size, and the shares of each kind of answer.
+
+`python -m studies.verdict_cells [PART ...]` prints one line for each cell whose name has all these parts;
+`LABCTL_STUDY_CAMPAIGNS` is how many campaigns a cell has.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache, partial
+
+from labctl.errors import LabctlError
+from labctl.fitting.criticism import Verdict, criticise
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.models.presets import preset_for
+from labctl.recording import Recording
+from labctl.services.simulation.recordings import SimulateRequest, make_recording
+from studies.campaigns import MODELS, OUTSIDE, PROTOCOLS, campaign
+from studies.effect_sizes import sizes
+from studies.outside_catalogue import KINDS
+from studies.report_tables import wilson
+
+PER_CELL = int(os.environ.get("LABCTL_STUDY_CAMPAIGNS", "20"))
+#: Sizes of hidden effects, in noise units; beyond 100 in proportion.
+Z_LEVELS = (5, 10, 30, 100, 300, 1000, 3000)
+#: Recipes and starting models with nothing hidden, beside those of the protocols.
+PLAIN = (
+    ("gyrostar", "weiss1995"), ("gyrostar", "ojeda2000"), ("gyrostar", "bias_scale"), ("ojeda2000", "ojeda2000"),
+    ("ojeda2000", "bias_scale"), ("short", "bias_scale"), ("quick-triaxial", "yang2018"), ("informative", "yang2018"),
+    ("informative", "bias_scale"),
+)  # fmt: skip
+#: Recipe, starting model, and the largest error in deg/s that what the catalogue does not have makes there.
+FOREIGN = (
+    ("ojeda2000", "ojeda2000", 0.03),
+    ("ojeda2000", "ojeda2000", 1.0),
+    ("gyrostar", "weiss1995", 0.5),
+    ("informative", "yang2018", 0.03),
+)
+READINGS_HZ = 4.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """One campaign, the model that it starts from, and what a right answer says."""
+
+    recording: Callable[[], Recording]
+    model: str
+    effects: tuple[str, ...] = ()  #: hidden, each of the catalogue
+    channels: tuple[str, ...] = ()  #: of what is hidden that no effect of the catalogue describes
+
+
+@lru_cache(maxsize=64)
+def plain(recipe: str, seed: int) -> Recording:
+    """Return a recording of a recipe with nothing hidden."""
+    return make_recording(SimulateRequest(recipe=recipe, seed=seed, sample_rate_hz=READINGS_HZ)).recording
+
+
+def cells() -> Iterator[tuple[str, list[Case]]]:
+    """Yield the name and the campaigns of every cell."""
+    seeds = range(PER_CELL)
+    for recipe, model in PLAIN:
+        yield f"nothing/{recipe}/{model}", [Case(partial(plain, recipe, seed), model) for seed in seeds]
+    for name in PROTOCOLS:
+        yield f"nothing/{name}", [_of_protocol(name, 10_000 + seed, {}) for seed in seeds]
+        for z in Z_LEVELS:
+            yield f"effect/{name}/z{z}/", list(_hidden(name, z))
+    for recipe, model, size_dps in FOREIGN:
+        for kind in KINDS:
+            made = [Case(partial(_added, recipe, kind, size_dps, s), model, (), KINDS[kind].channels) for s in seeds]
+            yield f"outside/{recipe}/{model}/{size_dps:g}/{kind}", made
+
+
+def _of_protocol(name: str, seed: int, hidden: dict[str, float]) -> Case:
+    return Case(partial(campaign, name, seed, hidden), MODELS[name], tuple(hidden))
+
+
+def _hidden(name: str, z: int) -> Iterator[Case]:
+    """Yield campaigns with one effect hidden, drawn evenly from those that the protocol can show."""
+    sized = sizes(name)
+    inside = sorted(effect for effect in set(sized) - set(OUTSIDE) if "100" in sized[effect])
+    for k in range(PER_CELL):
+        effect = inside[k % len(inside)]
+        yield _of_protocol(name, 20_000 + k, {effect: sized[effect].get(f"{z}", sized[effect]["100"] * z / 100)})
+
+
+def _added(recipe: str, kind: str, size_dps: float, seed: int) -> Recording:
+    return KINDS[kind].added(plain(recipe, seed), seed, size_dps)
+
+
+def verdict_of(case: Case) -> Verdict:
+    """Return what is said about a campaign; insufficient data where the model cannot even be fitted."""
+    recording = case.recording()
+    try:
+        model, _ = preset_for(case.model, []).build(fit_data_of(recording))
+        return criticise(recording, model, full=False).verdict
+    except LabctlError as error:
+        return Verdict("insufficient_data", reason=str(error))
+
+
+def score(case: Case, verdict: Verdict) -> str:
+    """Return what kind of answer it is: right, honest (no name), missed, or which kind of wrong."""
+    named = set(verdict.named)
+    if not case.effects and named:
+        return "wrong alone" if any(len(group) == 1 for group in verdict.groups) else "wrong"
+    if not case.effects and case.channels:
+        if verdict.form != "unexplained":
+            return "missed"
+        said = {*verdict.depends_on[:1], *verdict.confounded}
+        return "right" if said & set(case.channels) else "other channel"
+    if not named:
+        honest = "honest" if verdict.form == "unexplained" else "missed"
+        return "right" if not case.effects and verdict.form == "adequate" else honest
+    if not set(case.effects) & named:
+        return "wrong alone" if any(len(group) == 1 for group in verdict.groups) else "wrong"
+    return "extra" if any(not set(group) & set(case.effects) for group in verdict.groups) else "right"
+
+
+def line(name: str, cases: list[Case], *, said: bool) -> str:
+    """Return one cell's counts, its share of right answers with the 95 % interval, and the seconds of one answer."""
+    counts: Counter[str] = Counter()
+    begun = time.process_time()
+    for case in cases:
+        verdict = verdict_of(case)
+        kind = score(case, verdict)
+        counts[kind] += 1
+        if said and kind != "right":
+            also = (verdict.depends_on[:2], verdict.confounded, dict(verdict.remainder or {}))
+            print(f"   {kind}: {case.effects} {verdict.form} {verdict.groups} {also}", flush=True)
+    low, high = wilson(counts["right"], len(cases))
+    seconds = (time.process_time() - begun) / len(cases)
+    share = f"{100 * counts['right'] / len(cases):.0f} ({100 * low:.0f} to {100 * high:.0f})"
+    return f"{name:45} {share:18} {dict(counts)} {seconds:.1f} s"
+
+
+def run(parts: list[str] | None = None, *, said: bool = False) -> str:
+    """Print each cell as it is done, and return all lines."""
+    lines = []
+    for name, cases in cells():
+        if all(part in name for part in parts or []):
+            lines.append(line(name, cases, said=said))
+            print(lines[-1], flush=True)
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    run([part for part in sys.argv[1:] if part != "--said"], said="--said" in sys.argv)

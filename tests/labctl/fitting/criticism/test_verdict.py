@@ -1,0 +1,131 @@
+"""What a verdict may not say: a second name for a remainder, an unphysical one, one that predicts worse, one too sure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labctl.fitting.criticism import Criticism, Verdict
+from labctl.fitting.criticism.model_comparison import compare_models
+from labctl.fitting.criticism.reduction import reduce_recording
+from labctl.fitting.criticism.search.held_out import held_out_rises
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.effects import CATALOGUE, Term
+from labctl.fitting.models.presets import changed, preset_for
+from labctl.recording import Recording, read_recording
+from labctl.services.criticism.report_text import sentences
+from labctl.services.simulation.recordings import SimulateRequest, make_recording
+from studies.outside_catalogue import KINDS
+from tests.helpers.criticism import held
+from tests.helpers.simulated_recordings import single_axis, three_axes
+
+EXAMPLES = Path(__file__).parents[4] / "examples"
+
+
+def made(recipe: str, seed: int = 1, *hide: str) -> Recording:
+    return make_recording(SimulateRequest(recipe=recipe, seed=seed, hide=list(hide), sample_rate_hz=4.0)).recording
+
+
+@pytest.mark.parametrize("model", ["ojeda2000", "bias_scale"])
+def test_a_law_of_temperature_that_is_none_of_the_catalogues_is_not_given_a_name(model: str) -> None:
+    """A Gyrostar's bias is a tanh of temperature; one rising leg makes self-heating and hysteresis look like that."""
+    found = held(made("gyrostar"), model)
+    assert (found.verdict.form, found.verdict.named, found.verdict.depends_on[0]) == (
+        "unexplained", (), "temperature_c",
+    )  # fmt: skip
+    assert "as far as one rising leg of temperatures can show" in " ".join(sentences(found))
+
+
+@pytest.mark.parametrize("seed", [2, 3, 9])
+def test_what_a_base_leaves_a_hundredth_of_is_not_named(seed: int) -> None:
+    assert held(made("gyrostar", seed), "weiss1995").verdict.named == ()
+
+
+@pytest.mark.parametrize("effect", ["saturation", "vibration_rectification"])
+def test_the_remainder_of_a_large_effect_gets_no_second_name(effect: str) -> None:
+    found = held(made("ojeda2000", 1, effect))
+    assert found.verdict.groups == ((effect,),)
+
+
+def test_what_remains_is_said_with_its_channel() -> None:
+    found = held(made("ojeda2000", 1, "saturation"))
+    left = found.verdict.remainder
+    assert left is not None
+    assert 0 < left["share"] < 0.02
+    assert left["depends_on"][0] == "table_rate_dps"
+    assert any(line.startswith("saturation explains 99") for line in sentences(found))
+
+
+@pytest.mark.parametrize(
+    ("kind", "channel"), [("supply_scale", "supply_v"), ("humidity_scale", "humidity_pct"), ("time_step_scale", "t_s")]
+)
+def test_what_another_channel_does_to_the_scale_factor_depends_on_that_channel(kind: str, channel: str) -> None:
+    verdict = held(KINDS[kind].added(made("ojeda2000"), 1, 0.05)).verdict
+    assert (verdict.form, verdict.named) == ("unexplained", ())
+    assert channel in {verdict.depends_on[0], *verdict.confounded}
+
+
+def test_an_effect_that_a_technology_cannot_have_is_not_named() -> None:
+    """The sine of an open-loop interferometer is alike a cubic, and no MEMS gyro has one."""
+    found = held(three_axes(1, scale_factor_odd=3e-9), "yang2018")
+    assert found.comparison is not None
+    sine = next(c for c in found.comparison.candidates if c.id == "sine_response")
+    assert not sine.physical
+    assert "sine_response" not in found.verdict.named
+    assert "scale_factor_odd" in found.verdict.named
+
+
+def test_a_fibre_gyro_may_have_it() -> None:
+    assert "sine_response" in held(single_axis(5, sine_response=0.25)).verdict.named
+
+
+def test_a_model_that_leaves_less_than_the_noise_is_adequate_whatever_is_like_the_rest() -> None:
+    found = held(read_recording(EXAMPLES / "osu-fog"), full=True)
+    assert (found.verdict.form, found.verdict.named) == ("adequate", ())
+    assert found.verdict.further
+    assert any(line.startswith("Further suspects, within the noise: at best") for line in sentences(found))
+    assert all(suspect.share_removed < 1 for suspect in found.suspects)
+
+
+def test_axes_may_have_different_causes() -> None:
+    recording = made("quick-triaxial")
+    columns = dict(recording.columns)
+    rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
+    about = {axis: np.where(columns["position"] == axis, rate, 0.0) for axis in "xyz"}
+    columns["gyro_x"] = columns["gyro_x"] + 1e-8 * about["x"] ** 3
+    columns["gyro_y"] = columns["gyro_y"] + 2e-6 * about["y"] ** 2
+    columns["gyro_z"] = columns["gyro_z"] + 0.3 * (np.asarray(columns["supply_v"]) - 5.0)
+    found = held(replace(recording, columns=columns), "yang2018")
+    axes = {name: where for group in found.verdict.groups for name in group for where in [
+        found.verdict.axes[group[0]]
+    ]}  # fmt: skip
+    assert axes["scale_factor_odd"] == ("x",)
+    assert axes["scale_factor_even"] == ("y",)
+    assert axes["supply_sensitivity"] == ("z",)
+    assert " on x" in sentences(found)[0]
+
+
+def test_a_term_that_predicts_left_out_temperatures_worse_rises() -> None:
+    """A polynomial through steps from level to level follows what it saw, and nothing that it did not."""
+    recording = single_axis(1)
+    warm = np.asarray(recording.columns["chamber_setpoint_c"])
+    level = np.searchsorted(np.unique(warm), warm)
+    output = recording.columns["gyro_z"] + 0.05 * np.random.default_rng(3).normal(size=level.max() + 1)[level]
+    stepped = replace(recording, columns={**recording.columns, "gyro_z": output})
+    data = fit_data_of(stepped)
+    model, _ = changed(preset_for("ojeda2000", []).build(data)[0]).build(data)
+    comparison = compare_models(reduce_recording(stepped), model)
+    assert held_out_rises(comparison, (Term("bias_temperature", 5),), CATALOGUE)
+    assert not held_out_rises(comparison, (Term("scale_factor_asymmetry"),), CATALOGUE)
+
+
+def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
+    found = held(made("ojeda2000", 1))
+    told = Criticism(
+        Verdict("ambiguous", (("scale_factor_odd", "sine_response"),)), found.data, None, None, found.comparison
+    )
+    said = sentences(told, [{"do": "the rates in random order"}, {"do": "another"}])
+    assert [line for line in said if line.startswith("To tell")] == ["To tell: the rates in random order."]
