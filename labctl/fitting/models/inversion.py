@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.errors import LabctlError
 from labctl.fitting.numeric.arrays import Array
@@ -31,7 +32,8 @@ def invert(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: str) -> 
     """Return rates with output = rate + error(rates), axis -> (n,) deg/s, for outputs axis -> (n,) deg/s.
 
     By fixed-point iteration, which converges because a gyro's error changes far less than its rate; where it does not,
-    by bisection. `name` is the model's, for the message of NotConverged, which is raised when neither converges.
+    by bisection. `name` is the model's, for the message of NotConverged, which is raised when neither converges, or
+    where no rate near an output has that output. An output that is not a number has none.
     """
     rates, change = dict(outputs), 0.0
     for _ in range(FIXED_POINT_STEPS):
@@ -50,11 +52,13 @@ def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: s
     rates = dict(outputs)
     change = 0.0
     for _ in range(ROUNDS):
-        before = dict(rates)
+        before, outside = dict(rates), {}
         for axis, output in outputs.items():
-            rates = {**rates, axis: _bisected(output, error_dps, rates, axis)}
+            found, outside[axis] = _bisected(output, error_dps, rates, axis)
+            rates = {**rates, axis: found}
         change = _largest_change(rates, before)
         if change < ROUND_STEP_DPS:
+            _require_roots(outputs, outside, name)
             return rates
     raise NotConverged(
         f"model {name!r} could not be inverted: the last step still changed the rate by {change:.3g} "
@@ -62,15 +66,42 @@ def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: s
     )
 
 
-def _bisected(output: Array, error_dps: ErrorOfRates, rates: Mapping[str, Array], axis: str) -> Array:
-    reach = REACH_SHARE * np.max(np.abs(output), initial=0.0) + REACH_DPS
+def _require_roots(outputs: Mapping[str, Array], outside: Mapping[str, NDArray[np.bool_]], name: str) -> None:
+    """Raise NotConverged where no rate near an output has that output: a bisection ends at the edge of its interval."""
+    for axis, rows in outside.items():
+        if rows.any():
+            row = int(np.argmax(rows))
+            raise NotConverged(
+                f"model {name!r} could not be inverted: no rate within {_reach(outputs[axis]):.3g} deg/s of output "
+                f"{outputs[axis][row]:.6g} deg/s of axis {axis} has that output ({int(rows.sum())} of {len(rows)} "
+                "rows); its coefficients are not those of a gyro (check sign, unit and axes of the output)"
+            )
+
+
+def _reach(output: Array) -> float:
+    known = np.abs(output[np.isfinite(output)])
+    return float(REACH_SHARE * np.max(known, initial=0.0) + REACH_DPS)
+
+
+def _bisected(
+    output: Array, error_dps: ErrorOfRates, rates: Mapping[str, Array], axis: str
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the rates of one axis, (n,) deg/s, and where the interval holds none, (n,)."""
+
+    def excess(at: Array) -> Array:
+        return np.asarray(at + error_dps({**rates, axis: at}, axis) - output)
+
+    reach = _reach(output)
     low, high = output - reach, output + reach
+    outside = np.asarray((excess(low) > 0) | (excess(high) < 0))
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        above = middle + error_dps({**rates, axis: middle}, axis) > output
+        above = excess(middle) > 0
         low, high = np.where(above, low, middle), np.where(above, middle, high)
-    return np.asarray(0.5 * (low + high))
+    return np.asarray(0.5 * (low + high)), outside
 
 
 def _largest_change(rates: Mapping[str, Array], before: Mapping[str, Array]) -> float:
-    return max(float(np.max(np.abs(rates[axis] - before[axis]), initial=0.0)) for axis in rates)
+    """Return the largest change, deg/s; what is not a number stays so and does not count."""
+    changes = [np.abs(rates[axis] - before[axis]) for axis in rates]
+    return max(float(np.max(change[~np.isnan(change)], initial=0.0)) for change in changes)

@@ -66,7 +66,7 @@ def _of_readings(recording: Recording) -> Summary:
     rows = {name: np.asarray(values)[valid] for name, values in columns.items()}
     if not valid.any():
         return Summary(recording.info, {"dataset": np.zeros(0, dtype=np.int64)})
-    outputs = {axis: recording.gyro_dps(axis)[valid] for axis in recording.info.axes}
+    outputs: dict[str, NDArray[np.float64]] = {a: recording.gyro_dps(a)[valid] for a in recording.info.axes}
     starts = dataset_starts(rows["dataset"])
     sets = [
         _one_set(recording.info, rows, outputs, slice(int(begin), int(end)))
