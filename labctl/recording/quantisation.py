@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
+#: What coarse steps of the output leave in a mean, as a standard deviation: suffix of the output's column.
+QUANTISATION = "_quantisation_std"
 #: Readings of a data set that are looked at for codes; with more different ones than this there is no coarse step.
 CODE_READINGS, MOST_CODES, LEAST_READINGS = 256, 32, 16
 #: Share of the data sets that must take few codes, and of those the share that shows two codes or more.
@@ -62,6 +65,13 @@ def quantisation_std(
         return None, nothing
     variance = [quantisation_variance(step, w, s) if c else 0.0 for c, s, w in zip(coarse, std, white, strict=True)]
     return step, np.sqrt(variance)
+
+
+def steps_columns(name: str, sets: Sequence[NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    """Return the column of what coarse steps leave in the means of data sets of readings; none where they are fine."""
+    figures = np.array([codes_of(readings) for readings in sets], dtype=np.float64).reshape(-1, 4)
+    step, deviation = quantisation_std(*figures.T)
+    return {} if step is None else {f"{name}{QUANTISATION}": deviation}
 
 
 def quantisation_variance(step: float, white: float, std: float) -> float:

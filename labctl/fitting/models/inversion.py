@@ -18,8 +18,9 @@ FIXED_POINT_STEPS, FIXED_POINT_STEP_DPS = 60, 1e-12
 DIVERGING = 3.0
 #: Bisection: rounds over the axes, halvings of an interval, and the step in deg/s at which the rounds have converged.
 ROUNDS, HALVINGS, ROUND_STEP_DPS = 8, 50, 1e-9
-#: Half of the first interval of a bisection: this share of the largest output, plus this many deg/s.
-REACH_SHARE, REACH_DPS = 0.02, 10.0
+#: Half of the interval of a bisection: this share of the largest output, plus this many deg/s; where it holds no root
+#: the second share is tried, which holds that of any gain from 0.5 on.
+REACH_SHARES, REACH_DPS = (0.02, 1.0), 10.0
 
 
 class NotConverged(LabctlError):
@@ -72,15 +73,16 @@ def _require_roots(outputs: Mapping[str, Array], outside: Mapping[str, NDArray[n
         if rows.any():
             row = int(np.argmax(rows))
             raise NotConverged(
-                f"model {name!r} could not be inverted: no rate within {_reach(outputs[axis]):.3g} deg/s of output "
+                f"model {name!r} could not be inverted: no rate within {_reach(outputs[axis])[-1]:.3g} deg/s of output "
                 f"{outputs[axis][row]:.6g} deg/s of axis {axis} has that output ({int(rows.sum())} of {len(rows)} "
                 "rows); its coefficients are not those of a gyro (check sign, unit and axes of the output)"
             )
 
 
-def _reach(output: Array) -> float:
-    known = np.abs(output[np.isfinite(output)])
-    return float(REACH_SHARE * np.max(known, initial=0.0) + REACH_DPS)
+def _reach(output: Array) -> list[float]:
+    """Return half intervals to try, deg/s, the narrow one first."""
+    largest = float(np.max(np.abs(output[np.isfinite(output)]), initial=0.0))
+    return [share * largest + REACH_DPS for share in REACH_SHARES]
 
 
 def _bisected(
@@ -91,9 +93,12 @@ def _bisected(
     def excess(at: Array) -> Array:
         return np.asarray(at + error_dps({**rates, axis: at}, axis) - output)
 
-    reach = _reach(output)
-    low, high = output - reach, output + reach
-    outside = np.asarray((excess(low) > 0) | (excess(high) < 0))
+    low, high, outside = output, output, np.ones(len(output), dtype=np.bool_)
+    for reach in _reach(output):
+        low, high = np.where(outside, output - reach, low), np.where(outside, output + reach, high)
+        outside = np.asarray((excess(low) > 0) | (excess(high) < 0))
+        if not outside.any():
+            break
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         above = excess(middle) > 0

@@ -115,7 +115,7 @@ def _of_axis(summary: Summary, axis: str, known: list[tuple[str, Response]]) -> 
     if negative and len(negative) < len(signed):
         where = f"axis {axis}, position {', '.join(negative)}"
         yield _sign(where, min(gains), f"mark these data sets as position {_turned(negative[0])}")
-    elif negative:
+    elif negative and POSSIBLE[0] <= abs(float(np.median(gains))) <= POSSIBLE[1]:
         scale = _output_unit(summary, axis).scale
         do = f"give [output.{axis}] scale = {-scale:.6g}, or correct the sign of the table's rate or the position"
         yield _sign(f"axis {axis}", float(np.median(gains)), do)

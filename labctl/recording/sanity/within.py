@@ -48,14 +48,19 @@ def check_at_rest(summary: Summary) -> Iterator[Finding]:
             )  # fmt: skip
 
 
+def with_two_rates(summary: Summary, axis: str) -> NDArray[np.bool_]:
+    """Return which data sets, (m,), have a sudden change of an output within them."""
+    rate, change = np.asarray(summary["table_rate_dps"], dtype=np.float64), summary.of_axis("change", axis)
+    step = np.nan_to_num(summary.of_axis("code_step", axis))
+    return np.asarray(np.abs(change) > np.maximum(CHANGE_DPS + CHANGE_SHARE * np.abs(rate), 3.0 * step))
+
+
 def check_changes(summary: Summary) -> Iterator[Finding]:
     """Yield the data sets within which the output changes from one rate to another."""
     rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)
     for axis in summary.info.axes:
         change, row = summary.of_axis("change", axis), summary.of_axis("change_row", axis)
-        step = np.nan_to_num(summary.of_axis("code_step", axis))
-        size = np.abs(change)
-        found = size > np.maximum(CHANGE_DPS + CHANGE_SHARE * np.abs(rate), 3.0 * step)
+        size, found = np.abs(change), with_two_rates(summary, axis)
         if not found.any():
             continue
         worst = int(np.argmax(np.where(found, size, 0.0)))

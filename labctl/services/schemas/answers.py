@@ -46,8 +46,10 @@ class ErrorFigures(ResponseModel):
 class Validity(ResponseModel):
     """Where the calibration was measured; outside it is extrapolation."""
 
-    temperature_c: tuple[float, float]
-    rate_dps: tuple[float, float]
+    temperature_c: tuple[float, float] = Field(description="Lowest and highest of the readings, deg C.")
+    rate_dps: tuple[float | None, float | None] = Field(
+        description="Lowest and highest true rate, deg/s; null: no limit, nothing of the model depends on the rate."
+    )
 
 
 class FitResponse(ResponseModel):
