@@ -3,7 +3,7 @@
 LabctlError              exit 2, HTTP 400
 ├── BadInput             a file, an option or a request is wrong; nothing was changed
 │   ├── BadRecording     in a recording: names file, column, row and what was expected
-│   ├── BadRecipe        in a recipe or a plan
+│   ├── DataRefused      the data are certainly wrong, or a fit makes them worse     HTTP 422
 │   ├── BadBench         in a bench file
 │   └── BadCalibrationFile   edited, truncated or of an unknown format
 ├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
@@ -41,10 +41,11 @@ class BadRecording(BadInput):
     slug = "bad-recording"
 
 
-class BadRecipe(BadInput):
-    """A recipe is wrong, or asks for what the bench or the unit cannot do."""
+class DataRefused(BadInput):
+    """What is asked for would be wrong with certainty, by the data's own evidence; it can be insisted on."""
 
-    slug = "bad-recipe"
+    status = 422
+    slug = "data-refused"
 
 
 class BadBench(BadInput):

@@ -10,7 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
+from tests.helpers.leftovers import leftover_tasks, leftover_threads
+
+#: The same examples every time and on every machine; a busy machine is slow, not wrong.
+settings.register_profile("labctl", derandomize=True, deadline=None, database=None)
+settings.load_profile("labctl")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
@@ -29,6 +35,15 @@ def signals() -> Iterator[None]:
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture(autouse=True)
+def nothing_left(signals: None) -> Iterator[None]:
+    """Fail a test that leaves a thread or an asyncio task of its own behind. Set up first, so looked at last."""
+    with leftover_threads() as threads, leftover_tasks() as tasks:
+        yield
+    assert not threads, f"threads that run on: {threads}"
+    assert not tasks, f"tasks that were cancelled with their loop: {tasks}"
 
 
 @pytest.fixture

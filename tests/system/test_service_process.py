@@ -19,7 +19,8 @@ import pytest
 
 from instruments.clock import SystemClock
 from labctl.config import os_user
-from labctl.services.admin.api_keys import KeyRequest, Role, create_key
+from labctl.services.admin.api_keys import create_key
+from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import check, holder_of, open_store
 from tests.helpers.paths import EXAMPLES
 

@@ -9,7 +9,6 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
@@ -21,43 +20,22 @@ from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.recording import Recording
-from labctl.services.cache import cached
-from labctl.services.commands.protocol import ImproveRequest
+from labctl.services.cache import RecentResults, cached
+from labctl.services.calibrations.comparison import worse_than_before
 from labctl.services.criticism.criticise import version_of
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, load_reduced_readings
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.recordings.transfer import newest_row
-from labctl.services.schemas.answers import (
-    ErrorFigures,
+from labctl.services.recordings.inspection import covered_of, refuse_wrong, warning_of
+from labctl.services.recordings.loading import newest_row
+from labctl.services.schemas.calibrations import (
     FitResponse,
-    ModelResponse,
-    ResidualColumns,
-    ResponseModel,
-    Validity,
+    ImproveRequest,
+    PreviewResponse,
 )
+from labctl.services.schemas.criticism import ResidualColumns
+from labctl.services.schemas.warnings import DataWarning
 from labctl.store import CalibrationRecord, NewCalibration, RecordingRow, Store
-
-
-class PreviewResponse(ResponseModel):
-    """What a changed model would be; nothing was kept, so it has no version of its own."""
-
-    serial: str
-    improved_from: int
-    recording: int
-    model: ModelResponse
-    axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
-    error: ErrorFigures
-    before: ErrorFigures
-    validity: Validity
-    plausible: dict[str, dict[str, Any]] = Field(description="Effect -> the usual range, and whether it is inside.")
-    left_out: list[dict[str, Any]] = Field(description="Effects that would not leave the house with a calibration.")
-    residuals: ResidualColumns = Field(description="What the changed model leaves, data set by data set.")
-
-
-#: Changes whose fits are at hand, by what was asked.
-_RECENT: dict[str, _Change] = {}
-MOST_RECENT = 4
 
 
 @dataclass(frozen=True)
@@ -69,6 +47,12 @@ class _Change:
     points: Recording
     before: FitResult
     after: FitResult
+    data_warnings: list[DataWarning]
+
+    @property
+    def warnings(self) -> list[DataWarning]:
+        """What is wrong with the data, and with the change."""
+        return [*self.data_warnings, *map(warning_of, worse_than_before(self.before.error, self.after.error))]
 
     @property
     def figures(self) -> dict[str, Any]:
@@ -77,12 +61,24 @@ class _Change:
         return {
             **self.after.to_json(), "recording": self.recording.id, "improved_from": self.row.version,
             "before": self.before.error.to_dict(), "plausible": plausible(self.after, technology),
+            "warnings": [warning.model_dump() for warning in self.warnings],
         }  # fmt: skip
 
 
+#: Changes that were fitted a moment ago: a preview is often kept as the next version.
+_RECENT: RecentResults[_Change] = RecentResults(most=4)
+
+
 def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> FitResponse:
-    """Change a version's effects, fit again, keep it as the next. Raises NotFound, BadInput, NotEnoughData."""
-    return _keep(store, serial, _change(store, serial, request), at)
+    """Change a version's effects, fit again, keep it as the next.
+
+    Raises NotFound, BadInput, NotEnoughData, DataRefused for data that are certainly wrong and for a result that is
+    worse than no correction.
+    """
+    change = _change(store, serial, request)
+    what = f"change of version {change.row.version} of {serial} on recording {change.recording.id}"
+    refuse_wrong(change.warnings, what, accepted=request.accept_warnings)
+    return _keep(store, serial, change, at)
 
 
 def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewResponse:
@@ -122,15 +118,11 @@ def _residuals(store: Store, change: _Change) -> ResidualColumns:
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
-    """Fit a changed model, or take the fit of a moment ago: who has looked at a preview often keeps it next."""
+    """Fit a changed model, or return the fit of a moment ago."""
     row = version_of(store, serial, request.version)
     measured = newest_row(store, serial, request.recording)
     asked = json.dumps(_question(store, row, measured, request), sort_keys=True)
-    change = _RECENT.get(asked) or _fitted(row, Measurements(store, measured), request)
-    _RECENT[asked] = change
-    for old in list(_RECENT)[:-MOST_RECENT]:
-        _RECENT.pop(old, None)
-    return change
+    return _RECENT.get(asked, lambda: _fitted(row, Measurements(store, measured), request))
 
 
 def _refuse_what_changes_nothing(
@@ -147,7 +139,8 @@ def _refuse_what_changes_nothing(
 
 def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequest) -> _Change:
     model = model_of(row)
-    context = fit_data_of(measured.points)
+    covered = covered_of(measured.inspection, measured.points.info) if measured.row.kind == "samples" else None
+    context = fit_data_of(measured.points, covered)
     for effect_id in request.remove:
         if effect_id not in model.effect_ids:
             raise BadInput(f"effect {effect_id!r} is not in version {row.version} ({', '.join(model.effect_ids)})")
@@ -160,7 +153,7 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     add = tuple(_shaped(measured, base, term) for term in wanted)
     before = fit_preset(context, changed(model))
     after = fit_preset(context, changed(model, add, tuple(request.remove)))
-    return _Change(row, measured.row, measured.points, before, after)
+    return _Change(row, measured.row, measured.points, before, after, measured.inspection.warnings)
 
 
 def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
@@ -13,32 +12,13 @@ from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.numeric.arrays import Array
-from labctl.services.schemas.answers import ResponseModel, Validity
+from labctl.services.schemas.calibrations import Surface, SurfaceResponse, Validity
 from labctl.store import CalibrationRecord, Store
 
+#: Rates that a surface of a model without a rate spans where the unit's are not known, deg/s.
+UNKNOWN_MAX_RATE_DPS = 100.0
 #: Rounds in which a law of the output is solved for the output; each shrinks the rest a hundredfold or so.
 ROUNDS, CLOSE_DPS = 100, 1e-12
-
-
-class Surface(ResponseModel):
-    """One axis, turned about itself, the others at rest."""
-
-    rate_dps: list[float]
-    temperature_c: list[float]
-    error_dps: list[list[float]] = Field(
-        description="Output minus true rate: a row per temperature, one per rate in it."
-    )
-
-
-class SurfaceResponse(ResponseModel):
-    """What a calibration takes off, within what was calibrated."""
-
-    serial: str
-    version: int
-    validity: Validity
-    held: dict[str, float] = Field(description="Channels that the model needs besides: their means in its recording.")
-    left_out: list[dict[str, Any]] = Field(description="Effects of the fit that do not leave with the calibration.")
-    axes: dict[str, Surface]
 
 
 def surface_of(store: Store, serial: str, version: int, rate_points: int, temperature_points: int) -> SurfaceResponse:
@@ -46,7 +26,10 @@ def surface_of(store: Store, serial: str, version: int, rate_points: int, temper
     row = store.calibrations.get(store.units.get(serial).serial, version)
     calibration = read_calibration(row.document)
     held = _held(store, row, calibration)
-    rates, temperatures = _grid(calibration.rate_dps, rate_points), _grid(calibration.temperature_c, temperature_points)
+    rates, temperatures = (
+        _grid(_rate_span(store, row, calibration), rate_points),
+        _grid(calibration.temperature_c, temperature_points),
+    )
     axes = {
         axis: Surface(
             rate_dps=rates.tolist(), temperature_c=temperatures.tolist(),
@@ -54,9 +37,19 @@ def surface_of(store: Store, serial: str, version: int, rate_points: int, temper
         )
         for axis in calibration.axes
     }  # fmt: skip
-    validity = Validity(temperature_c=calibration.temperature_c, rate_dps=calibration.rate_dps)
+    validity = Validity.model_validate(calibration.document["validity"])
     left_out = list(calibration.document["left_out"])
     return SurfaceResponse(serial=serial, version=version, validity=validity, held=held, left_out=left_out, axes=axes)
+
+
+def _rate_span(store: Store, row: CalibrationRecord, calibration: Calibration) -> tuple[float, float]:
+    """Return the calibrated rates, deg/s; where there is no limit, those of the unit as far as they are known."""
+    low, high = calibration.rate_dps
+    if np.isfinite(low) and np.isfinite(high):
+        return low, high
+    known = store.recordings.get(row.recording).info.get("max_rate_dps") if row.recording is not None else None
+    fastest = float(known or UNKNOWN_MAX_RATE_DPS)
+    return -fastest, fastest
 
 
 def _grid(span: tuple[float, float], points: int) -> Array:

@@ -8,14 +8,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 from labctl.errors import BadInput
 from labctl.services.cache import cached_group
-from labctl.services.recordings.transfer import newest_row
-from labctl.services.schemas.answers import (
-    CriticismResponse,
-    LadderResponse,
-    LadderRow,
-    ResidualsResponse,
-    ResponseModel,
-)
+from labctl.services.recordings.loading import newest_row
+from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.calibrations import LadderResponse, LadderRow
+from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse
 from labctl.store import CalibrationRecord, Store
 
 if TYPE_CHECKING:

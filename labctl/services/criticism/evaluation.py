@@ -13,10 +13,10 @@ from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.next_experiment import experiments_for
-from labctl.services.criticism.report_text import answer_of
+from labctl.services.criticism.report_text import answer_of, with_warnings
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.formulas import catalogue_with
-from labctl.services.schemas.answers import CriticismResponse, ResidualsResponse
+from labctl.services.effects import catalogue_with
+from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 
@@ -33,7 +33,7 @@ def evaluate(
     serial, version = calibration.serial, calibration.version
     experiments = experiments_for(store, recording.campaign, found)
     return (
-        answer_of(serial, version, recording.id, found, experiments),
+        with_warnings(answer_of(serial, version, recording.id, found, experiments), measured.inspection.warnings),
         ResidualsResponse(serial=serial, version=version, recording=recording.id, columns=columns),
     )
 

@@ -6,23 +6,12 @@ from datetime import datetime
 from importlib import resources
 from pathlib import Path
 
-from pydantic import Field
-
 from labctl.errors import BadInput
-from labctl.services.commands.protocol import SimulatedRequest
+from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.transfer import suggested_model
-from labctl.services.schemas.answers import ImportResponse
+from labctl.services.schemas.recordings import SimulatedRecordingResponse, SimulatedRequest
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from labctl.store import Store
-
-
-class SimulatedRecordingResponse(ImportResponse):
-    """A simulated recording that is now in the database."""
-
-    recipe: str
-    bench: str
-    seed: int
-    hidden: dict[str, float] = Field(description="Effect -> size that is hidden in the unit.")
 
 
 def examples() -> dict[str, Path]:
@@ -50,4 +39,5 @@ def add_simulated(store: Store, request: SimulatedRequest, at: datetime) -> Simu
         serial=made.recording.info.serial, recording=number, datasets=made.plan.datasets,
         readings=len(made.recording), suggested_model=suggested_model(made.recording.info), recipe=recipe,
         bench=bench, seed=request.seed, hidden=hidden,
+        warnings=inspect_stored(store, store.recordings.get(number), made.recording).warnings,
     )  # fmt: skip

@@ -232,7 +232,7 @@ def test_a_write_must_be_echoed(make_bench: Callable[..., Bench], answer: str) -
         bench.registers.put(SETPOINT, -221)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.sampled_from(["tcp", "rtu"]), st.lists(st.binary(max_size=40), min_size=3, max_size=3))
 def test_no_garbage_ever_raises_anything_else(framing: str, answers: list[bytes]) -> None:
     bench = Bench(framing)
@@ -243,7 +243,7 @@ def test_no_garbage_ever_raises_anything_else(framing: str, answers: list[bytes]
     assert bench.clock.now_s() < 10 * ALL_TRIES_S
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.sampled_from(["tcp", "rtu"]), st.binary(max_size=300))
 @example("tcp", b"\0\0\0")
 @example("tcp", b"\0\0\0\0\0\xff\1\3")

@@ -16,10 +16,10 @@ from labctl.cli import terminal_operator
 from labctl.cli.terminal_operator import TerminalOperator
 from labctl.config import os_user
 from labctl.errors import Stopped
-from labctl.services.campaigns import execution, resume
-from labctl.services.campaigns.execution import StartRequest, run_here
+from labctl.services.campaigns import preparation, resume
+from labctl.services.campaigns.execution import run_here
 from labctl.services.campaigns.resume import resume_here
-from labctl.services.commands.protocol import ResumeRequest
+from labctl.services.schemas.campaigns import ResumeRequest, StartRequest
 from labctl.store import open_store
 from procedures.contracts.operator import HumanOperator, Prompt
 
@@ -35,7 +35,7 @@ class Terminal:
         self.stdin = os.fdopen(theirs, encoding="utf-8")
         self._answer = answer
         monkeypatch.setattr("sys.stdin", self.stdin)
-        monkeypatch.setattr(terminal_operator.complaints, "print", self._shown)
+        monkeypatch.setattr(terminal_operator.stderr, "print", self._shown)
 
     def type(self, text: str) -> None:
         os.write(self.ours, text.encode())
@@ -89,7 +89,7 @@ def test_answers_and_resumes_at_a_terminal_are_in_the_audit_trail(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     location = str(tmp_path / "lab.sqlite")
-    for module in (execution, resume):
+    for module in (preparation, resume):
         monkeypatch.setattr(module, "operator_of", lambda _: HumanOperator())
     seen: list[int] = []
 

@@ -16,9 +16,9 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.errors import Conflict, StoreError
-from labctl.services.app import LabService
-from labctl.services.campaigns import execution
+from labctl.services.campaigns import preparation
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
@@ -33,7 +33,7 @@ WAIT_S = 60.0  #: for the next sign of life
 @pytest.fixture
 def runner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> BenchRunner:
     """A bench on which a person turns and switches the units."""
-    monkeypatch.setattr(execution, "operator_of", lambda _: HumanOperator())
+    monkeypatch.setattr(preparation, "operator_of", lambda _: HumanOperator())
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     return BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
 
@@ -46,7 +46,7 @@ def client(runner: BenchRunner) -> Iterator[TestClient]:
 
 def until(client: TestClient, wanted: Any) -> Any:
     """Look at campaign 1, whenever its runner says that something happened, until it is as wanted."""
-    runner = service_of(client).bench_runner()
+    runner = service_of(client).bench_runner
     return wait_until(runner.listen, lambda: client.get("/api/campaigns/1").json(), wanted)
 
 

@@ -1,0 +1,61 @@
+"""Recordings as a fit takes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from labctl.errors import NotEnoughData, NotFound
+from labctl.recording import Recording
+from labctl.recording.output_steps import per_reading
+from labctl.recording.points import with_pieces
+from labctl.recording.quantisation import QUANTISATION
+from labctl.services.recordings.inspection import inspect_stored
+from labctl.services.schemas.warnings import RecordingInspection
+from labctl.store import RecordingRow, Store
+
+
+def points_of(store: Store, row: RecordingRow) -> Recording:
+    """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces."""
+    points = store.recordings.points(row.id, head=row)
+    if row.kind != "samples":
+        return points
+    pieces = with_pieces(points, lambda dataset: store.recordings.dataset(row.id, dataset))
+    return _with_steps(pieces, inspect_stored(store, row))
+
+
+def _with_steps(points: Recording, found: RecordingInspection) -> Recording:
+    """Return means with a column for what coarse steps of an output leave in them, where they do."""
+    if not found.quantisation_dps:
+        return points
+    columns = dict(points.columns)
+    numbers, dataset = np.asarray(found.dataset), np.asarray(columns["dataset"])
+    for axis, u_dps in found.quantisation_dps.items():
+        unit = next((unit for name, unit in points.info.output.items() if name == axis), None)
+        scale = abs(unit.scale) if unit else 1.0
+        columns[f"gyro_{axis}{QUANTISATION}"] = per_reading(dataset, numbers, scale * np.asarray(u_dps))
+    return replace(points, columns=columns)
+
+
+def newest_row(store: Store, serial: str, recording: int | None) -> RecordingRow:
+    """Return the recording asked for, checked to be the unit's, or the newest in which something was measured.
+
+    Raises NotFound, NotEnoughData where no data set is complete yet.
+    """
+    store.units.get(serial)
+    rows = store.recordings.of_unit(serial) if recording is None else [store.recordings.get(recording)]
+    if not rows:
+        raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign makes one")
+    row = next((row for row in rows if _measured(row)), rows[0])
+    if row.serial != serial:
+        raise NotFound(f"recording {recording} is of unit {row.serial!r}, not of {serial!r}")
+    if not _measured(row):
+        raise NotEnoughData(
+            f"recording {row.id} of unit {serial!r} holds no complete data set yet; wait for its first, or name another"
+        )
+    return row
+
+
+def _measured(row: RecordingRow) -> bool:
+    return row.kind != "samples" or row.datasets > 0
