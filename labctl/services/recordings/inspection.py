@@ -76,9 +76,12 @@ def covered_of(found: RecordingInspection, info: RecordingInfo) -> Covered | Non
     return covered_by(rates, np.asarray(found.position), (min(low), max(high)), up_rate_dps(info))
 
 
-def refuse_wrong(warnings: list[DataWarning], what: str, *, accepted: bool) -> None:
+INSIST = "; to do it all the same: --accept-warnings"
+
+
+def refuse_wrong(warnings: list[DataWarning], what: str, *, accepted: bool, insist: str = INSIST) -> None:
     """Raise DataRefused for the first certain warning, unless it is accepted; `what` would be done."""
     sure = [warning for warning in warnings if warning.severity == "certain"]
     if sure and not accepted:
         more = f" (and {len(sure) - 1} more)" if len(sure) > 1 else ""
-        raise DataRefused(f"{what} is refused: {sure[0].text}{more}; to do it all the same: --accept-warnings")
+        raise DataRefused(f"{what} is refused: {sure[0].text}{more}{insist}")
