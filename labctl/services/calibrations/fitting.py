@@ -11,7 +11,8 @@ from labctl.exports import export_calibration
 from labctl.fitting import fit
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
-from labctl.services.recordings.inspection import covered_of, inspect_stored, refuse_wrong, warning_of
+from labctl.services.recordings.coverage import covered_of
+from labctl.services.recordings.inspection import inspect_stored, refuse_wrong, warning_of
 from labctl.services.recordings.loading import newest_row, points_of
 from labctl.services.schemas.calibrations import (
     CalibrationRow,

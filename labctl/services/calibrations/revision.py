@@ -26,7 +26,8 @@ from labctl.services.criticism.criticise import version_of
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, load_reduced_readings
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.recordings.inspection import covered_of, refuse_wrong, warning_of
+from labctl.services.recordings.coverage import covered_of
+from labctl.services.recordings.inspection import refuse_wrong, warning_of
 from labctl.services.recordings.loading import newest_row
 from labctl.services.schemas.calibrations import (
     FitResponse,

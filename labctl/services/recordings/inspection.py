@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import DataRefused
-from labctl.fitting.data.covered import Covered, covered_by
-from labctl.fitting.data.earth import up_rate_dps
-from labctl.recording import Recording, RecordingInfo
+from labctl.recording import Recording
 from labctl.recording.sanity import Finding, Summary, findings_of, joined, steps_of, summarise
 from labctl.services.cache import cached
 from labctl.services.schemas.warnings import DataWarning, RecordingInspection
@@ -64,16 +62,6 @@ def _numbers(values: NDArray[np.float64]) -> list[float | None]:
 def warning_of(finding: Finding) -> DataWarning:
     """Return a finding as a response."""
     return DataWarning.model_validate(finding.to_json())
-
-
-def covered_of(found: RecordingInspection, info: RecordingInfo) -> Covered | None:
-    """Return what the readings of a recording cover; None where their temperatures are not known."""
-    low = [value for value in found.temperature_low_c if value is not None]
-    high = [value for value in found.temperature_high_c if value is not None]
-    if not low or not high:
-        return None
-    rates = np.asarray(found.rate_low_dps), np.asarray(found.rate_high_dps)
-    return covered_by(rates, np.asarray(found.position), (min(low), max(high)), up_rate_dps(info))
 
 
 INSIST = "; to do it all the same: --accept-warnings"
