@@ -49,6 +49,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "import": recordings.import_,
     "fit": calibrations.fit,
     "effects": effects.effects,
+    "verify": criticism.verify,
     "criticise": criticism.criticise,
     "improve": criticism.improve,
     "ladder": criticism.ladder,

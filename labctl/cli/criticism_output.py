@@ -9,16 +9,38 @@ from labctl.cli.output import console, format_number, print_warnings, table
 
 if TYPE_CHECKING:
     from labctl.services.schemas.calibrations import FitResponse, LadderResponse
-    from labctl.services.schemas.criticism import CriticismResponse
+    from labctl.services.schemas.criticism import CriticismResponse, VerificationResponse
 
 
 #: From dark to bright: residual over floor in the small map.
 SHADES = " ·░▒▓█"
 
 
+def print_verification(answer: VerificationResponse) -> None:
+    """Print what a version leaves of a recording as it is, axis by axis."""
+    from labctl.services.criticism.verification_text import verification_sentence
+
+    console.print(verification_sentence(answer), markup=False, soft_wrap=not console.is_terminal)
+    rows = table("", "axis", "RMS deg/s", "largest", "mean", numbers=3)
+    for axis, found in answer.axes.items():
+        rows.add_row(axis, format_number(found.rms_dps), format_number(found.max_dps), format_number(found.bias_dps))
+    console.print(rows)
+    console.print("as expected" if answer.ok else "NOT as expected: fit a new version, or criticise this one")
+
+
 def print_criticism(answer: CriticismResponse) -> None:
-    """Print a criticism for a person: the verdict, the errors, a small map, then the table."""
+    """Print a criticism: the version as it is, the verdict on its model refitted, the errors, a small map, a table."""
+    from labctl.services.criticism.verification_text import verification_sentence
+
     whole = not console.is_terminal  # a program that reads lines gets each sentence on one
+    if answer.applied is not None and not answer.applied.seen:
+        console.print(
+            verification_sentence(answer.applied),
+            style=None if answer.applied.ok else "red",
+            markup=False,
+            soft_wrap=whole,
+        )
+        console.print(f"Refitted to recording {answer.recording}:", markup=False)
     for line in answer.text:
         console.print(line, style="bold" if line is answer.text[0] else None, markup=False, soft_wrap=whole)
     error = answer.error
@@ -142,7 +164,8 @@ def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:
     def place(value: float) -> int:
         return max(round(log10(value / lowest) / span * width), 1)
 
-    lines = [f"{answer.serial}: error by version, deg/s, logarithmic (bar: fitted data; o: held-out; |: noise floor)"]
+    scale = "error, deg/s, logarithmic (bar: fitted data; o: held-out; |: noise floor)"
+    lines = [f"{answer.serial}, versions of recording {answer.recording}: {scale}"]
     for step in answer.steps:
         bar = list(("█" * place(step.rms_dps) if step.rms_dps else "").ljust(width + 2))
         if step.heldout_rms_dps:
@@ -153,4 +176,9 @@ def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:
         lines.append(f"{step.version:3d} {''.join(bar)} {figures}  {step.model}")
     if answer.noise_floor_dps:
         lines.append(f"    noise floor {format_number(answer.noise_floor_dps)} deg/s")
+    for other in answer.others:
+        error = (
+            "cannot be applied" if other.applied_rms_dps is None else f"{format_number(other.applied_rms_dps)} deg/s"
+        )
+        lines.append(f"    version {other.version} of recording {other.recording}, applied here as it is: {error}")
     return lines

@@ -17,7 +17,9 @@ from labctl.services.calibrations.uncertainty import uncertainty_at
 from labctl.services.commands.registry import CERTIFY, FIT, IMPROVE, REVOKE
 from labctl.services.commands.requests import ToNewestOrVersion, ToUnit, ToVersion
 from labctl.services.criticism import criticise as criticism_services
+from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
+from labctl.services.criticism.verification import verify_unit
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     CertificationResponse,
@@ -31,9 +33,15 @@ from labctl.services.schemas.calibrations import (
     UncertaintyResponse,
     VersionResponse,
 )
-from labctl.services.schemas.criticism import CriticismResponse, PictureResponse, ResidualsResponse
+from labctl.services.schemas.criticism import (
+    CriticismResponse,
+    PictureResponse,
+    ResidualsResponse,
+    VerificationResponse,
+)
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
+OtherUnit = Annotated[bool, Query(description="The recording may be of another unit.")]
 RecordingNumber = Annotated[int | None, Query(description="Recording; default: the unit's newest.")]
 
 
@@ -88,17 +96,28 @@ def certifications(serial: str, service: ServiceDep) -> list[CertificationRespon
     return list_certifications(service.store, serial)
 
 
+@router.get("/calibrations/{version}/verification", summary="Apply a version to a recording")
+def verification(
+    serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None, other_unit: OtherUnit = False
+) -> VerificationResponse:
+    """What the version leaves of the recording as it is, nothing refitted, and whether that is as expected of it."""
+    return verify_unit(service.store, serial, version, recording, other_unit=other_unit)
+
+
 @router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")
 def criticism(
     serial: str,
     version: int,
     service: ServiceDep,
     recording: RecordingNumber = None,
+    other_unit: OtherUnit = False,
     formula: Annotated[list[str] | None, Query(description="Effects of your own that compete: 'name: expr'.")] = None,
 ) -> CriticismResponse:
     """What the model leaves, where, which effect may be missing, and what this recording cannot say."""
     competing = [read_formula(line) for line in formula or []]
-    return criticism_services.criticise_unit(service.store, serial, version, recording, competing)
+    return criticism_services.criticise_unit(
+        service.store, serial, version, recording, competing, other_unit=other_unit
+    )
 
 
 @router.get("/calibrations/{version}/residuals", summary="What a model leaves, data set by data set")
@@ -147,9 +166,13 @@ def uncertainty(
 
 @router.head("/ladder", include_in_schema=False)
 @router.get("/ladder", summary="The error, version by version")
-def ladder(serial: str, service: ServiceDep) -> LadderResponse:
-    """Every version's errors, oldest first, down to the noise floor."""
-    return criticism_services.ladder(service.store, serial)
+def ladder(
+    serial: str,
+    service: ServiceDep,
+    recording: Annotated[int | None, Query(description="Recording; default: that of the newest version.")] = None,
+) -> LadderResponse:
+    """The errors of the versions fitted to one recording, each after its parent, and the noise floor."""
+    return ladder_of(service.store, serial, recording)
 
 
 @command_route(router, CERTIFY, "Make a version current", dependencies=[NEEDS_APPROVER])

@@ -1,4 +1,4 @@
-"""`labctl criticise`, `improve`, `ladder`: hold the model against the measurements, add what is missing."""
+"""`labctl verify`, `criticise`, `improve`, `ladder`: hold the model against the measurements, add what is missing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labctl.cli.criticism_output import print_criticism, print_improvement, print_ladder
+from labctl.cli.criticism_output import (
+    print_criticism,
+    print_improvement,
+    print_ladder,
+    print_verification,
+)
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
 from labctl.cli.output import print_json
@@ -22,10 +27,36 @@ FormulaOption = Annotated[
 ]
 
 
+OtherUnit = Annotated[bool, typer.Option("--other-unit", help="The recording may be of another unit.")]
+
+
+def verify(
+    serial: Serial,
+    version: VersionOption = None,
+    recording: RecordingId = None,
+    other_unit: OtherUnit = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Apply a version as it is to a recording, nothing refitted: its errors, and whether they are as expected."""
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.criticism.verification import verify_unit
+
+    with one_clear_line(), open_readonly(database) as store:
+        answer = verify_unit(store, serial, version, recording, other_unit=other_unit)
+    if as_json:
+        print_json(answer)
+    else:
+        print_verification(answer)
+    if not answer.ok:
+        raise typer.Exit(1)
+
+
 def criticise(
     serial: Serial,
     version: VersionOption = None,
     recording: RecordingId = None,
+    other_unit: OtherUnit = False,
     formula: FormulaOption = None,
     next_recipe: Annotated[
         Path | None, typer.Option("--next", metavar="FILE", help="Write the best next experiment as a recipe.")
@@ -41,7 +72,7 @@ def criticise(
     from labctl.services.criticism.criticise import criticise_unit, write_next
 
     with one_clear_line(), open_readonly(database) as store:
-        answer = criticise_unit(store, serial, version, recording, written(formula))
+        answer = criticise_unit(store, serial, version, recording, written(formula), other_unit=other_unit)
         if next_recipe is not None:
             write_next(answer, next_recipe)
         if report is not None:
@@ -98,13 +129,21 @@ def improve(
         print_improvement(answer)
 
 
-def ladder(serial: Serial, as_json: Json = False, database: Database = None) -> None:
-    """Show the error, version by version, down to the noise floor."""
+def ladder(
+    serial: Serial,
+    recording: Annotated[
+        int | None,
+        typer.Option("--recording", metavar="ID", help="Versions of this recording; default: of the newest version's."),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Show the error of the versions on one recording, each after its parent, down to the noise floor."""
     from labctl.services.commands.open import open_readonly
-    from labctl.services.criticism.criticise import ladder as ladder_of
+    from labctl.services.criticism.ladder import ladder as ladder_of
 
     with one_clear_line(), open_readonly(database) as store:
-        answer = ladder_of(store, serial)
+        answer = ladder_of(store, serial, recording)
     if as_json:
         print_json(answer)
     else:

@@ -6,7 +6,8 @@ from instruments.clock import VirtualClock
 from labctl.cli.criticism_output import ladder_lines
 from labctl.cli.demo.runner import DemoRunner
 from labctl.services.calibrations.revision import improve_unit
-from labctl.services.criticism.criticise import criticise_unit, ladder
+from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.criticism.ladder import ladder
 from labctl.services.schemas.calibrations import ImproveRequest
 from labctl.services.schemas.criticism import CriticismResponse
 

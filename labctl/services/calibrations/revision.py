@@ -22,10 +22,10 @@ from labctl.fitting.models.presets import changed
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
-from labctl.services.criticism.criticise import version_of
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, load_reduced_readings
 from labctl.services.criticism.residuals import residual_columns
+from labctl.services.criticism.versions import version_of
 from labctl.services.recordings.coverage import covered_of
 from labctl.services.recordings.inspection import refuse_wrong, warning_of
 from labctl.services.recordings.loading import newest_row

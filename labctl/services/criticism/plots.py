@@ -6,7 +6,8 @@ import hashlib
 import json
 
 from labctl.services.cache import cached
-from labctl.services.criticism.criticise import criticise_unit, ladder
+from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.criticism.ladder import ladder
 from labctl.services.schemas.criticism import PictureResponse, PicturesResponse
 from labctl.store import Store
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from labctl.plots import report_html
-from labctl.services.criticism.criticise import ladder
+from labctl.services.criticism.ladder import ladder
 from labctl.services.schemas.criticism import CriticismResponse
 from labctl.store import Store
 

@@ -38,17 +38,18 @@ def _with_steps(points: Recording, found: RecordingInspection) -> Recording:
     return replace(points, columns=columns)
 
 
-def newest_row(store: Store, serial: str, recording: int | None) -> RecordingRow:
-    """Return the recording asked for, checked to be the unit's, or the newest in which something was measured.
+def newest_row(store: Store, serial: str, recording: int | None, *, other_unit: bool = False) -> RecordingRow:
+    """Return the recording asked for, or the unit's newest in which something was measured.
 
-    Raises NotFound, NotEnoughData where no data set is complete yet.
+    It must be a recording of the unit, unless `other_unit`. Raises NotFound, NotEnoughData where no data set is
+    complete yet.
     """
     store.units.get(serial)
     rows = store.recordings.of_unit(serial) if recording is None else [store.recordings.get(recording)]
     if not rows:
         raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign makes one")
     row = next((row for row in rows if _measured(row)), rows[0])
-    if row.serial != serial:
+    if row.serial != serial and not other_unit:
         raise NotFound(f"recording {recording} is of unit {row.serial!r}, not of {serial!r}")
     if not _measured(row):
         raise NotEnoughData(

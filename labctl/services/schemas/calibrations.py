@@ -107,8 +107,12 @@ class LadderRow(ResponseModel):
 
     version: int
     parent: int | None
+    recording: int | None = Field(description="The recording that the version was fitted to.")
     model: str
     effects: list[str]
+    applied_rms_dps: float | None = Field(
+        default=None, description="Of a version of another recording: its error on this one, applied as it is."
+    )
     raw_rms_dps: float | None
     rms_dps: float | None
     heldout_rms_dps: float | None
@@ -116,10 +120,14 @@ class LadderRow(ResponseModel):
 
 
 class LadderResponse(ResponseModel):
-    """The error, version by version, oldest first."""
+    """The error of the versions fitted to one recording, each version after its parent."""
 
     serial: str
+    recording: int | None = Field(default=None, description="The recording of all steps.")
     steps: list[LadderRow]
+    others: list[LadderRow] = Field(
+        default_factory=list, description="Versions of other recordings, and their error on this one."
+    )
     noise_floor_dps: float | None
 
 

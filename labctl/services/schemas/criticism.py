@@ -10,6 +10,34 @@ from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
 
+class AxisVerification(ResponseModel):
+    """Corrected minus true rate of one axis over the data sets, deg/s."""
+
+    rms_dps: float
+    max_dps: float
+    bias_dps: float
+
+
+class VerificationResponse(ResponseModel):
+    """A calibration version applied as it is to a recording, nothing fitted. Errors: corrected minus true rate."""
+
+    serial: str
+    version: int
+    recording: int
+    recorded_unit: str = Field(description="Serial number of the unit that was recorded.")
+    seen: bool = Field(description="Whether the version was fitted to this recording.")
+    datasets: int
+    rms_dps: float = Field(description="Over data sets and axes.")
+    max_dps: float
+    bias_dps: float = Field(description="Mean over data sets and axes.")
+    axes: dict[str, AxisVerification]
+    outside_validity: int = Field(description="Data sets outside the version's rates or temperatures.")
+    expected_dps: float | None = Field(
+        description="Error that the version states: held-out, or of its own data where that is larger; null: unknown."
+    )
+    ok: bool = Field(description="Whether the error is at most twice the expected one.")
+
+
 class CriticismResponse(ResponseModel):
     """A model held against a recording: the verdict in one of five forms, and what it stands on."""
 
@@ -28,6 +56,9 @@ class CriticismResponse(ResponseModel):
     not_testable: list[dict[str, Any]]
     experiments: list[dict[str, Any]]
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
+    applied: VerificationResponse | None = Field(
+        default=None, description="The version as it is on this recording; everything else is of a refit to it."
+    )
     views: dict[str, Any] = Field(
         default_factory=dict, description="Where and how the model fails, as numbers for pictures, by view."
     )
