@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -74,9 +75,9 @@ class Calibration:
 
     @property
     def rate_dps(self) -> tuple[float, float]:
-        """The calibrated rates."""
+        """The calibrated rates; infinite where the document has null: nothing of the model depends on the rate."""
         low, high = self.document["validity"]["rate_dps"]
-        return float(low), float(high)
+        return -math.inf if low is None else float(low), math.inf if high is None else float(high)
 
     def to_bytes(self) -> bytes:
         """Return the bytes that are stored and served, always the same."""

@@ -20,8 +20,9 @@ from labctl.fitting.models.sine_form import sine_form_of
 
 Array = NDArray[np.float64]
 Outside = Literal["clamp", "refuse"]
-#: Beyond the calibrated range by less than this counts as inside: a thermometer's last digits.
+#: Beyond the calibrated temperatures by no more than this counts as inside, K: a thermometer's last digits.
 MARGIN_C = 0.5
+#: The range of rates is taken wider by this share: it was measured in true rates and is looked at in the output's.
 MARGIN_SHARE = 0.02
 Correct = Callable[[Array, Array, Mapping[str, Array]], Array]
 
@@ -34,12 +35,20 @@ class Compensated:
     outside: NDArray[np.bool_]
 
 
+def output_limits_dps(calibration: Calibration) -> tuple[float, float]:
+    """Return the lowest and highest output, deg/s, that counts as inside; infinite where there is no limit of rate."""
+    slow, fast = calibration.rate_dps
+    margin = MARGIN_SHARE * max(fast - slow, 1e-9)
+    return slow - margin, fast + margin
+
+
 class Compensator:
     """Corrects a unit's output by its calibration.
 
     Outside the calibrated temperatures and rates it either takes off the error at the edge of the range and flags the
-    sample ("clamp"), or raises BadInput ("refuse"). A sample that is not a number comes back as it was, flagged. The
-    range of rates is taken 2 % wider, as it was measured in true rates and is looked at in the output's.
+    sample ("clamp"), or raises BadInput ("refuse"). A sample that is not a number, or whose temperature is none, comes
+    back as no number, flagged. Temperatures count as inside up to `MARGIN_C` beyond the calibrated ones, but are
+    corrected at the edge; rates up to `MARGIN_SHARE` of their range. The C header does the same.
     """
 
     def __init__(self, calibration: Calibration, outside: Outside = "clamp") -> None:
@@ -49,9 +58,7 @@ class Compensator:
         self.axes = calibration.axes
         self._outside = outside
         self._low_c, self._high_c = calibration.temperature_c
-        slow, fast = calibration.rate_dps
-        margin = MARGIN_SHARE * max(fast - slow, 1e-9)
-        self._slow, self._fast = slow - margin, fast + margin
+        self._slow, self._fast = output_limits_dps(calibration)
         units = [calibration.output[axis] for axis in self.axes]
         self._offset = np.array([unit.offset for unit in units])
         self._scale = np.array([unit.scale for unit in units])

@@ -3,6 +3,7 @@
 LabctlError              exit 2, HTTP 400
 ├── BadInput             a file, an option or a request is wrong; nothing was changed
 │   ├── BadRecording     in a recording: names file, column, row and what was expected
+│   ├── DataRefused      the data are certainly wrong, or a fit makes them worse     HTTP 422
 │   ├── BadBench         in a bench file
 │   └── BadCalibrationFile   edited, truncated or of an unknown format
 ├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
@@ -38,6 +39,13 @@ class BadRecording(BadInput):
     """A recording is wrong; the text names file, column, row and what was expected."""
 
     slug = "bad-recording"
+
+
+class DataRefused(BadInput):
+    """What is asked for would be wrong with certainty, by the data's own evidence; it can be insisted on."""
+
+    status = 422
+    slug = "data-refused"
 
 
 class BadBench(BadInput):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from labctl.cli.output import console, format_number, table
+from labctl.cli.output import console, format_number, print_warnings, table
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 def print_fit(answer: FitResponse) -> None:
     """Print a fit for a person: the errors first, then the coefficients."""
     error = answer.error
+    print_warnings(answer.warnings)
     console.print(f"[bold]{answer.serial}[/] version {answer.version}: {answer.model.name}")
     console.print(f"  before             {format_number(error.raw_rms_dps)} deg/s RMS")
     console.print(f"  after              {format_number(error.rms_dps)} deg/s RMS")
@@ -22,7 +23,8 @@ def print_fit(answer: FitResponse) -> None:
     console.print(f"  noise floor        {format_number(error.noise_floor_dps)} deg/s")
     low, high = answer.validity.temperature_c
     slow, fast = answer.validity.rate_dps
-    console.print(f"  valid              {low:.1f} to {high:.1f} deg C, {slow:.4g} to {fast:.4g} deg/s")
+    rates = "any rate" if slow is None or fast is None else f"{slow:.4g} to {fast:.4g} deg/s"
+    console.print(f"  valid              {low:.1f} to {high:.1f} deg C, {rates}")
     for axis, content in answer.axes.items():
         coefficients = content["coefficients"]
         if "temperature_c" in coefficients:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import log10
 from typing import TYPE_CHECKING, Any
 
-from labctl.cli.output import console, format_number, table
+from labctl.cli.output import console, format_number, print_warnings, table
 
 if TYPE_CHECKING:
     from labctl.services.schemas.calibrations import FitResponse, LadderResponse
@@ -129,6 +129,7 @@ def print_improvement(answer: FitResponse) -> None:
     """Print what a change brought."""
     extra: dict[str, Any] = answer.model_extra or {}
     before = extra["before"]
+    print_warnings(answer.warnings)
     console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {extra['parent']}: {answer.model.name}")
     rows = table("", "deg/s", "before", "after", numbers=2)
     rows.add_row("RMS", format_number(before["rms_dps"]), format_number(answer.error.rms_dps))

@@ -12,6 +12,10 @@ Database = Annotated[
     typer.Option("--database", metavar="URL_OR_PATH", help="The database; default $LABCTL_DATABASE or the user's own."),
 ]
 Serial = Annotated[str, typer.Argument(metavar="SERIAL", help="Serial number of the unit.")]
+AcceptWarnings = Annotated[
+    bool,
+    typer.Option("--accept-warnings", help="Fit also data that are certainly wrong, or what is worse than no fit."),
+]
 BenchName = Annotated[
     str | None,
     typer.Option("--bench", metavar="FILE", help="Bench file, or the name of a bench that ships with labctl."),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterable
 from typing import Any
 
 from pydantic import BaseModel
@@ -13,6 +14,13 @@ from rich.table import Table
 #: Where nobody looks at a terminal, lines are not cut to its width.
 console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
 stderr = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def print_warnings(warnings: Iterable[Any]) -> None:
+    """Print the warnings of an answer, each on one line."""
+    for warning in warnings:
+        word = "wrong" if warning.severity == "certain" else "check"
+        console.print(f"{word}: {warning.text}", style="bold red", markup=False, soft_wrap=True)
 
 
 def print_json(answer: Any, *, one_line: bool = False) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import numpy as np
 
 from labctl.calibration import Calibration
-from labctl.compensator import MARGIN_SHARE
+from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
 from labctl.exports.c_sine import sine_body
 from labctl.exports.c_tables import c_table
@@ -20,13 +21,16 @@ from labctl.fitting.numeric.arrays import Array
 
 HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * Hash of the calibration: {hash}
- * Valid from {low:g} to {high:g} deg C and from {slow:g} to {fast:g} deg/s; outside, the error at the edge of the
- * range is taken off and the function returns 1, else 0. The range of rates is taken {margin:g} deg/s wider, as it was
- * measured in true rates.
+ * Valid from {low:g} to {high:g} deg C and {rates}; outside, the error at the edge of the range is
+ * taken off and the function returns 1, else 0. What is at most {margin_c:g} K or {margin:g} deg/s beyond counts as
+ * inside: a thermometer's last digits, corrected at the edge, and rates in the output's, as the range is of true rates.
+ * What is not a number gives no number, and 1.
  * Input: output of the gyro as a rate, deg/s ({nominal}); result: rate in deg/s.
  * Define LABCTL_REAL as float before including it for single precision. */
 #ifndef {guard}
 #define {guard}
+
+#include <math.h>
 
 #ifndef LABCTL_REAL
 #define LABCTL_REAL double
@@ -35,13 +39,23 @@ HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
 #define {name}_AXES {axes}
 static const char {name}_hash[] = "{hash}";
 static const double {name}_temperature_c[2] = {{{low:.17g}, {high:.17g}}};
-static const double {name}_output_dps[2] = {{{slowest:.17g}, {fastest:.17g}}};
+static const double {name}_inside_c[2] = {{{coldest:.17g}, {warmest:.17g}}};
+static const double {name}_output_dps[2] = {{{slowest}, {fastest}}};
 
 static inline LABCTL_REAL {name}_held(LABCTL_REAL w, int *outside)
 {{
-    if (!(w >= (LABCTL_REAL){name}_output_dps[0])) {{ *outside = 1; return (LABCTL_REAL){name}_output_dps[0]; }}
-    if (w > (LABCTL_REAL){name}_output_dps[1]) {{ *outside = 1; return (LABCTL_REAL){name}_output_dps[1]; }}
+    if (!(w >= (LABCTL_REAL){name}_output_dps[0] && w <= (LABCTL_REAL){name}_output_dps[1])) *outside = 1;
+    if (w < (LABCTL_REAL){name}_output_dps[0]) return (LABCTL_REAL){name}_output_dps[0];
+    if (w > (LABCTL_REAL){name}_output_dps[1]) return (LABCTL_REAL){name}_output_dps[1];
     return w;
+}}
+
+static inline LABCTL_REAL {name}_held_c(LABCTL_REAL t, int *outside)
+{{
+    if (!(t >= (LABCTL_REAL){name}_inside_c[0] && t <= (LABCTL_REAL){name}_inside_c[1])) *outside = 1;
+    if (t < (LABCTL_REAL){name}_temperature_c[0]) return (LABCTL_REAL){name}_temperature_c[0];
+    if (t > (LABCTL_REAL){name}_temperature_c[1]) return (LABCTL_REAL){name}_temperature_c[1];
+    return t;
 }}
 """
 
@@ -58,12 +72,7 @@ static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c
 {{
     int outside = 0, a, i, j;
     LABCTL_REAL u;
-    if (!(temperature_c >= (LABCTL_REAL){name}_temperature_c[0])) {{
-        temperature_c = (LABCTL_REAL){name}_temperature_c[0]; outside = 1;
-    }}
-    if (temperature_c > (LABCTL_REAL){name}_temperature_c[1]) {{
-        temperature_c = (LABCTL_REAL){name}_temperature_c[1]; outside = 1;
-    }}
+    temperature_c = {name}_held_c(temperature_c, &outside);
     u = temperature_c - (LABCTL_REAL){reference:.17g};
     for (a = 0; a < {name}_AXES; a++) {{
         LABCTL_REAL error = 0, held = {name}_held(w[a], &outside);
@@ -90,12 +99,7 @@ static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c
 {{
     LABCTL_REAL m[{name}_AXES][{name}_AXES + 1], weight[{points}];
     int outside = 0, last, i, j, r, c, p;
-    if (!(temperature_c >= (LABCTL_REAL){name}_temperature_c[0])) {{
-        temperature_c = (LABCTL_REAL){name}_temperature_c[0]; outside = 1;
-    }}
-    if (temperature_c > (LABCTL_REAL){name}_temperature_c[1]) {{
-        temperature_c = (LABCTL_REAL){name}_temperature_c[1]; outside = 1;
-    }}
+    temperature_c = {name}_held_c(temperature_c, &outside);
     for (last = {points} - 1; last < {name}_NODES - 1 && temperature_c > (LABCTL_REAL){name}_node_c[last]; last++) {{ }}
     for (i = 0; i < {points}; i++) {{
         LABCTL_REAL at = (LABCTL_REAL){name}_node_c[last - {points} + 1 + i];
@@ -161,7 +165,8 @@ def c_header(calibration: Calibration) -> bytes:
 
 def _head(name: str, calibration: Calibration) -> str:
     (low, high), (slow, fast) = calibration.temperature_c, calibration.rate_dps
-    margin = MARGIN_SHARE * max(fast - slow, 1e-9)
+    slowest, fastest = output_limits_dps(calibration)
+    is_limited = math.isfinite(slow) and math.isfinite(fast)
     nominal = "; ".join(
         f"{axis}: (output in {unit.unit} - {unit.offset:g}) / {unit.scale:g}"
         for axis, unit in calibration.output.items()
@@ -173,11 +178,13 @@ def _head(name: str, calibration: Calibration) -> str:
         hash=calibration.hash,
         low=low,
         high=high,
-        slow=slow,
-        fast=fast,
-        margin=margin,
-        slowest=slow - margin,
-        fastest=fast + margin,
+        rates=f"from {slow:g} to {fast:g} deg/s" if is_limited else "at any rate",
+        margin_c=MARGIN_C,
+        margin=fastest - fast if is_limited else 0.0,
+        coldest=low - MARGIN_C,
+        warmest=high + MARGIN_C,
+        slowest=f"{slowest:.17g}" if is_limited else "-INFINITY",
+        fastest=f"{fastest:.17g}" if is_limited else "INFINITY",
         nominal=nominal,
         guard=f"LABCTL_{name.upper()}_V{calibration.version}_H",
         name=name,

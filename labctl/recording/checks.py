@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
 from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, needed
+from labctl.recording.constant_rate import rate_change
 from labctl.recording.info import RecordingInfo
 
 #: What no gyro, table or chamber has ever been at: another unit, or a slip.
@@ -33,6 +34,8 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -
     if "t_s" in columns:
         _time(path, columns["t_s"], strict=info.kind == "samples")
     _datasets(path, columns["dataset"], points=info.kind == "points")
+    if info.kind == "samples":
+        _one_rate(path, columns)
     return _defaults(path, info, columns)
 
 
@@ -92,6 +95,18 @@ def _datasets(path: Path, dataset: NDArray[np.int64], *, points: bool) -> None:
         raise BadRecording(
             f"{path}: column 'dataset', row {rows[again] + 1}: number {numbers[again]} returns; "
             "each data set stands once, in one stretch of rows"
+        )
+
+
+def _one_rate(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+    rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
+    valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(rate), dtype=bool)
+    change = rate_change(columns["dataset"], rate, valid)
+    if change is not None:
+        raise BadRecording(
+            f"{path}: column 'table_rate_dps', row {change.row + 1}: {change.after_dps:g} deg/s in data set "
+            f"{change.dataset}, which began at {change.before_dps:g} deg/s; a data set has one rate: give the readings "
+            "at another a number of their own, or mark them with valid = 0"
         )
 
 

@@ -52,6 +52,10 @@ COLUMNS = (
         for a in "xyz"
     ),
     *(Column(f"gyro_{a}_white_std", "number", "as [output]", f"the white part of gyro_{a}_std") for a in "xyz"),
+    *(
+        Column(f"gyro_{a}_quantisation_std", "number", "as [output]", f"what the steps of gyro_{a} leave in a mean")
+        for a in "xyz"
+    ),
     Column("n", "integer", "", "number of readings behind a mean"),
     Column("scale_factor", "number", "output unit per deg/s", "scale factor", frozenset({"coefficients"})),
     Column("offset", "number", "output unit", "output at rest", frozenset({"coefficients"})),

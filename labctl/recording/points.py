@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.quantisation import steps_columns
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
@@ -88,8 +89,9 @@ def to_points(recording: Recording) -> Recording:
 
     A long data set through which the temperature moved has a row for each of its pieces, under its own number.
     Only valid readings count. `t_s` is the middle of the data set, `table_angle_deg` its start, `duration_s` its
-    length; each gyro column gains `_std` (n - 1) and, where every set has readings enough, `_white_std`; every row
-    gains `n`. A data set without a valid reading is left out.
+    length; each gyro column gains `_std` (n - 1), where every set has readings enough `_white_std`, and where its
+    readings come in coarse steps `_quantisation_std`; every row gains `n`. A data set without a valid reading is left
+    out.
     """
     if recording.info.kind != "samples":
         return recording
@@ -110,8 +112,9 @@ def to_points(recording: Recording) -> Recording:
             points[name], spread = _mean_and_std(values.astype(np.float64), starts, counts)
             if name.startswith("gyro_"):
                 points[f"{name}_std"] = spread
+                sets = np.split(values.astype(np.float64), starts[1:])
+                points |= steps_columns(name, sets)
                 if counts.min() >= LEAST_FOR_SPECTRUM:
-                    sets = np.split(values.astype(np.float64), starts[1:])
                     points[f"{name}_white_std"] = np.array([white_std(readings) for readings in sets])
     points["n"] = counts.astype(np.int64)
     return Recording(recording.info.model_copy(update={"kind": "points"}), points, recording.environment)

@@ -15,12 +15,14 @@ import numpy as np
 import pytest
 
 from labctl.calibration import Calibration, build_calibration, read_calibration
-from labctl.compensator import Compensator
+from labctl.compensator import MARGIN_C, MARGIN_SHARE, Compensator
 from labctl.errors import BadCalibrationFile, BadInput, NotEnoughData
 from labctl.exports import export_calibration
-from labctl.fitting import Channels, fit
-from labctl.recording import Recording
+from labctl.fitting import Channels, fit, fit_data_of
+from labctl.recording import Recording, to_points
 from labctl.turn_error import error_per_turn, static_bias
+from tests.helpers.simulated_recordings import single_axis
+from tests.helpers.static_recordings import resting
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 Grid = tuple[np.ndarray, np.ndarray]
@@ -70,6 +72,11 @@ def any_calibration(request: pytest.FixtureRequest) -> Calibration:
         output = rate * (1.01 + 1e-4 * (warm - 30)) + 0.1 + 0.01 * (warm - 30)
         return calibrated(make(rate, warm, output), "bias_scale")
     return request.getfixturevalue(request.param)  # type: ignore[no-any-return]
+
+
+@pytest.fixture(scope="module")
+def single_axis_run() -> Recording:
+    return single_axis(3)
 
 
 def inside(calibration: Calibration, n: int = 500) -> tuple[np.ndarray, np.ndarray]:
@@ -177,41 +184,34 @@ int main(void) {{
 """
 
 
+def in_c(calibration: Calibration, raw: np.ndarray, warm: np.ndarray, folder: Path, real: str = "double") -> np.ndarray:
+    """Compile a calibration's C header; return flag and rates of samples, (n, 1 + axes)."""
+    content, media_type = export_calibration(calibration.to_bytes(), "c")
+    assert media_type == "text/x-c"
+    (folder / "calibration.h").write_bytes(content)
+    name = next(
+        line.split()[1] for line in content.decode().splitlines() if line.endswith(f"_AXES {len(calibration.axes)}")
+    )
+    source = MAIN.format(axes=len(calibration.axes), name=name.removesuffix("_AXES"))
+    (folder / "main.c").write_text(source)
+    compiler = shutil.which("cc")
+    assert compiler is not None
+    command = [compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", f"-DLABCTL_REAL={real}", "-O1", "main.c"]
+    subprocess.run([*command, "-o", "main"], cwd=folder, check=True, capture_output=True)
+    lines = "\n".join(f"{t:.17g} " + " ".join(f"{v:.17g}" for v in row) for t, row in zip(warm, raw, strict=True))
+    out = subprocess.run([folder / "main"], input=lines, text=True, check=True, capture_output=True).stdout
+    return np.array([[float(word) for word in line.split()] for line in out.splitlines()])
+
+
 @pytest.mark.needs_cc
 @pytest.mark.parametrize(("real", "tolerance"), [("double", 1e-11), ("float", 2e-3)])
 def test_the_c_header_computes_the_same(
     any_calibration: Calibration, tmp_path: Path, real: str, tolerance: float
 ) -> None:
-    content, media_type = export_calibration(any_calibration.to_bytes(), "c")
-    assert media_type == "text/x-c"
-    (tmp_path / "calibration.h").write_bytes(content)
-    name = next(
-        line.split()[1] for line in content.decode().splitlines() if line.endswith(f"_AXES {len(any_calibration.axes)}")
-    )
-    source = MAIN.format(axes=len(any_calibration.axes), name=name.removesuffix("_AXES"))
-    (tmp_path / "main.c").write_text(source)
-    compiler = shutil.which("cc")
-    assert compiler is not None
-    command = [
-        compiler,
-        "-std=c99",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        f"-DLABCTL_REAL={real}",
-        "-O1",
-        "main.c",
-        "-o",
-        "main",
-        "-lm",
-    ]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     raw, warm = inside(any_calibration, 200)
     warm = np.append(warm, [any_calibration.temperature_c[1] + 50])
     raw = np.vstack([raw, raw[:1]])
-    lines = "\n".join(f"{t:.17g} " + " ".join(f"{v:.17g}" for v in row) for t, row in zip(warm, raw, strict=True))
-    out = subprocess.run([tmp_path / "main"], input=lines, text=True, check=True, capture_output=True).stdout
-    table = np.array([[float(word) for word in line.split()] for line in out.splitlines()])
+    table = in_c(any_calibration, raw, warm, tmp_path, real)
     expected = Compensator(any_calibration).compensate(raw, warm)
     assert table[:, 1:] == pytest.approx(expected.rate_dps, abs=tolerance)
     assert table[:-1, 0].sum() == 0
@@ -225,6 +225,66 @@ def test_what_has_no_closed_form_in_c_is_named_alone(
     bent = calibrated(make_points(rate, warm, rate * 1.01 + 0.1), effects=["bias", "scale_factor", "dead_band"])
     with pytest.raises(BadInput, match=r"without a closed form in C \(dead_band\)"):
         export_calibration(bent.to_bytes(), "c")
+
+
+def around(low: float, high: float, margin: float) -> np.ndarray:
+    """Return values on, just within and just beyond both edges of a range and of the range with its margin."""
+    edges = np.array([low, high, low - margin, high + margin])
+    just = np.concatenate([edges, np.nextafter(edges, -np.inf), np.nextafter(edges, np.inf)])
+    return np.concatenate([just, edges - 0.3 * margin, edges + 0.3 * margin, np.linspace(low, high, 5), [np.nan]])
+
+
+@pytest.mark.needs_cc
+def test_c_flags_and_corrects_the_samples_that_python_does(any_calibration: Calibration, tmp_path: Path) -> None:
+    (low, high), (slow, fast) = any_calibration.temperature_c, any_calibration.rate_dps
+    temperatures, rates = around(low, high, MARGIN_C), around(slow, fast, MARGIN_SHARE * (fast - slow))
+    warm, first = (grid.ravel() for grid in np.meshgrid(temperatures, rates))
+    raw = np.column_stack([first, *(np.zeros((len(any_calibration.axes) - 1, len(first))))])
+    table = in_c(any_calibration, raw, warm, tmp_path)
+    expected = Compensator(any_calibration).compensate(raw, warm)
+    assert 0 < expected.outside.sum() < len(raw)
+    assert table[:, 0].astype(bool).tolist() == expected.outside.tolist()
+    assert np.allclose(table[:, 1:], expected.rate_dps, rtol=0, atol=1e-9, equal_nan=True)
+
+
+@pytest.fixture
+def at_rest() -> Recording:
+    """Readings of one axis on a loop of temperature at rest, where the Earth turns."""
+    rng = np.random.default_rng(4)
+    warm = np.repeat([*range(20, 41, 5), *range(35, 19, -5)], 40) + rng.normal(0, 0.05, 360)
+    dataset = np.repeat(np.arange(1, 10), 40)
+    moved = {"dataset": dataset, "t_s": np.arange(360.0), "temperature_c": warm}
+    recording = resting(0.1 + 0.002 * (warm - 30) + rng.normal(0, 1e-3, 360), **moved)
+    return replace(recording, info=recording.info.model_copy(update={"latitude_deg": 48.0}))
+
+
+@pytest.mark.needs_cc
+def test_a_model_without_a_rate_in_it_has_no_limit_of_rate(at_rest: Recording, tmp_path: Path) -> None:
+    calibration = calibrated(at_rest, effects=["bias", "bias_temperature"])
+    assert calibration.document["validity"]["rate_dps"] == [None, None]
+    raw, warm = np.array([[0.1], [-300.0], [1e6], [np.nan], [0.1]]), np.array([30.0, 25.0, 35.0, 30.0, 60.0])
+    found = Compensator(read_calibration(calibration.to_bytes())).compensate(raw, warm)
+    assert found.outside.tolist() == [False, False, False, True, True]
+    assert found.rate_dps[1, 0] == pytest.approx(-300.09, abs=0.01)
+    assert in_c(calibration, raw, warm, tmp_path)[:, 0].astype(bool).tolist() == found.outside.tolist()
+
+
+def test_a_calibrations_own_readings_are_inside(at_rest: Recording, single_axis_run: Recording) -> None:
+    """Validity is that of the readings: means alone leave out the hottest and coldest of them."""
+    for recording, calibration in (
+        (at_rest, calibrated(at_rest, effects=["bias", "bias_temperature"])),
+        (single_axis_run, calibrated(single_axis_run, "ojeda2000")),
+    ):
+        warm = recording.columns["temperature_c"]
+        assert calibration.temperature_c == (warm.min(), warm.max())
+        found = Compensator(calibration, "refuse").compensate(recording.gyro_dps("z"), warm)
+        assert not found.outside.any()
+
+
+def test_means_keep_the_range_of_their_readings(single_axis_run: Recording) -> None:
+    covered = fit_data_of(single_axis_run).covered
+    result = fit(to_points(single_axis_run), "ojeda2000", covered=covered)
+    assert result.temperature_c == fit(single_axis_run, "ojeda2000").temperature_c
 
 
 def test_unknown_formats_are_named(fog: Calibration) -> None:

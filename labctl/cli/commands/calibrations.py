@@ -10,7 +10,7 @@ import typer
 
 from labctl.cli.calibration_output import print_fit
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Database, Json, RecordingId, Serial
+from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
 from labctl.cli.output import console, print_json
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def fit(
     effects: Annotated[
         str | None, typer.Option("--effects", metavar="A,B,C", help="Effects; `name:2` sets a polynomial order.")
     ] = None,
+    accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -41,7 +42,7 @@ def fit(
 
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
     with one_clear_line():
-        request = FitRequest(recording=recording, model=model, effects=names)
+        request = FitRequest(recording=recording, model=model, effects=names, accept_warnings=accept_warnings)
         answer = execute(database, FIT, ToUnit(serial, request))
     if as_json:
         print_json(answer)

@@ -14,7 +14,7 @@ from labctl.cli.criticism_output import (
     print_verification,
 )
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Database, Json, RecordingId, Serial
+from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
 from labctl.cli.output import print_json
 
 if TYPE_CHECKING:
@@ -103,6 +103,7 @@ def improve(
     formula: FormulaOption = None,
     version: VersionOption = None,
     recording: RecordingId = None,
+    accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -118,8 +119,9 @@ def improve(
 
     with one_clear_line():
         request = ImproveRequest(
-            add=names(add), remove=names(remove), formula=as_lines(formula or []), recording=recording
-        )
+            add=names(add), remove=names(remove), formula=as_lines(formula or []), recording=recording,
+            accept_warnings=accept_warnings,
+        )  # fmt: skip
         answer = execute(database, IMPROVE, ToNewestOrVersion(serial, version, request))
     if as_json:
         print_json(answer)

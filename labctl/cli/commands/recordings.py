@@ -9,7 +9,7 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
-from labctl.cli.output import console, print_json
+from labctl.cli.output import console, print_json, print_warnings
 
 export_app = typer.Typer(no_args_is_help=True, help="Write what the database holds to files.")
 
@@ -29,6 +29,7 @@ def import_(
     if as_json:
         print_json(answer)
         return
+    print_warnings(answer.warnings)
     console.print(
         f"recording {answer.recording} of {answer.serial}: {answer.datasets} data sets, {answer.readings} readings"
     )

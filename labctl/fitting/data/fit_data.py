@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.channels import Channels, channels_of
+from labctl.fitting.data.covered import Covered, covered_by_means, covered_by_readings
 from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.mean_noise import white_var_of
 from labctl.fitting.data.temperature_channel import with_temperature
 from labctl.fitting.data.temperature_levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
@@ -27,6 +29,7 @@ class FitData:
     channels: Channels  #: true rates along the body axes, Earth included where it is known
     outputs: Mapping[str, Array]  #: axis -> (m,) gyro output, deg/s
     white_var: Mapping[str, Array] | None  #: axis -> (m,) variance of the mean from white noise, (deg/s)^2
+    covered: Covered  #: by the readings behind the means, where they are known
 
     def __len__(self) -> int:
         return len(self.channels)
@@ -89,8 +92,10 @@ class FitData:
         return len(np.unique(np.round(self.temperature_c)))
 
 
-def fit_data_of(recording: Recording) -> FitData:
+def fit_data_of(recording: Recording, covered: Covered | None = None) -> FitData:
     """Return what a fit of this recording works on.
+
+    `covered` is the range of the readings behind a recording of means, where it is known.
 
     Raises BadInput for coefficients, NotEnoughData when empty or where nothing says how warm the unit was.
     """
@@ -104,23 +109,23 @@ def fit_data_of(recording: Recording) -> FitData:
     points = with_temperature(points)
     info = points.info
     outputs: dict[str, Array] = {axis: points.gyro_dps(axis) for axis in info.axes}
-    return FitData(info, channels_of(points, up_rate_dps(info)), outputs, _white(points))
+    up_dps = up_rate_dps(info)
+    channels = channels_of(points, up_dps)
+    if covered is None and recording.info.kind == "samples":
+        covered = covered_by_readings(recording, up_dps)
+    return FitData(info, channels, outputs, _white(points), covered or covered_by_means(channels))
 
 
 def _white(points: Recording) -> dict[str, Array] | None:
     """Return the variance of each mean from white noise, or None where the spread of the readings is not known.
 
     `gyro_*_white_std` is taken where it is there: the white level alone, without lines from the table's steps, which
-    average out over a data set and are no noise of the mean.
+    average out over a data set and are no noise of the mean. What coarse steps of the output leave in a mean is added.
     """
     found: dict[str, Array] = {}
-    n = points.columns.get("n")
     for axis in points.info.axes:
-        spread = points.columns.get(f"gyro_{axis}_white_std", points.columns.get(f"gyro_{axis}_std"))
-        if spread is None or n is None or not np.all(np.isfinite(spread)) or not np.any(spread > 0):
+        variance = white_var_of(points, axis)
+        if variance is None or not np.all(np.isfinite(variance)) or not np.any(variance > 0):
             return None
-        output = points.info.output.get(axis)
-        scale = abs(output.scale) if output else 1.0
-        variance = (np.asarray(spread, dtype=np.float64) / scale) ** 2 / np.maximum(np.asarray(n), 1)
         found[axis] = np.maximum(variance, 1e-6 * float(np.median(variance[variance > 0])))
     return found

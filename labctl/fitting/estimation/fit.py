@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.temperature_channel import is_chambers
@@ -17,6 +18,7 @@ from labctl.fitting.estimation.error_metrics import ErrorFigures, floor_from_rep
 from labctl.fitting.estimation.held_out import held_out_errors
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.estimation.validity import valid_rates_dps
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.presets import Preset, preset_for
@@ -26,8 +28,10 @@ from labctl.fitting.numeric.least_squares import Solution
 from labctl.recording import Recording
 
 
-def fit(recording: Recording, model: str | None = None, effects: list[str] | None = None) -> FitResult:
-    """Fit a preset, or effects, to a recording.
+def fit(
+    recording: Recording, model: str | None = None, effects: list[str] | None = None, *, covered: Covered | None = None
+) -> FitResult:
+    """Fit a preset, or effects, to a recording; `covered` is the range of the readings behind means, if known.
 
     Raises BadInput for unknown names, NotEnoughData when the recording cannot determine the model (and how much more it
     takes).
@@ -35,7 +39,7 @@ def fit(recording: Recording, model: str | None = None, effects: list[str] | Non
     preset = preset_for(model, effects or [])
     if recording.info.kind == "coefficients" and preset.name == "weiss1995":
         return from_coefficients(recording)
-    return fit_preset(fit_data_of(recording), preset)
+    return fit_preset(fit_data_of(recording, covered), preset)
 
 
 @single_threaded
@@ -53,12 +57,11 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
     floor, source = _noise_floor(data, found.solutions, residual)
     error = ErrorFigures(rms(raw), rms(residual), rms(held_out_errors(data, preset, found.solutions)), floor, source)
-    rates = np.concatenate([data.true_rate_dps(axis) for axis in data.outputs])
     return FitResult(
         fitted,
         error,
-        (float(data.temperature_c.min()), float(data.temperature_c.max())),
-        (float(rates.min()), float(rates.max())),
+        data.covered.temperature_c,
+        valid_rates_dps(fitted, data),
         {axis: _noise_json(solution) for axis, solution in found.solutions.items()},
         _environment(data, found.turning),
         residual,

@@ -12,6 +12,7 @@ from labctl.fitting.data.temperature_levels import folds
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.models.presets import Preset
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.least_squares import Solution
@@ -36,6 +37,12 @@ def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solut
             found = solve_axes(seen.take(rows), model, solutions)
         except NotEnoughData:
             return {}
-        for axis, values in residuals(FittedModel(model, found.fits), data.take(mask), found.turning).items():
+        left_out = data.take(mask)
+        try:
+            left = residuals(FittedModel(model, found.fits), left_out, found.turning)
+        except NotConverged as error:
+            at_c = float(left_out.temperature_c.mean())
+            raise NotConverged(f"{error}; the model was fitted without the data sets near {at_c:.1f} deg C") from None
+        for axis, values in left.items():
             errors[axis].append(values)
     return {axis: np.concatenate(parts) for axis, parts in errors.items() if parts}

@@ -21,8 +21,8 @@ class FitResult:
 
     fitted: FittedModel
     error: ErrorFigures
-    temperature_c: tuple[float, float]  #: range of the data sets, deg C
-    rate_dps: tuple[float, float]  #: range of the true rates over all axes, deg/s
+    temperature_c: tuple[float, float]  #: range of the readings, deg C
+    rate_dps: tuple[float | None, float | None]  #: range of the true rates over all axes, deg/s; None: no limit
     noise: Mapping[str, Any] = field(default_factory=dict)  #: axis -> white noise and drift, as JSON
     environment: Mapping[str, Any] = field(default_factory=dict)
     residual_dps: Mapping[str, Array] = field(default_factory=dict)  #: axis -> (m,) corrected minus true rate, deg/s

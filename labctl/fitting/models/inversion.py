@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.errors import LabctlError
 from labctl.fitting.numeric.arrays import Array
@@ -19,8 +20,9 @@ DIVERGING = 3.0
 NEWTON_STEPS, SLOPE_STEP_DPS, LEAST_SLOPE = 40, 1e-4, 1e-3
 #: Bisection: rounds over the axes, halvings of an interval, and the step in deg/s at which the rounds have converged.
 ROUNDS, HALVINGS, ROUND_STEP_DPS = 8, 50, 1e-9
-#: Half of the first interval of a bisection: this share of the largest output, plus this many deg/s.
-REACH_SHARE, REACH_DPS = 0.02, 10.0
+#: Half of the interval of a bisection: this share of the largest output, plus this many deg/s; where it holds no root
+#: the second share is tried, which holds that of any gain from 0.5 on.
+REACH_SHARES, REACH_DPS = (0.02, 1.0), 10.0
 
 
 class NotConverged(LabctlError):
@@ -34,7 +36,8 @@ def invert(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: str) -> 
 
     By fixed-point iteration, which converges because a gyro's error changes far less than its rate; where it does not,
     by Newton's method, and where that fails by bisection. `name` is the model's, for the message of NotConverged, which
-    is raised when none of them converges.
+    is raised when none of them converges, or where no rate near an output has that output. An output that is not a
+    number has none.
     """
     rates, change = dict(outputs), 0.0
     for _ in range(FIXED_POINT_STEPS):
@@ -71,11 +74,13 @@ def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: s
     rates = dict(outputs)
     change = 0.0
     for _ in range(ROUNDS):
-        before = dict(rates)
+        before, outside = dict(rates), {}
         for axis, output in outputs.items():
-            rates = {**rates, axis: _bisected(output, error_dps, rates, axis)}
+            found, outside[axis] = _bisected(output, error_dps, rates, axis)
+            rates = {**rates, axis: found}
         change = _largest_change(rates, before)
         if change < ROUND_STEP_DPS:
+            _require_roots(outputs, outside, name)
             return rates
     raise NotConverged(
         f"model {name!r} could not be inverted: the last step still changed the rate by {change:.3g} "
@@ -83,15 +88,46 @@ def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: s
     )
 
 
-def _bisected(output: Array, error_dps: ErrorOfRates, rates: Mapping[str, Array], axis: str) -> Array:
-    reach = REACH_SHARE * np.max(np.abs(output), initial=0.0) + REACH_DPS
-    low, high = output - reach, output + reach
+def _require_roots(outputs: Mapping[str, Array], outside: Mapping[str, NDArray[np.bool_]], name: str) -> None:
+    """Raise NotConverged where no rate near an output has that output: a bisection ends at the edge of its interval."""
+    for axis, rows in outside.items():
+        if rows.any():
+            row = int(np.argmax(rows))
+            raise NotConverged(
+                f"model {name!r} could not be inverted: no rate within {_reach(outputs[axis])[-1]:.3g} deg/s of output "
+                f"{outputs[axis][row]:.6g} deg/s of axis {axis} has that output ({int(rows.sum())} of {len(rows)} "
+                "rows); its coefficients are not those of a gyro (check sign, unit and axes of the output)"
+            )
+
+
+def _reach(output: Array) -> list[float]:
+    """Return half intervals to try, deg/s, the narrow one first."""
+    largest = float(np.max(np.abs(output[np.isfinite(output)]), initial=0.0))
+    return [share * largest + REACH_DPS for share in REACH_SHARES]
+
+
+def _bisected(
+    output: Array, error_dps: ErrorOfRates, rates: Mapping[str, Array], axis: str
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the rates of one axis, (n,) deg/s, and where the interval holds none, (n,)."""
+
+    def excess(at: Array) -> Array:
+        return np.asarray(at + error_dps({**rates, axis: at}, axis) - output)
+
+    low, high, outside = output, output, np.ones(len(output), dtype=np.bool_)
+    for reach in _reach(output):
+        low, high = np.where(outside, output - reach, low), np.where(outside, output + reach, high)
+        outside = np.asarray((excess(low) > 0) | (excess(high) < 0))
+        if not outside.any():
+            break
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        above = middle + error_dps({**rates, axis: middle}, axis) > output
+        above = excess(middle) > 0
         low, high = np.where(above, low, middle), np.where(above, middle, high)
-    return np.asarray(0.5 * (low + high))
+    return np.asarray(0.5 * (low + high)), outside
 
 
 def _largest_change(rates: Mapping[str, Array], before: Mapping[str, Array]) -> float:
-    return max(float(np.max(np.abs(rates[axis] - before[axis]), initial=0.0)) for axis in rates)
+    """Return the largest change, deg/s; what is not a number stays so and does not count."""
+    changes = [np.abs(rates[axis] - before[axis]) for axis in rates]
+    return max(float(np.max(change[~np.isnan(change)], initial=0.0)) for change in changes)

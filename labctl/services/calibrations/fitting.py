@@ -10,6 +10,9 @@ from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
 from labctl.services.calibrations.certification import certification_response, version_in_force
+from labctl.services.calibrations.comparison import worse_than_raw
+from labctl.services.recordings.coverage import covered_of
+from labctl.services.recordings.inspection import inspect_stored, refuse_wrong, warning_of
 from labctl.services.recordings.loading import newest_row, points_of
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
@@ -32,12 +35,18 @@ class CalibrationFile:
 def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> FitResponse:
     """Fit a model to a unit's recording and keep it as the next version.
 
-    Raises NotFound, BadInput for an unknown model or effect, NotEnoughData.
+    Raises NotFound, BadInput for an unknown model or effect, NotEnoughData, DataRefused for data that are certainly
+    wrong and for a fit that is worse than none.
     """
     row = newest_row(store, serial, request.recording)
     recording, campaign = row.id, row.campaign
+    found = inspect_stored(store, row)
+    refuse_wrong(found.warnings, f"fit of recording {recording} of {serial}", accepted=request.accept_warnings)
     source = points_of(store, row)
-    result = fit(source, request.model, request.effects)
+    covered = covered_of(found, source.info) if row.kind == "samples" else None
+    result = fit(source, request.model, request.effects, covered=covered)
+    warnings = [*found.warnings, *map(warning_of, worse_than_raw(result.error))]
+    refuse_wrong(warnings, f"fit of recording {recording} of {serial}", accepted=request.accept_warnings)
     made = {
         "recording": recording,
         "campaign": campaign,
@@ -50,6 +59,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
             source.info, result, version=version, parent=None, issued_at=at, provenance=made
         )
         answer = {"serial": serial, "version": version, **result.to_json(), **made, "hash": calibration.hash}
+        answer["warnings"] = [warning.model_dump() for warning in warnings]
         return NewCalibration(
             None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
         )

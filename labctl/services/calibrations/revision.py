@@ -21,10 +21,13 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
+from labctl.services.calibrations.comparison import worse_than_before
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, load_reduced_readings
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.versions import version_of
+from labctl.services.recordings.coverage import covered_of
+from labctl.services.recordings.inspection import refuse_wrong, warning_of
 from labctl.services.recordings.loading import newest_row
 from labctl.services.schemas.calibrations import (
     FitResponse,
@@ -32,6 +35,7 @@ from labctl.services.schemas.calibrations import (
     PreviewResponse,
 )
 from labctl.services.schemas.criticism import ResidualColumns
+from labctl.services.schemas.warnings import DataWarning
 from labctl.store import CalibrationRecord, NewCalibration, RecordingRow, Store
 
 
@@ -44,6 +48,12 @@ class _Change:
     points: Recording
     before: FitResult
     after: FitResult
+    data_warnings: list[DataWarning]
+
+    @property
+    def warnings(self) -> list[DataWarning]:
+        """What is wrong with the data, and with the change."""
+        return [*self.data_warnings, *map(warning_of, worse_than_before(self.before.error, self.after.error))]
 
     @property
     def figures(self) -> dict[str, Any]:
@@ -52,6 +62,7 @@ class _Change:
         return {
             **self.after.to_json(), "recording": self.recording.id, "improved_from": self.row.version,
             "before": self.before.error.to_dict(), "plausible": plausible(self.after, technology),
+            "warnings": [warning.model_dump() for warning in self.warnings],
         }  # fmt: skip
 
 
@@ -60,8 +71,15 @@ _RECENT: RecentResults[_Change] = RecentResults(most=4)
 
 
 def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> FitResponse:
-    """Change a version's effects, fit again, keep it as the next. Raises NotFound, BadInput, NotEnoughData."""
-    return _keep(store, serial, _change(store, serial, request), at)
+    """Change a version's effects, fit again, keep it as the next.
+
+    Raises NotFound, BadInput, NotEnoughData, DataRefused for data that are certainly wrong and for a result that is
+    worse than no correction.
+    """
+    change = _change(store, serial, request)
+    what = f"change of version {change.row.version} of {serial} on recording {change.recording.id}"
+    refuse_wrong(change.warnings, what, accepted=request.accept_warnings)
+    return _keep(store, serial, change, at)
 
 
 def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewResponse:
@@ -122,7 +140,8 @@ def _refuse_what_changes_nothing(
 
 def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequest) -> _Change:
     model = model_of(row)
-    context = fit_data_of(measured.points)
+    covered = covered_of(measured.inspection, measured.points.info) if measured.row.kind == "samples" else None
+    context = fit_data_of(measured.points, covered)
     for effect_id in request.remove:
         if effect_id not in model.effect_ids:
             raise BadInput(f"effect {effect_id!r} is not in version {row.version} ({', '.join(model.effect_ids)})")
@@ -135,7 +154,7 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     add = tuple(_shaped(measured, base, term) for term in wanted)
     before = fit_preset(context, changed(model))
     after = fit_preset(context, changed(model, add, tuple(request.remove)))
-    return _Change(row, measured.row, measured.points, before, after)
+    return _Change(row, measured.row, measured.points, before, after, measured.inspection.warnings)
 
 
 def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:

@@ -15,13 +15,19 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.services.schemas.calibrations import Surface, SurfaceResponse, Validity
 from labctl.store import CalibrationRecord, Store
 
+#: Rates that a surface of a model without a rate spans where the unit's are not known, deg/s.
+UNKNOWN_MAX_RATE_DPS = 100.0
+
 
 def surface_of(store: Store, serial: str, version: int, rate_points: int, temperature_points: int) -> SurfaceResponse:
     """Return the modelled error on a grid over the validity. Raises NotFound, BadInput, NotConverged."""
     row = store.calibrations.get(store.units.get(serial).serial, version)
     calibration = read_calibration(row.document)
     held = _held(store, row, calibration)
-    rates, temperatures = _grid(calibration.rate_dps, rate_points), _grid(calibration.temperature_c, temperature_points)
+    rates, temperatures = (
+        _grid(_rate_span(store, row, calibration), rate_points),
+        _grid(calibration.temperature_c, temperature_points),
+    )
     axes = {
         axis: Surface(
             rate_dps=rates.tolist(), temperature_c=temperatures.tolist(),
@@ -29,9 +35,19 @@ def surface_of(store: Store, serial: str, version: int, rate_points: int, temper
         )
         for axis in calibration.axes
     }  # fmt: skip
-    validity = Validity(temperature_c=calibration.temperature_c, rate_dps=calibration.rate_dps)
+    validity = Validity.model_validate(calibration.document["validity"])
     left_out = list(calibration.document["left_out"])
     return SurfaceResponse(serial=serial, version=version, validity=validity, held=held, left_out=left_out, axes=axes)
+
+
+def _rate_span(store: Store, row: CalibrationRecord, calibration: Calibration) -> tuple[float, float]:
+    """Return the calibrated rates, deg/s; where there is no limit, those of the unit as far as they are known."""
+    low, high = calibration.rate_dps
+    if np.isfinite(low) and np.isfinite(high):
+        return low, high
+    known = store.recordings.get(row.recording).info.get("max_rate_dps") if row.recording is not None else None
+    fastest = float(known or UNKNOWN_MAX_RATE_DPS)
+    return -fastest, fastest
 
 
 def _grid(span: tuple[float, float], points: int) -> Array:

@@ -11,12 +11,14 @@ from labctl.errors import BadInput, LabctlError
 from labctl.fitting.criticism import criticise
 from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.inversion import NotConverged
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.next_experiment import experiments_for
-from labctl.services.criticism.report_text import answer_of
+from labctl.services.criticism.report_text import answer_of, with_warnings
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.verification import verify
 from labctl.services.effects import catalogue_with
+from labctl.services.recordings.inspection import refuse_wrong
 from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse, VerificationResponse
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
@@ -29,13 +31,19 @@ def evaluate(
     `competing` formulas are added to the catalogue.
     """
     catalogue, measured = catalogue_with(competing), Measurements(store, recording)
-    found = criticise(measured.readings, model_of(calibration), catalogue, points=measured.points)
+    warnings = measured.inspection.warnings
+    try:
+        found = criticise(measured.readings, model_of(calibration), catalogue, points=measured.points)
+    except NotConverged as error:
+        what = f"criticism of version {calibration.version} on recording {recording.id}"
+        refuse_wrong(warnings, what, accepted=False, insist=f"; as they are, {error}")
+        raise
     columns = residual_columns(found.data, found.residuals, measured.points, found.base)
     serial, version = calibration.serial, calibration.version
     experiments = experiments_for(store, recording.campaign, found)
     criticism = answer_of(serial, version, recording.id, found, experiments)
     return (
-        criticism.model_copy(update={"applied": _applied(store, calibration, measured)}),
+        with_warnings(criticism.model_copy(update={"applied": _applied(store, calibration, measured)}), warnings),
         ResidualsResponse(serial=serial, version=version, recording=recording.id, columns=columns),
     )
 

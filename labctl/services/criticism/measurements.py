@@ -10,7 +10,10 @@ import numpy as np
 from labctl.errors import BadInput
 from labctl.fitting.criticism import decimate
 from labctl.recording import Recording
+from labctl.recording.output_steps import per_reading, quantisation_of
+from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.loading import points_of
+from labctl.services.schemas.warnings import RecordingInspection
 from labctl.store import RecordingRow, Store
 
 
@@ -25,6 +28,11 @@ class Measurements:
     def points(self) -> Recording:
         """The means as a fit takes them, one row per data set or piece of a long one."""
         return points_of(self.store, self.row)
+
+    @cached_property
+    def inspection(self) -> RecordingInspection:
+        """What is wrong with the recording, and what its readings cover."""
+        return inspect_stored(self.store, self.row)
 
     @cached_property
     def readings(self) -> Recording:
@@ -44,4 +52,6 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) ->
     info = points.info.model_copy(update={"kind": "samples"})
     parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    for name, values in quantisation_of(points).items():  # decimated readings do not show their steps any more
+        columns[name] = per_reading(np.asarray(columns["dataset"]), np.asarray(points.columns["dataset"]), values)
     return Recording(info, columns, points.environment)

@@ -20,6 +20,17 @@ from labctl.fitting.criticism import (
 )
 from labctl.fitting.effects import CATALOGUE, kind_of
 from labctl.services.schemas.criticism import CriticismResponse
+from labctl.services.schemas.warnings import DataWarning
+
+#: How a warning begins that stands before a verdict.
+DATA_FIRST = {"certain": "The data are wrong", "likely": "Check the data"}
+
+
+def with_warnings(answer: CriticismResponse, warnings: list[DataWarning]) -> CriticismResponse:
+    """Return an answer that says first what is wrong with the data: a verdict on wrong data is none."""
+    said = [f"{DATA_FIRST[warning.severity]}: {warning.text}." for warning in warnings]
+    return answer.model_copy(update={"warnings": warnings, "text": [*said, *answer.text]})
+
 
 #: Channels that run on while temperatures rise.
 HISTORY = frozenset({"t_s", "power_s"})

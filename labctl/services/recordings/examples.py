@@ -7,6 +7,7 @@ from importlib import resources
 from pathlib import Path
 
 from labctl.errors import BadInput
+from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.transfer import suggested_model
 from labctl.services.schemas.recordings import SimulatedRecordingResponse, SimulatedRequest
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
@@ -38,4 +39,5 @@ def add_simulated(store: Store, request: SimulatedRequest, at: datetime) -> Simu
         serial=made.recording.info.serial, recording=number, datasets=made.plan.datasets,
         readings=len(made.recording), suggested_model=suggested_model(made.recording.info), recipe=recipe,
         bench=bench, seed=request.seed, hidden=hidden,
+        warnings=inspect_stored(store, store.recordings.get(number), made.recording).warnings,
     )  # fmt: skip

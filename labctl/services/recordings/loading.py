@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from labctl.errors import NotEnoughData, NotFound
 from labctl.recording import Recording
+from labctl.recording.output_steps import per_reading
 from labctl.recording.points import with_pieces
+from labctl.recording.quantisation import QUANTISATION
+from labctl.services.recordings.inspection import inspect_stored
+from labctl.services.schemas.warnings import RecordingInspection
 from labctl.store import RecordingRow, Store
 
 
@@ -13,7 +21,21 @@ def points_of(store: Store, row: RecordingRow) -> Recording:
     points = store.recordings.points(row.id, head=row)
     if row.kind != "samples":
         return points
-    return with_pieces(points, lambda dataset: store.recordings.dataset(row.id, dataset))
+    pieces = with_pieces(points, lambda dataset: store.recordings.dataset(row.id, dataset))
+    return _with_steps(pieces, inspect_stored(store, row))
+
+
+def _with_steps(points: Recording, found: RecordingInspection) -> Recording:
+    """Return means with a column for what coarse steps of an output leave in them, where they do."""
+    if not found.quantisation_dps:
+        return points
+    columns = dict(points.columns)
+    numbers, dataset = np.asarray(found.dataset), np.asarray(columns["dataset"])
+    for axis, u_dps in found.quantisation_dps.items():
+        unit = next((unit for name, unit in points.info.output.items() if name == axis), None)
+        scale = abs(unit.scale) if unit else 1.0
+        columns[f"gyro_{axis}{QUANTISATION}"] = per_reading(dataset, numbers, scale * np.asarray(u_dps))
+    return replace(points, columns=columns)
 
 
 def newest_row(store: Store, serial: str, recording: int | None, *, other_unit: bool = False) -> RecordingRow:

@@ -13,6 +13,7 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 from labctl.errors import BadRecording
 from labctl.recording import RecordingInfo, read_recording, write_recording
+from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.schemas.recordings import ImportResponse
 from labctl.store import Store
 
@@ -36,6 +37,7 @@ def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
         datasets=datasets,
         readings=readings,
         suggested_model=suggested_model(recording.info),
+        warnings=inspect_stored(store, row, recording).warnings,
     )
 
 

@@ -9,6 +9,9 @@ from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.criticism import ResidualColumns
+from labctl.services.schemas.warnings import WARNINGS, DataWarning
+
+ACCEPT = "Fit also what is certainly wrong, or worse than no correction; the answer still holds the warnings."
 
 
 class FitRequest(Request):
@@ -20,6 +23,7 @@ class FitRequest(Request):
         default_factory=list,
         description="Effect ids, `name:2` sets an order. Without `model` a complete model, with it added to it.",
     )
+    accept_warnings: bool = Field(default=False, description=ACCEPT)
 
 
 class ImproveRequest(Request):
@@ -30,6 +34,7 @@ class ImproveRequest(Request):
     formula: list[str] = Field(default_factory=list, description="Effects of your own: 'name: expression'.")
     version: int | None = Field(default=None, description="Version to change; default: the newest.")
     recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
+    accept_warnings: bool = Field(default=False, description=ACCEPT)
 
 
 class CertifyRequest(Request):
@@ -62,8 +67,10 @@ class ErrorFigures(ResponseModel):
 class Validity(ResponseModel):
     """Where the calibration was measured; outside it is extrapolation."""
 
-    temperature_c: tuple[float, float]
-    rate_dps: tuple[float, float]
+    temperature_c: tuple[float, float] = Field(description="Lowest and highest of the readings, deg C.")
+    rate_dps: tuple[float | None, float | None] = Field(
+        description="Lowest and highest true rate, deg/s; null: no limit, nothing of the model depends on the rate."
+    )
 
 
 class FitResponse(ResponseModel):
@@ -75,6 +82,7 @@ class FitResponse(ResponseModel):
     axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
     error: ErrorFigures
     validity: Validity
+    warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
 
 
 class PreviewResponse(ResponseModel):
@@ -88,6 +96,7 @@ class PreviewResponse(ResponseModel):
     error: ErrorFigures
     before: ErrorFigures
     validity: Validity
+    warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     plausible: dict[str, dict[str, Any]] = Field(description="Effect -> the usual range, and whether it is inside.")
     left_out: list[dict[str, Any]] = Field(description="Effects that would not leave the house with a calibration.")
     residuals: ResidualColumns = Field(description="What the changed model leaves, data set by data set.")

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
 
 class AxisVerification(ResponseModel):
@@ -54,6 +55,7 @@ class CriticismResponse(ResponseModel):
     depends_on: list[str] = Field(description="Channels that the residual hangs on, strongest first.")
     not_testable: list[dict[str, Any]]
     experiments: list[dict[str, Any]]
+    warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     applied: VerificationResponse | None = Field(
         default=None, description="The version as it is on this recording; everything else is of a refit to it."
     )

@@ -10,6 +10,7 @@ from pydantic import Field
 from instruments.bench_config import SERIAL
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
+from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
 
 class SimulatedRequest(Request):
@@ -42,6 +43,7 @@ class ImportResponse(ResponseModel):
     datasets: int
     readings: int
     suggested_model: str = Field(default="bias_scale", description="A published model for such a recording.")
+    warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
 
 
 class SimulatedRecordingResponse(ImportResponse):

@@ -11,6 +11,7 @@ import pytest
 
 from labctl.errors import BadRecording
 from labctl.recording import Recording, RecordingInfo, read_recording, to_points, write_recording
+from labctl.recording.constant_rate import rate_change
 
 HEAD = """format = "labctl-recording/1"
 serial = "G-1"
@@ -160,3 +161,36 @@ def test_points_are_means_of_valid_readings(folder: Path) -> None:
 def test_a_bad_reading_may_hold_no_number(folder: Path) -> None:
     rows(folder, lambda r: [r[0] + ",valid", r[1] + ",1", "1,0.1,10,25.0,nan,0", r[3] + ",1", r[4] + ",1"])
     assert len(read_recording(folder)) == 4
+
+
+def test_rates_that_change_inside_a_data_set_are_refused(folder: Path) -> None:
+    rows(folder, lambda r: [*r[:2], "1,0.1,20,25.0,10.2", *r[3:]])
+    said = r"samples.csv: column 'table_rate_dps', row 2: 20 deg/s in data set 1, which began at 10 deg/s"
+    with pytest.raises(BadRecording, match=said):
+        read_recording(folder)
+
+
+def test_a_reading_at_another_rate_that_is_marked_bad_is_no_change(folder: Path) -> None:
+    rows(folder, lambda r: [r[0] + ",valid", *(f"{row},{int(k != 1)}" for k, row in enumerate(r[1:]))])
+    rows_of = (folder / "samples.csv").read_text().replace("1,0.1,10,25.0,10.2,0", "1,0.1,40,25.0,10.2,0")
+    (folder / "samples.csv").write_text(rows_of)
+    assert len(read_recording(folder)) == 4
+
+
+@pytest.mark.parametrize(("noise", "share"), [(0.2, 0.0), (0.0, 0.004), (0.5, 0.002)])
+def test_a_measured_rate_may_be_noisy(noise: float, share: float) -> None:
+    rng = np.random.default_rng(1)
+    dataset = np.repeat(np.arange(20), 100)
+    rate = 5.0 * dataset * (1 + share * np.sin(np.arange(2000) / 9)) + noise * rng.normal(size=2000)
+    assert rate_change(dataset, rate, np.ones(2000, dtype=bool)) is None
+
+
+def test_a_change_is_found_in_noise_with_its_row() -> None:
+    rng = np.random.default_rng(1)
+    dataset = np.repeat(np.arange(20), 100)
+    rate = 5.0 * dataset + 0.2 * rng.normal(size=2000)
+    rate[1150:1200] += 5.0
+    change = rate_change(dataset, rate, np.ones(2000, dtype=bool))
+    assert change is not None
+    assert (change.dataset, change.row) == (11, 1150)
+    assert change.after_dps == pytest.approx(60, abs=1)

@@ -20,6 +20,10 @@ MOST_READINGS = 1200
 LEAST_READINGS = 32
 
 
+#: A data set of which less than this share would be left is left as it is.
+LEAST_KEPT = 0.5
+
+
 @dataclass(frozen=True)
 class Within:
     """Readings of m data sets, up to n each, with zeros where there is none."""
@@ -52,6 +56,9 @@ class Within:
         values = values - self._earth(values, axis)
         spread = 1.4826 * float(np.median(np.abs(values[self.there > 0])))
         inside = np.abs(values) <= OUTLIER * spread
+        kept = (self.there * inside).sum(axis=1)
+        # where most readings are equal, as of a coarse output, the usual spread says nothing of the others
+        inside |= (kept < LEAST_KEPT * self.there.sum(axis=1))[:, None]
         return Residual(np.where(inside, values, 0.0), self.there * inside, inner[-1], spread, inner[1:-1])
 
     def _earth(self, values: NDArray[np.float64], axis: str) -> NDArray[np.float64]:

@@ -17,6 +17,8 @@ from labctl.fitting.numeric.arrays import Array
 #: From this evidence on, the scatter of the coordinates is estimated again without what the leader explains.
 REESTIMATE_FROM = 6.0
 ROBUST = 1.4826
+#: Least variance of a mean, (deg/s)^2: data without any scatter, as formulas make them, must not divide by zero.
+LEAST_VAR = 1e-20
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def _noise_of(data: ReducedRecording, design: Design, y: NDArray[np.float64], ax
     """Return the white variance of each mean, (m,) (deg/s)^2, and the drifts to average over."""
     stability = data.info.datasheet.get("bias_stability_dps")
     known = data.white_var
-    white = known[axis] if known is not None else np.full(len(data), _floor_squared(design, y))
+    white = known[axis] if known is not None else np.full(len(data), max(_floor_squared(design, y), LEAST_VAR))
     level = float(np.sqrt(np.median(white)))
     return white, noise_grid(data.info.technology or "", stability, level, data.instability_dps(axis))
 

@@ -7,6 +7,7 @@ import numpy as np
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
 from labctl.fitting.data.channels import channels_of
 from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.mean_noise import quantisation_var_of, white_var_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording, to_points
 
@@ -25,15 +26,18 @@ def reduce_points(recording: Recording) -> ReducedRecording:
 
 
 def _white_of_points(points: Recording) -> dict[str, Array] | None:
-    """Return axis -> (m,) variance of a mean from white noise, (deg/s)^2; None without spread or number of readings."""
+    """Return axis -> (m,) variance of a mean from white noise, (deg/s)^2; None without spread or number of readings.
+
+    One level of white noise for all data sets, and what coarse steps leave in each mean.
+    """
     found: dict[str, Array] = {}
     for axis in points.info.axes:
-        spread = points.columns.get(f"gyro_{axis}_white_std", points.columns.get(f"gyro_{axis}_std"))
-        if spread is None or "n" not in points.columns:
+        variance = white_var_of(points, axis)
+        if variance is None:
             return None
-        scale = abs(points.info.output[axis].scale) if axis in points.info.output else 1.0
-        level = float(np.sqrt(np.median((np.asarray(spread, dtype=np.float64) / scale) ** 2)))
-        if not level > 0:
+        n = np.maximum(np.asarray(points.columns["n"], dtype=np.float64), 1.0)
+        left = quantisation_var_of(points, axis)
+        found[axis] = float(np.median((variance - left) * n)) / n + left
+        if not np.all(found[axis] > 0):
             return None
-        found[axis] = level**2 / np.maximum(np.asarray(points.columns["n"], dtype=np.float64), 1.0)
     return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from labctl.fitting.criticism.reduction.basis import WAVES, orthonormal_basis
@@ -10,12 +12,15 @@ from labctl.fitting.criticism.reduction.nodes import nodes_of
 from labctl.fitting.criticism.reduction.outliers import inlier_mask, white_level_dps
 from labctl.fitting.criticism.reduction.padding import pad, piece_labels
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
+from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
+from labctl.recording.output_steps import with_quantisation
+from labctl.recording.quantisation import QUANTISATION
 
 
 def reduce_samples(recording: Recording, *, outliers: bool) -> ReducedRecording:
     """Return the coordinates of every data set; without `outliers` every valid reading counts."""
-    numbers, dataset, texts = decimated_columns(recording)
+    numbers, dataset, texts = decimated_columns(with_quantisation(recording))
     padded = pad(piece_labels({"dataset": dataset, **numbers}))
     m = len(padded.there)
     begin = padded.index[:, 0]
@@ -39,8 +44,21 @@ def reduce_samples(recording: Recording, *, outliers: bool) -> ReducedRecording:
             waves["cos", k] = np.einsum("rmn,mn->rm", basis, np.cos(k * angle))
             waves["sin", k] = np.einsum("rmn,mn->rm", basis, np.sin(k * angle))
     coordinates = {axis: np.einsum("rmn,mn->rm", basis, outputs[axis]) for axis in axes}
-    white = {axis: np.full(m, white_level_dps(outputs[axis], there) ** 2) / count for axis in axes}
+    white = {}
+    for axis in axes:
+        noise = white_level_dps(outputs[axis], there) ** 2
+        white[axis] = np.full(m, noise) / count + _steps_var(recording, numbers, axis)[begin]
+    known = all(np.all(values > 0) for values in white.values())  # else no reading differs from the next
     return ReducedRecording(
-        recording.info, nodes, weights, waves, coordinates, present, white, dataset[begin],
+        recording.info, nodes, weights, waves, coordinates, present, white if known else None, dataset[begin],
         int(padded.there.sum() - there.sum()),
     )  # fmt: skip
+
+
+def _steps_var(recording: Recording, numbers: Mapping[str, Array], axis: str) -> Array:
+    """Return what coarse steps of an output leave in a mean, at each reading (n,), (deg/s)^2."""
+    left = numbers.get(f"gyro_{axis}{QUANTISATION}")
+    if left is None:
+        return np.zeros(len(numbers[f"gyro_{axis}"]))
+    output = next((unit for name, unit in recording.info.output.items() if name == axis), None)
+    return np.asarray((left / (output.scale if output else 1.0)) ** 2)

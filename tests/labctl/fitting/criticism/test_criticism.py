@@ -15,10 +15,11 @@ from labctl.errors import BadInput
 from labctl.fitting.criticism import visibility
 from labctl.fitting.effects import CATALOGUE, formulas
 from labctl.fitting.effects.formula import Formula
-from labctl.recording import Recording, write_recording
+from labctl.recording import Recording, to_points, write_recording
 from tests.helpers.criticism import held
 from tests.helpers.lab import Lab
 from tests.helpers.simulated_recordings import single_axis, three_axes
+from tests.helpers.spoilt import quantised, spoilt
 
 HELD: dict[str, Any] = {"scale_factor_asymmetry": 2e-4}
 
@@ -314,3 +315,23 @@ def test_what_is_wrong_gets_one_line(bring: Callable[[Recording], Lab], argument
     result = lab.run(*arguments, status=2)
     assert said in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("step", [0.05, 0.5, 5.0])
+def test_coarse_readings_are_noise_and_no_missing_effect(step: float) -> None:
+    """A mean of coarse readings is known to the step only; without scatter there is no division by zero."""
+    found = held(spoilt(single_axis(1), quantised(step)), full=True)
+    assert (found.verdict.form, found.verdict.named) == ("adequate", ())
+    assert found.base is not None
+    assert found.base.error.rms_dps is not None
+    assert found.base.error.noise_floor_dps is not None
+    assert found.base.error.rms_dps < 1.5 * found.base.error.noise_floor_dps
+
+
+@pytest.mark.parametrize("as_points", [False, True])
+def test_data_without_any_scatter_are_no_traceback(as_points: bool) -> None:
+    def exact(columns: dict[str, np.ndarray]) -> None:
+        columns["gyro_z"] = 1.01 * columns["table_rate_dps"] + 0.1
+
+    recording = spoilt(single_axis(1), exact)
+    assert held(to_points(recording) if as_points else recording).verdict.form == "adequate"

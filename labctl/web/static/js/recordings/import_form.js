@@ -53,7 +53,9 @@ export function importForm(taken) {
 }
 
 function acceptedNotice(made, left) {
-  return notice("good", h("p", { class: "lead" }, `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`),
+  const warnings = made.warnings ?? [];
+  return notice(warnings.length ? "bad" : "good", h("p", { class: "lead" }, `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`),
+    warnings.map((warning) => h("p", {}, `${warning.severity === "certain" ? "Wrong" : "Check"}: ${warning.text}`)),
     left.length ? h("p", { class: "small" }, `Left out of the folder: ${left.join(", ")}.`) : null,
     h("div", { class: "row" },
       h("a", { class: "button primary", href: `/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}` }, "Fit and explore"),

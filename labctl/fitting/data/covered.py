@@ -1,0 +1,62 @@
+"""Range that a recording covers, from its readings: temperatures, and rates along each body axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.data.channels import Channels, body_rates
+from labctl.fitting.numeric.arrays import Array
+from labctl.recording import Recording
+from labctl.recording.points import dataset_starts, temperature_of
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Covered:
+    """Lowest and highest temperature, deg C, and true rate along each body axis, deg/s, over all readings."""
+
+    temperature_c: Range
+    rate_dps: Mapping[str, Range]
+
+
+def covered_by(
+    table_rates_dps: tuple[Array, Array], position: NDArray[Any], temperature_c: Range, up_rate_dps: float = 0.0
+) -> Covered:
+    """Return what data sets with lowest and highest table rates, (m,) each, in positions (m,) cover.
+
+    `up_rate_dps` is the Earth's rate along the table axis, deg/s.
+    """
+    ends = [body_rates(rates + up_rate_dps, position) for rates in table_rates_dps]
+    return Covered(
+        temperature_c,
+        {a: (min(float(r[a].min()) for r in ends), max(float(r[a].max()) for r in ends)) for a in ends[0]},
+    )
+
+
+def covered_by_readings(recording: Recording, up_rate_dps: float = 0.0) -> Covered | None:
+    """Return what the valid readings of a recording cover; None without a reading or a thermometer."""
+    columns = recording.columns
+    valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
+    warm = temperature_of(columns)
+    if warm is None or not valid.any():
+        return None
+    rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)[valid]
+    starts = dataset_starts(np.asarray(columns["dataset"])[valid])
+    axis = recording.info.axes[0]
+    position = np.asarray(columns["position"])[valid][starts] if "position" in columns else np.full(len(starts), axis)
+    ends = np.minimum.reduceat(rate, starts), np.maximum.reduceat(rate, starts)
+    span = float(warm[valid].min()), float(warm[valid].max())
+    return covered_by(ends, position, span, up_rate_dps)
+
+
+def covered_by_means(channels: Channels) -> Covered:
+    """Return what data-set means cover, where their readings are not known."""
+    warm = np.asarray(channels["temperature_c"], dtype=np.float64)
+    rates = {axis: (float(rate.min()), float(rate.max())) for axis, rate in channels.rates.items()}
+    return Covered((float(warm.min()), float(warm.max())), rates)

@@ -1,0 +1,46 @@
+"""A finding: one thing in a recording that is wrong, or probably wrong, before anything is fitted to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+#: "certain": a fit of such data is wrong and is refused; "likely": it may be meant so, and is said.
+Severity = Literal["certain", "likely"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found, where, its value, what was expected, and what to do."""
+
+    what: str  #: a word for programs: "sign", "unit", "scale", ...
+    severity: Severity
+    where: str  #: axis, position, data set or column
+    said: str  #: what is the case, in words, with value and unit
+    value: float | None
+    unit: str
+    expected: str
+    do: str
+
+    @property
+    def text(self) -> str:
+        """One sentence: where, what, and what to do."""
+        return f"{self.where}: {self.said} (expected {self.expected}); {self.do}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the finding as JSON, with its sentence."""
+        return {**asdict(self), "text": self.text}
+
+
+def certain(findings: Iterable[Finding]) -> list[Finding]:
+    """Return the findings with which a fit is certainly wrong."""
+    return [finding for finding in findings if finding.severity == "certain"]
+
+
+def numbers_in_words(numbers: Iterable[int], most: int = 6) -> str:
+    """Return "data set 7" or "data sets 1, 2, 3 and 40 more" for the numbers of data sets."""
+    known = [int(number) for number in numbers]
+    shown = ", ".join(str(number) for number in known[:most])
+    more = f" and {len(known) - most} more" if len(known) > most else ""
+    return f"data set{'s' if len(known) > 1 else ''} {shown}{more}"

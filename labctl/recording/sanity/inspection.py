@@ -1,0 +1,37 @@
+"""All checks of a recording, in order."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from labctl.recording.recording import Columns, Recording
+from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.gain import check_responses
+from labctl.recording.sanity.outlying import check_outlying
+from labctl.recording.sanity.response import responses
+from labctl.recording.sanity.summary import Summary, summarise
+from labctl.recording.sanity.timing import check_time
+from labctl.recording.sanity.within import check_at_rest, check_changes, check_codes, check_spread, with_two_rates
+
+
+def inspect_recording(recording: Recording) -> list[Finding]:
+    """Return the findings of a whole recording, the certain ones first; none for a table of coefficients."""
+    return findings_of(summarise(recording), recording.environment)
+
+
+def findings_of(summary: Summary, environment: Columns | None = None) -> list[Finding]:
+    """Return the findings of a summary, the certain ones first."""
+    if len(summary) == 0:
+        return []
+    known = responses(summary)
+    whole = summary.take(~np.any([with_two_rates(summary, axis) for axis in summary.info.axes], axis=0))
+    found = [
+        *check_responses(summary, known),
+        *check_outlying(whole, responses(whole)),
+        *check_changes(summary),
+        *check_at_rest(summary),
+        *check_spread(summary),
+        *check_codes(summary),
+        *check_time(summary, environment),
+    ]
+    return sorted(found, key=lambda finding: finding.severity != "certain")

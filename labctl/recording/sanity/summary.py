@@ -1,0 +1,178 @@
+"""Summary of a recording's data sets: the few numbers of each that the checks look at.
+
+The readings are needed once, data set by data set; what is kept has one row per data set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.recording.info import RecordingInfo
+from labctl.recording.points import dataset_starts, temperature_of
+from labctl.recording.quantisation import codes_of
+from labctl.recording.recording import Columns, Recording
+from labctl.recording.sanity.blocks import NO_CHANGE, level_change, noise_of_reading, wander
+
+#: Time steps longer than this many usual ones, and than so many seconds, are a gap.
+GAP_STEPS, GAP_S = 5.0, 0.5
+_NONE: NDArray[Any] = np.zeros(0)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """m data sets of one recording; rates in deg/s, NaN where the recording does not say."""
+
+    info: RecordingInfo
+    columns: Mapping[str, NDArray[Any]]  #: name -> (m,)
+
+    def __len__(self) -> int:
+        return len(self.columns["dataset"])
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.columns[name]
+
+    def of_axis(self, name: str, axis: str) -> NDArray[np.float64]:
+        """Return a figure of one output axis, (m,)."""
+        return np.asarray(self.columns[f"{name}_{axis}"], dtype=np.float64)
+
+    def take(self, rows: NDArray[Any]) -> Summary:
+        """Return the summary of some data sets, by index or mask."""
+        return Summary(self.info, {name: values[rows] for name, values in self.columns.items()})
+
+
+def summarise(recording: Recording) -> Summary:
+    """Return the summary of a recording of readings or of means; empty for a table of coefficients."""
+    if recording.info.kind == "coefficients" or len(recording) == 0:
+        return Summary(recording.info, {"dataset": np.zeros(0, dtype=np.int64)})
+    return _of_readings(recording) if recording.info.kind == "samples" else _of_means(recording)
+
+
+def joined(info: RecordingInfo, parts: Sequence[Summary]) -> Summary:
+    """Return the summaries of parts of a recording, in order, as one."""
+    known = [part for part in parts if len(part)]
+    if not known:
+        return Summary(info, {"dataset": np.zeros(0, dtype=np.int64)})
+    return Summary(info, {name: np.concatenate([part[name] for part in known]) for name in known[0].columns})
+
+
+def _of_readings(recording: Recording) -> Summary:
+    columns = recording.columns
+    valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
+    rows = {name: np.asarray(values)[valid] for name, values in columns.items()}
+    if not valid.any():
+        return Summary(recording.info, {"dataset": np.zeros(0, dtype=np.int64)})
+    outputs: dict[str, NDArray[np.float64]] = {a: recording.gyro_dps(a)[valid] for a in recording.info.axes}
+    starts = dataset_starts(rows["dataset"])
+    sets = [
+        _one_set(recording.info, rows, outputs, slice(int(begin), int(end)))
+        for begin, end in zip(starts, np.append(starts[1:], len(rows["dataset"])), strict=True)
+    ]
+    return Summary(recording.info, {name: np.array([one[name] for one in sets]) for name in sets[0]})
+
+
+def _one_set(
+    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], here: slice
+) -> dict[str, Any]:
+    rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)[here]
+    warm = temperature_of(rows)
+    t_s = np.asarray(rows["t_s"], dtype=np.float64)[here]
+    found: dict[str, Any] = {
+        **_place(info, rows, here.start),
+        "n": len(rate),
+        "table_rate_dps": float(rate.mean()),
+        "rate_low_dps": float(rate.min()),
+        "rate_high_dps": float(rate.max()),
+        **_temperatures(_NONE if warm is None else warm[here]),
+        **_times(t_s),
+        "turning_dps": _turning(rows, here, t_s),
+    }
+    for axis, values in outputs.items():
+        figures = _output(values[here], None if warm is None else warm[here], at_rest=not rate.any())
+        found |= {f"{name}_{axis}": value for name, value in figures.items()}
+    return found
+
+
+def _place(info: RecordingInfo, rows: Columns, row: int) -> dict[str, Any]:
+    return {
+        "dataset": int(rows["dataset"][row]),
+        "position": str(rows["position"][row]) if "position" in rows else info.axes[0],
+        "run": int(rows["run"][row]) if "run" in rows else 1,
+    }
+
+
+def _temperatures(warm: NDArray[np.float64]) -> dict[str, float]:
+    if len(warm) == 0:
+        return dict.fromkeys(("temperature_c", "temperature_low_c", "temperature_high_c"), np.nan)
+    return {
+        "temperature_c": float(warm.mean()),
+        "temperature_low_c": float(warm.min()),
+        "temperature_high_c": float(warm.max()),
+    }
+
+
+def _times(t_s: NDArray[np.float64]) -> dict[str, float]:
+    steps = np.diff(t_s)
+    usual = float(np.median(steps)) if len(steps) else np.nan
+    gaps = steps[steps > max(GAP_STEPS * usual, GAP_S)] if len(steps) else steps
+    return {
+        "t_begin_s": float(t_s[0]), "t_end_s": float(t_s[-1]), "step_s": usual,
+        "gap_s": float(gaps.max(initial=0.0)), "lost_s": float(np.sum(gaps - usual)) if len(gaps) else 0.0,
+    }  # fmt: skip
+
+
+def _turning(rows: Columns, here: slice, t_s: NDArray[np.float64]) -> float:
+    """Return the rate at which the logged table angle turns over the data set, degrees per unit of `t_s`."""
+    if "table_angle_deg" not in rows or len(t_s) < 2 or t_s[-1] <= t_s[0]:
+        return np.nan
+    angle = np.asarray(rows["table_angle_deg"], dtype=np.float64)[here]
+    return float((angle[-1] - angle[0]) / (t_s[-1] - t_s[0]))
+
+
+def _output(values: NDArray[np.float64], warm: NDArray[np.float64] | None, *, at_rest: bool) -> dict[str, float]:
+    codes = codes_of(values)
+    noise = min(noise_of_reading(values), codes.std)
+    change = level_change(values, noise)
+    return {
+        "mean": float(values.mean()), "std": codes.std, "noise": noise,
+        "code": codes.code, "code_step": codes.step, "white_std": codes.white_std,
+        "wander": wander(values, warm, noise) if at_rest else np.nan,
+        "change": change.size, "change_row": change.row,
+    }  # fmt: skip
+
+
+def _of_means(recording: Recording) -> Summary:
+    rows, m, info = recording.columns, len(recording), recording.info
+    rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)
+    warm = temperature_of(rows)
+    warm = np.full(m, np.nan) if warm is None else warm
+    t_s = np.asarray(rows["t_s"], dtype=np.float64) if "t_s" in rows else np.full(m, np.nan)
+    unknown = np.full(m, np.nan)
+    found: dict[str, NDArray[Any]] = {
+        "dataset": np.asarray(rows["dataset"]) if "dataset" in rows else np.arange(1, m + 1),
+        "position": np.asarray(rows["position"]).astype(np.str_) if "position" in rows else np.full(m, info.axes[0]),
+        "run": np.asarray(rows["run"]) if "run" in rows else np.ones(m, dtype=np.int64),
+        "n": np.asarray(rows["n"]) if "n" in rows else np.ones(m, dtype=np.int64),
+        "table_rate_dps": rate, "rate_low_dps": rate, "rate_high_dps": rate,
+        "temperature_c": warm, "temperature_low_c": warm, "temperature_high_c": warm,
+        "t_begin_s": t_s, "t_end_s": t_s, "turning_dps": unknown,
+        **dict.fromkeys(("step_s", "gap_s", "lost_s"), unknown),
+    }  # fmt: skip
+    for axis in info.axes:
+        output = info.output.get(axis)
+        scale = abs(output.scale) if output else 1.0
+        std = np.asarray(rows[f"gyro_{axis}_std"], dtype=np.float64) / scale if f"gyro_{axis}_std" in rows else unknown
+        figures = {
+            "mean": recording.gyro_dps(axis),
+            "std": std,
+            "noise": std,
+            "white_std": std,
+            "change": np.full(m, NO_CHANGE.size),
+        }
+        figures |= {"change_row": np.full(m, NO_CHANGE.row), **dict.fromkeys(("wander", "code", "code_step"), unknown)}
+        found |= {f"{name}_{axis}": values for name, values in figures.items()}
+    return Summary(info, found)

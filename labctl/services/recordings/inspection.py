@@ -1,0 +1,75 @@
+"""Inspection of a stored recording before it is fitted: warnings, range of its readings, coarse steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import DataRefused
+from labctl.recording import Recording
+from labctl.recording.sanity import Finding, Summary, findings_of, joined, steps_of, summarise
+from labctl.services.cache import cached
+from labctl.services.schemas.warnings import DataWarning, RecordingInspection
+from labctl.store import RecordingRow, Store
+
+
+def inspect_stored(store: Store, row: RecordingRow, recording: Recording | None = None) -> RecordingInspection:
+    """Return what an inspection of a recording finds; computed once for the readings that it holds now.
+
+    `recording` is the whole recording, where it is in memory already.
+    """
+    question = {"inspect": row.id, "readings": store.recordings.fingerprint(row.id, head=row)}
+    return cached(RecordingInspection, question, lambda: _inspected(store, row, recording))
+
+
+def _inspected(store: Store, row: RecordingRow, recording: Recording | None) -> RecordingInspection:
+    if recording is not None:
+        return _response(summarise(recording), recording)
+    points = store.recordings.points(row.id, head=row)
+    if row.kind != "samples":
+        return _response(summarise(points), points)
+    info = points.info.model_copy(update={"kind": "samples"})
+    parts = [summarise(Recording(info, columns)) for _, columns in store.recordings.iter_datasets(row.id)]
+    return _response(joined(info, parts), points)
+
+
+def _response(summary: Summary, recording: Recording) -> RecordingInspection:
+    if len(summary) == 0:
+        nothing: list[Any] = []
+        return RecordingInspection(
+            warnings=[], dataset=nothing, rate_low_dps=nothing, rate_high_dps=nothing, temperature_low_c=nothing,
+            temperature_high_c=nothing, position=nothing, quantisation_dps={},
+        )  # fmt: skip
+    coarse = {axis: steps_of(summary, axis) for axis in summary.info.axes}
+    return RecordingInspection(
+        warnings=[warning_of(finding) for finding in findings_of(summary, recording.environment)],
+        dataset=summary["dataset"].tolist(),
+        rate_low_dps=summary["rate_low_dps"].tolist(),
+        rate_high_dps=summary["rate_high_dps"].tolist(),
+        temperature_low_c=_numbers(summary["temperature_low_c"]),
+        temperature_high_c=_numbers(summary["temperature_high_c"]),
+        position=[str(position) for position in summary["position"]],
+        quantisation_dps={axis: u.tolist() for axis, (step, u) in coarse.items() if step is not None},
+    )
+
+
+def _numbers(values: NDArray[np.float64]) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def warning_of(finding: Finding) -> DataWarning:
+    """Return a finding as a response."""
+    return DataWarning.model_validate(finding.to_json())
+
+
+INSIST = "; to do it all the same: --accept-warnings"
+
+
+def refuse_wrong(warnings: list[DataWarning], what: str, *, accepted: bool, insist: str = INSIST) -> None:
+    """Raise DataRefused for the first certain warning, unless it is accepted; `what` would be done."""
+    sure = [warning for warning in warnings if warning.severity == "certain"]
+    if sure and not accepted:
+        more = f" (and {len(sure) - 1} more)" if len(sure) > 1 else ""
+        raise DataRefused(f"{what} is refused: {sure[0].text}{more}{insist}")

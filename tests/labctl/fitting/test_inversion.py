@@ -1,0 +1,45 @@
+"""Inversion of a forward law: a root where there is one, an error where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from labctl.fitting.models.inversion import NotConverged, invert
+
+OUTPUTS = {"z": np.array([-200.0, -3.0, 0.5, 150.0])}
+
+
+def law(gain: float, bias: float = 0.0):  # type: ignore[no-untyped-def]
+    return lambda rates, axis: (gain - 1.0) * rates[axis] + bias
+
+
+@pytest.mark.parametrize("gain", [0.55, 1.0, 1.02, 1.9, 16384.0])
+def test_a_gain_is_inverted(gain: float) -> None:
+    assert invert(OUTPUTS, law(gain, 0.2), "m")["z"] == pytest.approx((OUTPUTS["z"] - 0.2) / gain, abs=1e-9)
+
+
+def test_a_steep_flank_is_inverted_by_bisection() -> None:
+    def flank(rates: Mapping[str, np.ndarray], axis: str) -> np.ndarray:
+        return 3.0 * np.tanh(20.0 * (rates[axis] - 1.0))
+
+    found = invert(OUTPUTS, flank, "m")["z"]
+    assert found + flank({"z": found}, "z") == pytest.approx(OUTPUTS["z"], abs=1e-8)
+
+
+@pytest.mark.parametrize("gain", [0.0, 0.01745, -1.0, 0.3, 1e-3])
+def test_where_no_rate_near_an_output_has_it_nothing_is_returned(gain: float) -> None:
+    outputs = {"z": np.array([-200.0, -150.0, 100.0, 150.0])}
+    with pytest.raises(NotConverged, match="could not be inverted") as error:
+        invert(outputs, law(gain), "yang2018")
+    assert "\n" not in str(error.value)
+
+
+def test_outputs_that_are_no_numbers_stay_so_beside_the_others() -> None:
+    outputs = {"z": np.array([np.nan, 10.0]), "x": np.array([1.0, 2.0])}
+    found = invert(outputs, law(1.1), "m")
+    assert np.isnan(found["z"][0])
+    assert found["z"][1] == pytest.approx(10 / 1.1)
+    assert found["x"] == pytest.approx(outputs["x"] / 1.1)

@@ -1,0 +1,149 @@
+"""Wrong data are said at import, refused by fit and improve, and stand before a criticism's verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labctl.fitting import ErrorFigures
+from labctl.recording import Recording, to_points, write_recording
+from labctl.services.calibrations.comparison import worse_than_before, worse_than_raw
+from tests.helpers.lab import Lab
+from tests.helpers.recordings import Triaxial
+from tests.helpers.service import open_client
+from tests.helpers.simulated_recordings import single_axis
+from tests.helpers.spoilt import at_one_dataset, exchanged, quantised, scaled, spoilt, wrong_rate
+
+FOG = "FOG-0001"
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Lab:
+    return Lab(tmp_path)
+
+
+@pytest.fixture
+def brought_in(lab: Lab) -> Callable[[Recording], list[dict[str, object]]]:
+    """Import a recording and return the warnings of the answer."""
+
+    def bring(recording: Recording) -> list[dict[str, object]]:
+        folder = lab.folder / f"in-{len(list(lab.folder.iterdir()))}"
+        write_recording(recording, folder)
+        return lab.json("import", str(folder))["warnings"]  # type: ignore[no-any-return]
+
+    return bring
+
+
+def test_good_data_have_no_warning_anywhere(lab: Lab, brought_in: Callable[[Recording], list[object]]) -> None:
+    assert brought_in(single_axis(1)) == []
+    assert lab.json("fit", FOG, "--model", "ojeda2000")["warnings"] == []
+    found = lab.json("criticise", FOG)
+    assert found["warnings"] == []
+    assert found["text"][0] == "Nothing is missing: what is left is noise."
+    assert lab.json("improve", FOG, "--add", "scale_factor_asymmetry")["warnings"] == []
+
+
+def test_certainly_wrong_data_are_refused_in_one_line_unless_accepted(
+    lab: Lab, brought_in: Callable[[Recording], list[dict[str, object]]]
+) -> None:
+    (warning,) = brought_in(spoilt(single_axis(1), at_one_dataset(80.0, wrong_rate)))
+    assert (warning["what"], warning["severity"]) == ("one_data_set", "certain")
+    before = lab.content()
+    refused = lab.run("fit", FOG, "--model", "ojeda2000", status=2).stderr
+    assert refused.count("\n") == 1
+    assert "data set 65, axis z: its rate is 60 deg/s, its output says 79.8" in refused
+    assert "--accept-warnings" in refused
+    assert lab.content() == before
+    accepted = lab.json("fit", FOG, "--model", "ojeda2000", "--accept-warnings")
+    assert [each["what"] for each in accepted["warnings"]] == ["one_data_set"]
+    found = lab.json("criticise", FOG)
+    assert found["text"][0].startswith("The data are wrong: data set 65")
+    assert found["warnings"] == accepted["warnings"]
+    assert "improve" not in lab.run("improve", FOG, "--add", "scale_factor_odd", status=2).stdout
+    lab.run("improve", FOG, "--add", "scale_factor_odd", "--accept-warnings")
+
+
+def test_probably_wrong_data_are_fitted_with_a_loud_warning(
+    lab: Lab, brought_in: Callable[[Recording], list[dict[str, object]]]
+) -> None:
+    (warning,) = brought_in(spoilt(single_axis(1), quantised(5.0)))
+    assert (warning["what"], warning["severity"]) == ("quantised", "likely")
+    printed = lab.run("fit", FOG, "--model", "ojeda2000").stdout
+    assert printed.startswith("check: axis z")
+    assert "steps of 5 deg/s" in printed
+    found = lab.json("criticise", FOG)
+    assert found["verdict"] == "adequate"
+    assert found["text"][0].startswith("Check the data: axis z")
+
+
+def test_a_criticism_that_cannot_be_computed_says_the_data_first(
+    lab: Lab, brought_in: Callable[[Recording], list[dict[str, object]]]
+) -> None:
+    brought_in(spoilt(single_axis(1), scaled(-1.0, "gyro_z")))
+    lab.run("fit", FOG, "--model", "ojeda2000", "--accept-warnings")
+    refused = lab.run("criticise", FOG, status=2).stderr
+    assert "is refused: axis z: the output falls when the table turns faster" in refused
+
+
+def test_exchanged_axes_are_refused_and_have_no_inverse(
+    lab: Lab, brought_in: Callable[[Recording], list[dict[str, object]]]
+) -> None:
+    brought_in(spoilt(Triaxial(1).campaign(1), exchanged("gyro_x", "gyro_y")))
+    assert "exchange columns gyro_x and gyro_y" in lab.run("fit", "SIM-1", "--model", "yang2018", status=2).stderr
+    forced = lab.run("fit", "SIM-1", "--model", "yang2018", "--accept-warnings", status=2).stderr
+    assert "could not be inverted" in forced
+
+
+def test_over_http_the_refusal_is_a_problem_document(tmp_path: Path) -> None:
+    folder = tmp_path / "wrong"
+    write_recording(spoilt(to_points(single_axis(1)), scaled(np.pi / 180, "gyro_z")), folder)
+    with open_client(tmp_path / "lab.sqlite") as client:
+        files = [("files", (path.name, path.read_bytes())) for path in sorted(folder.iterdir())]
+        assert client.post("/api/recordings", files=files).json()["warnings"][0]["what"] == "unit"
+        path = f"/api/units/{FOG}/calibrations"
+        refused = client.post(path, json={"model": "ojeda2000"})
+        assert refused.status_code == 422
+        assert refused.json()["type"].endswith("data-refused")
+        assert "near pi/180" in refused.json()["detail"]
+        made = client.post(path, json={"model": "ojeda2000", "accept_warnings": True})
+        assert made.status_code == 201
+        assert made.json()["warnings"][0]["do"].startswith("correct the unit")
+        assert client.get(f"{path}/1").json()["warnings"] == made.json()["warnings"]
+
+
+def test_validity_of_a_stored_recording_is_that_of_its_readings(
+    lab: Lab, brought_in: Callable[[Recording], list[dict[str, object]]]
+) -> None:
+    recording = single_axis(1)
+    brought_in(recording)
+    warm = recording.columns["temperature_c"]
+    for answer in (
+        lab.json("fit", FOG, "--model", "ojeda2000"),
+        lab.json("improve", FOG, "--add", "scale_factor_asymmetry"),
+    ):
+        assert answer["validity"]["temperature_c"] == pytest.approx([warm.min(), warm.max()])
+    bias = lab.json("fit", FOG, "--effects", "bias,bias_temperature")
+    assert bias["validity"]["rate_dps"] == [None, None]
+    assert "any rate" in lab.run("fit", FOG, "--effects", "bias").stdout
+
+
+def figures(raw: float, left: float, held_out: float | None = None) -> ErrorFigures:
+    return ErrorFigures(raw, left, held_out, None)
+
+
+def test_a_fit_that_is_worse_than_none_is_certainly_wrong() -> None:
+    assert worse_than_raw(figures(2.0, 1.99)) == []
+    (little,) = worse_than_raw(figures(2.0, 2.01))
+    (much,) = worse_than_raw(figures(104.9, 109.4))
+    assert (little.severity, much.severity) == ("likely", "certain")
+    assert "leaves 109.4 deg/s RMS" in much.text
+
+
+def test_a_change_that_makes_held_out_temperatures_worse_is_said() -> None:
+    assert worse_than_before(figures(1, 0.036, 0.036), figures(1, 0.03, 0.037)) == []
+    (worse,) = worse_than_before(figures(1, 0.036, 0.036), figures(1, 0.03, 0.134))
+    assert worse.severity == "likely"
+    assert "held-out RMS error rises from 0.036 to 0.134 deg/s" in worse.text
