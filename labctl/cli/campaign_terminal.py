@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 from labctl.cli.error_reporting import ending_is_an_interrupt
 from labctl.cli.output import stderr
@@ -17,8 +17,12 @@ def campaign_terminal(*, quiet: bool) -> OpenTerminal:
 
     @contextmanager
     def opened() -> Iterator[CampaignTerminal]:
-        with ending_is_an_interrupt(), CampaignProgress(quiet=quiet) as progress:
-            yield CampaignTerminal(progress.update, TerminalOperator().answer_prompts, _say)
+        with (
+            ending_is_an_interrupt(),
+            closing(TerminalOperator()) as operator,
+            CampaignProgress(quiet=quiet) as progress,
+        ):
+            yield CampaignTerminal(progress.update, operator.answer_prompts, _say)
 
     return opened
 

@@ -54,7 +54,8 @@ def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse
     try:
         engine.run(prepared.start_at, prepared.restart)
     except KeyboardInterrupt as interrupt:
-        raise Stopped(_stopped(store, prepared, engine)) from interrupt
+        with ignore_signals():  # a second one must not take away what is to be said
+            raise Stopped(_stopped(store, prepared, engine)) from interrupt
     finally:
         with ignore_signals(), closing(prepared.bench):
             if engine.complaints:  # said in its event already, unless that could not be written

@@ -32,18 +32,20 @@ EXAMPLES_EACH, SEED = 10, 1
 
 @pytest.fixture(scope="module")
 def application(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """The API of a house with a unit, a recording and a calibration in force, and with a bench."""
+    """The API of a service with a unit, a recording and a calibration in force, and with a bench."""
     store = Store(Database(str(tmp_path_factory.mktemp("api") / "lab.sqlite"), write=True))
     lab_service = LabService(store, VirtualClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
     lab_service.execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
     lab_service.execute(FIT, ToUnit(UNIT, FitRequest(effects=["bias", "scale_factor"])))
     lab_service.execute(CERTIFY, ToVersion(UNIT, 1, CertifyRequest(by="A", reason="B")))
-    yield create_app(lab_service)
+    made = create_app(lab_service)
+    assert schema["/health"]["GET"].Case().call(app=made).status_code == 200  # begins the event loop that all share
+    yield made
     schemathesis.python.asgi.shutdown_lifespans()
 
 
-#: The description needs no house. The application that is asked is made later, and given with every call.
-schema = schemathesis.openapi.from_dict(create_app(None).openapi(), config=schemathesis.Config(seed=SEED))  # type: ignore[arg-type]
+#: The description needs no service. The application that is asked is made later, and given with every call.
+schema = schemathesis.openapi.from_dict(create_app(None).openapi(), config=schemathesis.Config(seed=SEED))
 schema.app = create_app
 
 

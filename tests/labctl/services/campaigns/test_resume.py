@@ -25,7 +25,7 @@ from labctl.services.schemas.campaigns import ResumeRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control
-from studies import crash_recovery, faults, process_kill
+from studies import crash_recovery, faults
 from studies.crashable_process import all_readings, complete_data_sets
 
 
@@ -58,13 +58,6 @@ def test_the_faults_drawn_are_of_every_kind_in_every_instrument() -> None:
     assert {each.url.partition("/")[2] for _, each in drawn} == {
         url.partition("/")[2] for bench in faults.benches() for url in faults.addresses(bench).values()
     }
-
-
-@pytest.mark.timeout(300)
-def test_a_real_process_is_killed_over_pty_and_tcp_and_its_heir_finishes(tmp_path: Path) -> None:
-    with process_kill.simulators(tmp_path) as bench:
-        heir = process_kill.kill_once(tmp_path, bench, 8.0)
-    assert heir.well, heir
 
 
 def stopped(store: Store, after: str, **changes: Any) -> Any:
