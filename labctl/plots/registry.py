@@ -33,9 +33,10 @@ class _Kind:
 KINDS = (
     _Kind(
         "map", "Where the model fails, in rate and temperature",
-        "Every measured cell: the mean residual of its data sets over the noise floor; red is too much, blue too "
-        "little, the same scale in all maps. Data sets share a cell where rate and temperature repeat within 0.1 % and "
-        "0.25 K. Dimmed cells are less than two floors from zero: by themselves they mean nothing. A "
+        "Each cell is the mean residual of its data sets over the noise floor, and every measured cell is drawn; red "
+        "is too much, blue too little, the same scale in all maps. Data sets share a cell where rate and temperature "
+        "repeat within 0.1 % and 0.25 K. Dimmed cells are less than two floors from zero: by themselves they mean "
+        "nothing. A "
         "column that is coloured from top to bottom depends on the rate, a row on the temperature, one corner on both.",
         residual_maps.maps,
     ),

@@ -6,7 +6,7 @@ import { h } from "../../core/elements.js";
 import { figure } from "../../core/figure.js";
 import { number, plainNumber } from "../../core/format.js";
 import { ownRows, rms, span } from "./rows.js";
-import { sceneLayout, twoScenes } from "./scenes.js";
+import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
 
 /** More temperature levels than this are dots without lines. */
 const MOST_LINES = 24;
@@ -17,7 +17,7 @@ export function fullTurn(comparison, state) {
   if (!here.length) return h("p", { class: "muted" }, `No data set of this recording turns the axis at ${comparison.least_turn_rate_dps} deg/s or more, or none is at rest.`);
   const rows = Object.fromEntries(Object.entries(own).map(([name, values]) => [name, here.map((k) => values[k])]));
   const draw = () => {
-    const colours = temperatureColours(rows.temperature_c, { x: 1 });
+    const colours = temperatureColours(rows.temperature_c, barPlace());
     const titles = [["turn_before_deg", "before: static bias off only"], ["turn_after_deg", "after the calibration"]].map(([name, title]) => `${title}, RMS ${number(rms(rows[name]), 2)} deg`);
     const axes = { x: ["rate, deg/s", span(rows.rate)], y: ["deg C", span(rows.temperature_c)], z: ["deg per turn", span([...rows.turn_before_deg, ...rows.turn_after_deg])] };
     return {

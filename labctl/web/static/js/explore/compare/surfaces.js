@@ -3,7 +3,7 @@
 import { colour, figure } from "../../core/figure.js";
 import { alongRate, linesOf, ownRows, positionsOf, rms, span } from "./rows.js";
 import { number } from "../../core/format.js";
-import { sceneLayout, twoScenes } from "./scenes.js";
+import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
 
 const SCALE = "Viridis";
 
@@ -17,7 +17,7 @@ export function surfaces(comparison, state) {
     const axes = { x: ["rate, deg/s", span(rows.rate)], y: ["deg C", span(rows.temperature_c)], z: ["error, deg/s", reach] };
     return {
       data: [
-        ...lines.map((each, k) => ({ type: "surface", name: "model", scene: "scene", ...shared, showscale: k === 0, colorbar: { title: { text: "deg/s" }, thickness: 12 }, opacity: 0.85, x: alongRate(each)[0], y: each.level, z: each.error_dps, hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>modelled %{z:.4g} deg/s<extra></extra>" })),
+        ...lines.map((each, k) => ({ type: "surface", name: "model", scene: "scene", ...shared, showscale: k === 0, colorbar: { title: { text: "deg/s" }, thickness: 12, outlinewidth: 0, ...barPlace() }, opacity: 0.85, x: alongRate(each)[0], y: each.level, z: each.error_dps, hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>modelled %{z:.4g} deg/s<extra></extra>" })),
         dots(rows, "measured_error_dps", "measured", "scene"),
         residualSurface(rows, shared),
         dots(rows, "residual_dps", "what remains", "scene2"),
