@@ -10,6 +10,7 @@ from labctl.actor import actor
 from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
+from labctl.fitting.uncertainty import evidence_of
 from labctl.services.commands.protocol import CertifyRequest, FitRequest
 from labctl.services.recordings.transfer import newest_row, points_of
 from labctl.services.schemas.answers import CalibrationRow, CertificationResponse, FitResponse, VersionResponse
@@ -34,6 +35,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
     recording, campaign = row.id, row.campaign
     source = points_of(store, row)
     result = fit(source, request.model, request.effects)
+    evidence = evidence_of(source, request.model, request.effects)
     made = {
         "recording": recording,
         "campaign": campaign,
@@ -43,7 +45,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
-            source.info, result, version=version, parent=None, issued_at=at, provenance=made
+            source.info, result, version=version, parent=None, issued_at=at, provenance=made, evidence=evidence
         )
         answer = {"serial": serial, "version": version, **result.to_json(), **made, "hash": calibration.hash}
         return NewCalibration(
