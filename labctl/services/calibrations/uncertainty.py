@@ -4,42 +4,10 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from pydantic import Field
-
 from labctl.calibration import Calibration, read_calibration
 from labctl.fitting.uncertainty import COVERAGE, AxisEvidence, RateUncertainty, rate_uncertainty
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.calibrations import AxisUncertainty, UncertaintyResponse
 from labctl.store import Store
-
-
-class AxisUncertainty(ResponseModel):
-    """One axis, deg/s."""
-
-    coefficients_dps: float | None = Field(
-        description="Standard uncertainty from the coefficients' covariance; null: they state none."
-    )
-    model_dps: float | None = Field(
-        description="Error of the model and drift near this rate and temperature, by held-out data sets; null: unknown."
-    )
-    repeatability_dps: float | None = Field(description="From one power-on to the next; null: unknown.")
-    repeatability_source: str = Field(description="Between runs, data sheet, static record, or none.")
-    same_run_dps: float | None = Field(
-        description="Coefficients and model combined: without another power-on; null where one is unknown."
-    )
-    combined_dps: float | None = Field(description="All three combined; null where one of them is unknown.")
-    expanded_dps: float | None = Field(description="Combined, times the coverage factor.")
-
-
-class UncertaintyResponse(ResponseModel):
-    """The uncertainty of a corrected rate on later days; the noise of a single reading comes on top."""
-
-    serial: str
-    version: int
-    rate_dps: float
-    temperature_c: float
-    coverage_factor: float
-    inside: bool = Field(description="Whether rate and temperature are within what was calibrated.")
-    axes: dict[str, AxisUncertainty]
 
 
 def uncertainty_at(

@@ -17,7 +17,7 @@ from labctl.fitting.criticism import (
     worst_data_sets,
 )
 from labctl.fitting.effects import CATALOGUE, kind_of
-from labctl.services.schemas.answers import CriticismResponse
+from labctl.services.schemas.criticism import CriticismResponse
 
 
 def answer_of(
