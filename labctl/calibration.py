@@ -16,6 +16,7 @@ from typing import Any
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
 from labctl.fitting.models.paper_units import in_paper_units
+from labctl.fitting.uncertainty import AxisEvidence
 from labctl.recording import OutputUnit, RecordingInfo
 
 SCHEMA = "labctl-calibration/1"
@@ -92,8 +93,12 @@ def build_calibration(
     parent: int | None,
     issued_at: datetime,
     provenance: Mapping[str, Any],
+    evidence: Mapping[str, AxisEvidence] | None = None,
 ) -> Calibration:
-    """Make the document of a fit. What belongs to bench, fixture or environment is left out, and named."""
+    """Make the document of a fit. What belongs to bench, fixture or environment is left out, and named.
+
+    `evidence`, by axis, is what the uncertainty in use is computed from; without it that is unknown.
+    """
     exported, left_out = result.fitted.exported()
     document: dict[str, Any] = {
         "schema": SCHEMA,
@@ -113,6 +118,7 @@ def build_calibration(
         "noise": dict(result.noise),
         "environment": dict(result.environment),
         "validity": {"temperature_c": list(result.temperature_c), "rate_dps": list(result.rate_dps)},
+        "use": {axis: one.to_json() for axis, one in (evidence or {}).items()},
         "provenance": dict(provenance),
         "how_to_use": (
             "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' "

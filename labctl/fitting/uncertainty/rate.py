@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.uncertainty.use import AxisEvidence, combined_dps
 
 #: Coverage factor of the expanded uncertainty: about 95 % for a normal distribution (GUM 6.2).
 COVERAGE = 2.0
@@ -24,10 +26,13 @@ STEP_DPS = 0.01
 class RateUncertainty:
     """Uncertainties of one axis' corrected rate, deg/s; the noise of a single reading is not included."""
 
-    coefficients_dps: float  #: standard, of the coefficients, propagated through the inverted law (GUM 5.2)
-    model_dps: float | None  #: standard, held-out temperatures beyond the noise floor; None where either is unknown
-    combined_dps: float  #: root of the sum of squares
-    expanded_dps: float  #: combined, times the coverage factor
+    coefficients_dps: float | None  #: standard, of the coefficients, through the inverted law (GUM 5.2); None: unknown
+    model_dps: float | None  #: standard, error of the model and drift near there, by held-out data sets; None: unknown
+    repeatability_dps: float | None  #: standard, from one power-on to the next; None: unknown
+    repeatability_source: str  #: "between runs", "data sheet", "static record" or "none"
+    same_run_dps: float | None  #: of coefficients and model alone: without another power-on
+    combined_dps: float | None  #: root of the sum of squares, wider where few runs say it; None where one is unknown
+    expanded_dps: float | None  #: combined, times the coverage factor
 
 
 def rate_uncertainty(
@@ -35,13 +40,13 @@ def rate_uncertainty(
     rate_dps: float,
     temperature_c: float,
     *,
-    heldout_rms_dps: float | None,
-    noise_floor_dps: float | None,
+    evidence: Mapping[str, AxisEvidence],
     name: str,
 ) -> dict[str, RateUncertainty]:
     """Return axis -> the uncertainty of a corrected rate of `rate_dps` about that axis, the other axes at rest.
 
-    `heldout_rms_dps` and `noise_floor_dps` are the calibration's error figures; `name` identifies it in messages.
+    It holds for use on later days. `evidence` is what the calibration's recording shows by axis (`use_evidence`); an
+    axis without it is uncertain by an unknown amount. `name` identifies the calibration in messages.
     Raises BadInput for a number that no gyro measures, and where the model needs more than rate and temperature;
     NotEnoughData where the coefficients have no uncertainty.
     """
@@ -57,21 +62,35 @@ def rate_uncertainty(
         raise NotEnoughData(
             f"{name} has as many coefficients as data sets: nothing is left to be uncertain by; measure more data sets"
         )
-    beyond = _beyond_floor(heldout_rms_dps, noise_floor_dps)
-    return {axis: _of_axis(fitted, axis, rate_dps, temperature_c, beyond) for axis in fitted.axes}
-
-
-def _beyond_floor(heldout_rms_dps: float | None, noise_floor_dps: float | None) -> float | None:
-    """Return the part of the held-out error that is not noise, deg/s."""
-    if heldout_rms_dps is None or noise_floor_dps is None:
-        return None
-    return math.sqrt(max(heldout_rms_dps**2 - noise_floor_dps**2, 0.0))
+    return {axis: _of_axis(fitted, axis, rate_dps, temperature_c, evidence.get(axis)) for axis in fitted.axes}
 
 
 def _of_axis(
-    fitted: FittedModel, axis: str, rate_dps: float, temperature_c: float, beyond: float | None
+    fitted: FittedModel, axis: str, rate_dps: float, temperature_c: float, evidence: AxisEvidence | None
 ) -> RateUncertainty:
+    coefficients = _of_coefficients(fitted, axis, rate_dps, temperature_c)
+    beyond = evidence.model_error.at(rate_dps, temperature_c) if evidence else None
+    repeatability = evidence.repeatability if evidence else None
+    later = repeatability.u_dps if repeatability else None
+    same_run, combined = combined_dps(coefficients, beyond), combined_dps(coefficients, beyond, later)
+    if combined is not None and repeatability is not None:
+        combined *= repeatability.widening(same_run or 0.0)
+    return RateUncertainty(
+        coefficients,
+        beyond,
+        later,
+        repeatability.source if repeatability else "none",
+        same_run,
+        combined,
+        None if combined is None else COVERAGE * combined,
+    )
+
+
+def _of_coefficients(fitted: FittedModel, axis: str, rate_dps: float, temperature_c: float) -> float | None:
+    """Return the standard uncertainty from the coefficients, deg/s; None for published ones, which state none."""
     fit = fitted.axes[axis]
+    if not np.any(fit.covariance):
+        return None
     basis = fitted.model.temperature.basis(np.array([temperature_c]))[0]
     here = _channels(axis, np.array([rate_dps, rate_dps + STEP_DPS]), temperature_c)
     slope = float(np.diff(fitted.error_dps(here, axis))[0] / STEP_DPS) if fitted.model.argument == "rate" else 0.0
@@ -82,9 +101,7 @@ def _of_axis(
             for name, at in zip(fit.names, fit.values, strict=True)
         ]
     )
-    coefficients = math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0)) / abs(1.0 + slope)
-    combined = math.hypot(coefficients, beyond or 0.0)
-    return RateUncertainty(coefficients, beyond, combined, COVERAGE * combined)
+    return math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0)) / abs(1.0 + slope)
 
 
 def _channels(axis: str, rates_dps: Array, temperature_c: float) -> Channels:

@@ -9,6 +9,7 @@ from typing import Any
 from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
+from labctl.fitting.uncertainty import evidence_of
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.recordings.coverage import covered_of
@@ -47,6 +48,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
     result = fit(source, request.model, request.effects, covered=covered)
     warnings = [*found.warnings, *map(warning_of, worse_than_raw(result.error))]
     refuse_wrong(warnings, f"fit of recording {recording} of {serial}", accepted=request.accept_warnings)
+    evidence = evidence_of(source, request.model, request.effects)
     made = {
         "recording": recording,
         "campaign": campaign,
@@ -56,7 +58,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
-            source.info, result, version=version, parent=None, issued_at=at, provenance=made
+            source.info, result, version=version, parent=None, issued_at=at, provenance=made, evidence=evidence
         )
         answer = {"serial": serial, "version": version, **result.to_json(), **made, "hash": calibration.hash}
         answer["warnings"] = [warning.model_dump() for warning in warnings]

@@ -19,6 +19,7 @@ from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_fo
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
+from labctl.fitting.uncertainty import use_evidence
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
@@ -169,10 +170,11 @@ def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
 def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitResponse:
     parent, after = change.row.version, change.after
     made = {"recording": change.recording.id, "improved_from": parent}
+    evidence = use_evidence(fit_data_of(change.points), changed(after.fitted.model))
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
-            change.points.info, after, version=version, parent=parent, issued_at=at, provenance=made
+            change.points.info, after, version=version, parent=parent, issued_at=at, provenance=made, evidence=evidence
         )
         answer = {
             "serial": serial, "version": version, "parent": parent, **change.figures,

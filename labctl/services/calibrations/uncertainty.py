@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from labctl.calibration import Calibration, read_calibration
-from labctl.fitting.uncertainty import COVERAGE, RateUncertainty, rate_uncertainty
+from labctl.fitting.uncertainty import COVERAGE, AxisEvidence, RateUncertainty, rate_uncertainty
 from labctl.services.schemas.calibrations import AxisUncertainty, UncertaintyResponse
 from labctl.store import Store
 
@@ -30,13 +30,11 @@ def uncertainty_at(
 
 def uncertainty_of(calibration: Calibration, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
     """Return axis -> the uncertainty of a calibration's corrected rate. Raises BadInput, NotEnoughData."""
-    error = calibration.document["error"]
     return rate_uncertainty(
         calibration.fitted,
         rate_dps,
         temperature_c,
-        heldout_rms_dps=error.get("heldout_rms_dps"),
-        noise_floor_dps=error.get("noise_floor_dps"),
+        evidence={axis: AxisEvidence.from_json(one) for axis, one in calibration.document.get("use", {}).items()},
         name=f"{calibration.serial} version {calibration.version}",
     )
 

@@ -195,16 +195,23 @@ class SurfaceResponse(ResponseModel):
 class AxisUncertainty(ResponseModel):
     """One axis, deg/s."""
 
-    coefficients_dps: float = Field(description="Standard uncertainty from the coefficients' covariance.")
-    model_dps: float | None = Field(
-        description="What held-out temperatures show beyond the noise floor; null: unknown."
+    coefficients_dps: float | None = Field(
+        description="Standard uncertainty from the coefficients' covariance; null: they state none."
     )
-    combined_dps: float
-    expanded_dps: float = Field(description="Combined, times the coverage factor.")
+    model_dps: float | None = Field(
+        description="Error of the model and drift near this rate and temperature, by held-out data sets; null: unknown."
+    )
+    repeatability_dps: float | None = Field(description="From one power-on to the next; null: unknown.")
+    repeatability_source: str = Field(description="Between runs, data sheet, static record, or none.")
+    same_run_dps: float | None = Field(
+        description="Coefficients and model combined: without another power-on; null where one is unknown."
+    )
+    combined_dps: float | None = Field(description="All three combined; null where one of them is unknown.")
+    expanded_dps: float | None = Field(description="Combined, times the coverage factor.")
 
 
 class UncertaintyResponse(ResponseModel):
-    """The uncertainty of a corrected rate; the noise of a single reading comes on top."""
+    """The uncertainty of a corrected rate on later days; the noise of a single reading comes on top."""
 
     serial: str
     version: int

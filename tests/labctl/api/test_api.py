@@ -44,7 +44,10 @@ def test_uncertainty_criticism_improve_and_ladder(fog: TestClient) -> None:
     path = "/api/units/OSU-FOG-2024/calibrations/1"
     here = fog.get(f"{path}/uncertainty", params={"rate_dps": 50, "temperature_c": 40}).json()
     assert here["inside"] is True
-    assert 0 < here["axes"]["z"]["combined_dps"] < here["axes"]["z"]["expanded_dps"] < 0.5
+    along = here["axes"]["z"]
+    assert 0 < along["coefficients_dps"] < along["same_run_dps"] < 0.2
+    assert along["repeatability_source"] == "none"  # one power-on and no data sheet: unknown for later days, not 0
+    assert along["repeatability_dps"] is along["combined_dps"] is along["expanded_dps"] is None
     assert fog.get(f"{path}/uncertainty", params={"rate_dps": 50, "temperature_c": 400}).json()["inside"] is False
     assert fog.get(f"{path}/uncertainty", params={"rate_dps": "nan", "temperature_c": 40}).status_code == 400
     criticism = fog.get(f"{path}/criticism").json()

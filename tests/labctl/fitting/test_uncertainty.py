@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -14,8 +15,11 @@ from labctl.calibration import Calibration, build_calibration
 from labctl.errors import BadInput
 from labctl.fitting import FittedModel, fit
 from labctl.fitting.data.channels import Channels
-from labctl.recording import Recording
+from labctl.fitting.uncertainty import AxisEvidence, RateUncertainty, evidence_of, rate_uncertainty
+from labctl.recording import Recording, read_recording
 from labctl.services.calibrations.uncertainty import is_inside, uncertainty_of
+from tests.helpers.paths import EXAMPLES
+from tests.helpers.recordings import points
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 NOISE_DPS = 0.01
@@ -25,9 +29,15 @@ def calibrated(make_points: Callable[..., Recording], grid: Any, model: str) -> 
     rate, warm = grid
     noise = np.random.default_rng(5).normal(0, NOISE_DPS, len(rate))
     output = rate * (1.2 + 1e-3 * (warm - 35)) + 0.3 + 0.01 * (warm - 35) + noise
-    recording = make_points(rate, warm, output)
+    recording = make_points(rate, warm, output, datasheet={"bias_stability_dps": 2 * NOISE_DPS})
     return build_calibration(
-        recording.info, fit(recording, model), version=1, parent=None, issued_at=AT, provenance={"recording": 1}
+        recording.info,
+        fit(recording, model),
+        version=1,
+        parent=None,
+        issued_at=AT,
+        provenance={"recording": 1},
+        evidence=evidence_of(recording, model, None),
     )
 
 
@@ -64,7 +74,10 @@ def test_it_is_the_spread_of_what_drawn_coefficients_give(
 def test_it_grows_outside_and_says_so(make_points: Callable[..., Recording], grid_11_by_11: Any) -> None:
     calibration = calibrated(make_points, grid_11_by_11, "ojeda2000")
     inside, outside = (uncertainty_of(calibration, 0.0, warm)["z"] for warm in (35.0, 80.0))
-    assert outside.combined_dps > 3 * inside.combined_dps
+    assert inside.coefficients_dps is not None
+    assert inside.combined_dps is not None
+    assert outside.coefficients_dps > 3 * inside.coefficients_dps
+    assert outside.model_dps is outside.expanded_dps is None  # nothing was measured near there
     assert is_inside(calibration, 0.0, 35.0)
     assert not is_inside(calibration, 0.0, 80.0)
     assert inside.expanded_dps == pytest.approx(2 * inside.combined_dps)
@@ -77,3 +90,73 @@ def test_a_number_that_is_none_is_refused(
     calibration = calibrated(make_points, grid_11_by_11, "bias_scale")
     with pytest.raises(BadInput, match="must be a number between"):
         uncertainty_of(calibration, rate, warm)
+
+
+def campaign(misfit: float = 0.0, shifts: tuple[float, ...] = (0.0,), **info: Any) -> Recording:
+    """Return two passes over 11 rates and 9 temperatures per run, with a cubic of the rate of `misfit` deg/s."""
+    rng = np.random.default_rng(3)
+    rate, warm = np.tile(np.linspace(-100, 100, 11), 18), np.tile(np.repeat(np.linspace(0, 40, 9), 11), 2)
+    n, runs = len(rate), len(shifts)
+    error = 0.1 + 1e-3 * rate + 2e-3 * warm + misfit * (rate / 100) ** 3
+    made = points(np.tile(rate, runs), np.tile(warm, runs), np.tile(rate + error, runs), **info)
+    noise = rng.normal(0, 1e-3, n * runs) + np.repeat(shifts, n)
+    columns = {
+        **made.columns, "gyro_z": made.columns["gyro_z"] + noise, "run": np.repeat(np.arange(1, runs + 1), n),
+        "gyro_z_std": np.full(n * runs, 1e-2), "n": np.full(n * runs, 100),
+    }  # fmt: skip
+    return Recording(made.info, columns)
+
+
+STRAIGHT = ["bias", "bias_temperature:1", "scale_factor"]
+
+
+def of_use(recording: Recording, rate: float, warm: float) -> RateUncertainty:
+    evidence = evidence_of(recording, None, STRAIGHT)
+    again = {axis: AxisEvidence.from_json(json.loads(json.dumps(one.to_json()))) for axis, one in evidence.items()}
+    return rate_uncertainty(fit(recording, effects=STRAIGHT).fitted, rate, warm, evidence=again, name="unit")["z"]
+
+
+@pytest.mark.parametrize("rate", [-100.0, -50.0, 60.0, 100.0])
+def test_an_error_that_only_the_rate_shows_is_promised_where_it_is(rate: float) -> None:
+    """Leaving out temperatures cannot see it: U was 0 there and a quarter of the error."""
+    recording = campaign(misfit=0.1)
+    fitted = fit(recording, effects=STRAIGHT).fitted
+    left = 0.1 * (rate / 100) ** 3 - (fitted.axes["z"].values[2, 0] - 1e-3) * rate
+    found = of_use(recording, rate, 20.0)
+    assert found.model_dps is not None
+    assert 0.5 * abs(left) < found.model_dps < 3 * max(abs(left), 0.01)
+
+
+def test_a_model_that_is_adequate_is_promised_little_more_than_its_coefficients() -> None:
+    found = of_use(campaign(), 40.0, 20.0)
+    assert found.model_dps is not None
+    assert 0 < found.model_dps < 7e-4
+
+
+def test_the_scatter_between_runs_is_repeatability_and_not_the_models() -> None:
+    found = of_use(campaign(shifts=(0.02, -0.02, 0.01)), 40.0, 20.0)
+    assert found.repeatability_source == "between runs"
+    assert found.repeatability_dps == pytest.approx(0.0208 * np.sqrt(4 / 3), rel=0.1)
+    assert found.combined_dps == pytest.approx(found.repeatability_dps * 4.53 / 2, rel=0.02)  # two degrees of freedom
+    assert found.model_dps is not None
+    assert found.model_dps < 2e-3
+
+
+def test_what_is_not_known_is_none_and_never_zero() -> None:
+    one_run = of_use(campaign(), 0.0, 20.0)
+    assert one_run.same_run_dps is not None
+    assert one_run.repeatability_dps is one_run.combined_dps is one_run.expanded_dps is None
+    by_sheet = of_use(campaign(datasheet={"bias_stability_dps": 0.01}), 0.0, 20.0)
+    assert by_sheet.repeatability_dps == pytest.approx(0.005 * np.sqrt(2))
+    assert by_sheet.expanded_dps is not None
+    far = of_use(campaign(datasheet={"bias_stability_dps": 0.01}), 0.0, 90.0)
+    assert far.model_dps is far.expanded_dps is None
+
+
+def test_a_table_of_coefficients_is_uncertain_by_an_unknown_amount() -> None:
+    table = read_recording(EXAMPLES / "weiss-gyrostar")
+    found = rate_uncertainty(
+        fit(table, "weiss1995").fitted, 50.0, 25.0, evidence=evidence_of(table, "weiss1995", None), name="table"
+    )
+    for one in found.values():
+        assert one.coefficients_dps is one.model_dps is one.combined_dps is one.expanded_dps is None

@@ -1,0 +1,54 @@
+"""Error of a model near one rate and temperature: the variance that it leaves beyond the readings' own noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from labctl.fitting.numeric.arrays import Array
+
+#: Width of the neighbourhood, as a share of the range of rates and of temperatures (standard deviation of the weight).
+NEAR_SHARE = 0.12
+#: Data sets, weighted, that a neighbourhood needs.
+LEAST_NEAR = 3.0
+#: Farther than this many widths from every data set nothing is known.
+FARTHEST = 2.0
+#: Of the scatter of the estimate itself this much is the least that is claimed: an error as large would not be seen.
+LEAST_SHARE = 0.25
+
+
+@dataclass(frozen=True)
+class LocalModelError:
+    """Data sets of one axis, (m,) each: where they were, the variance left there, and that of the readings' noise."""
+
+    rate_dps: Array
+    temperature_c: Array
+    left_var: Array  #: (deg/s)^2, NaN where it is not known
+    white_var: Array  #: (deg/s)^2
+
+    def at(self, rate_dps: float, temperature_c: float) -> float | None:
+        """Return the standard error of the model there, deg/s, drift of the campaign included; None if unknown."""
+        known = np.isfinite(self.left_var)
+        if not known.any():
+            return None
+        away = np.hypot(_scaled(self.rate_dps, rate_dps), _scaled(self.temperature_c, temperature_c))[known]
+        if away.min() > FARTHEST:
+            return None
+        weight = np.exp(-0.5 * away**2)
+        near = float(weight.sum() ** 2 / (weight**2).sum())
+        if near < LEAST_NEAR:
+            return None
+        weight /= weight.sum()
+        left = float(weight @ self.left_var[known])
+        noise = float(weight @ self.white_var[known])
+        unseen = LEAST_SHARE * np.sqrt(2 / near) * max(left, noise)
+        return float(np.sqrt(max(left - noise, unseen)))
+
+
+def _scaled(values: Array, at: float) -> Array:
+    """Return distances from a place in widths of the neighbourhood, (m,); 0 along what was not varied."""
+    width = NEAR_SHARE * float(np.ptp(values))
+    if width == 0:
+        return np.zeros(len(values))
+    return np.asarray((values - at) / width)

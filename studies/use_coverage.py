@@ -1,0 +1,134 @@
+"""Coverage of the uncertainty that a calibration promises for use: errors on a later day against U (k = 2).
+
+Simulated units, each with its own laws of temperature and rate, are calibrated in three powered runs, or in one with a
+data sheet, by models that are adequate and by models that are not; on a later day, after another power-on and with
+another drift, the corrected rate is held against the truth in the middle, at the edges and at a corner of the range.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.estimation.fit import fit_preset
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.presets import preset_for
+from labctl.fitting.uncertainty import rate_uncertainty, use_evidence
+from labctl.recording import Recording, RecordingInfo
+
+UNITS = 200
+RATES = np.array([-100, -80, -60, -40, -20, 0, 20, 40, 60, 80, 100], dtype=np.float64)
+WARM_C = np.arange(-20.0, 61.0, 10.0)
+WHITE_DPS, DRIFT_DPS, DRIFT_TAU_S, TURN_ON_DPS = 3e-4, 1e-3, 1800.0, 2e-3
+ADEQUATE = ("bias", "bias_temperature:3", "scale_factor", "scale_factor_temperature:2", "scale_factor_odd")
+#: What the model leaves out of the unit's law.
+MODELS = {
+    "adequate": ADEQUATE,
+    "no cubic of rate": ADEQUATE[:-1],
+    "bias a parabola": ("bias", "bias_temperature:2", *ADEQUATE[2:]),
+    "scale factor constant": (*ADEQUATE[:3], ADEQUATE[-1]),
+}
+PLACES = {"middle": (30.0, 15.0), "cold": (10.0, -20.0), "warm": (-50.0, 60.0), "fastest": (100.0, 25.0),
+          "corner": (-100.0, 60.0), "rest": (0.0, 5.0), "between": (70.0, 38.0)}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One unit's law: output minus rate, deg/s."""
+
+    size: NDArray[np.float64]  #: (7,) of its terms
+
+    @staticmethod
+    def drawn(rng: np.random.Generator) -> Unit:
+        return Unit(rng.normal(size=7) * np.array([0.1, 0.05, 0.02, 5e-3, 1e-3, 1e-4, 1.5e-4]))
+
+    def error_dps(self, rate: NDArray[np.float64], warm: NDArray[np.float64]) -> NDArray[np.float64]:
+        u, w = (warm - 20.0) / 40.0, rate / 100.0
+        b0, b1, b2, b3, s0, s1, c3 = self.size
+        return np.asarray(
+            b0 + b1 * u + b2 * u**2 + b3 * u**3 + 100 * w * (s0 + s1 * u + 0.5 * s1 * u**2) + 100 * c3 * w**3
+        )
+
+
+def drift(t_s: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return an Ornstein-Uhlenbeck drift at rising times, deg/s."""
+    found = np.empty(len(t_s))
+    value, before = rng.normal(), t_s[0]
+    for i, now in enumerate(t_s):
+        kept = np.exp(-(now - before) / DRIFT_TAU_S)
+        value, before = kept * value + np.sqrt(1 - kept**2) * rng.normal(), now
+        found[i] = value * DRIFT_DPS
+    return found
+
+
+def campaign(unit: Unit, runs: int, rng: np.random.Generator) -> Recording:
+    """Return means of one minute over all temperatures and rates, the temperatures shared among powered runs."""
+    parts = []
+    for run in range(1, runs + 1):
+        levels = WARM_C[(run - 1) % runs :: runs] if runs > 1 else WARM_C
+        warm = np.repeat(levels, len(RATES)) + rng.normal(0, 0.02, len(levels) * len(RATES))
+        rate = np.concatenate([rng.permutation(RATES) for _ in levels])
+        t_s = 75.0 * np.arange(len(rate)) + 5400.0 * np.repeat(np.arange(len(levels)), len(RATES)) + 1e6 * run
+        noise = rng.normal(0, WHITE_DPS, len(rate)) + drift(t_s, rng) + rng.normal(0, TURN_ON_DPS)
+        parts.append((t_s, np.full(len(rate), run), rate, warm, rate + unit.error_dps(rate, warm) + noise))
+    t_s, number, rate, warm, output = (np.concatenate(column) for column in zip(*parts, strict=True))
+    n = len(rate)
+    columns = {
+        "dataset": np.arange(1, n + 1), "t_s": t_s, "run": number, "position": np.full(n, "z"), "table_rate_dps": rate,
+        "temperature_c": warm, "gyro_z": output, "gyro_z_std": np.full(n, 10 * WHITE_DPS), "n": np.full(n, 100),
+    }  # fmt: skip
+    sheet = {"bias_stability_dps": 2 * float(np.hypot(TURN_ON_DPS, 0.0))}
+    info = RecordingInfo(serial="USE", axes=("z",), kind="points", started_at=datetime(2026, 1, 5, tzinfo=UTC))
+    return Recording(info.model_copy(update={"datasheet": sheet}), columns)
+
+
+def scores(seed: int) -> dict[tuple[str, str], list[float]]:
+    """Return (model and runs, place) -> errors on later days over U / 2, of one unit."""
+    rng = np.random.default_rng(seed)
+    unit, found = Unit.drawn(rng), defaultdict(list)
+    for runs in (3, 1):
+        data = fit_data_of(campaign(unit, runs, rng))
+        later = rng.normal(0, TURN_ON_DPS) + rng.normal(0, DRIFT_DPS)
+        for name, effects in MODELS.items():
+            preset = preset_for(None, list(effects))
+            fitted, evidence = fit_preset(data, preset).fitted, use_evidence(data, preset)
+            for place, (rate, warm) in PLACES.items():
+                output = np.array([rate]) + unit.error_dps(np.array([rate]), np.array([warm])) + later
+                corrected = _corrected(fitted, output, warm)
+                claimed = rate_uncertainty(fitted, rate, warm, evidence=evidence, name="unit")["z"].combined_dps
+                assert claimed is not None
+                found[f"{name}, {runs} run{'s' * (runs > 1)}", place].append((corrected - rate) / claimed)
+    return dict(found)
+
+
+def _corrected(fitted: FittedModel, output: NDArray[np.float64], warm: float) -> float:
+    columns = {"temperature_c": np.array([warm]), "table_rate_dps": output, "position": np.array(["z"])}
+    return float(fitted.compensate({"z": output}, Channels(columns, {"z": output}))["z"][0])
+
+
+def run(units: int = UNITS) -> str:
+    """Return the share of errors within U, by model and place."""
+    pooled: dict[tuple[str, str], list[float]] = defaultdict(list)
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        for found in pool.map(scores, range(1, units + 1), chunksize=5):
+            for key, values in found.items():
+                pooled[key] += values
+    head = " | ".join([f"{units} units: within U (k = 2), %", *PLACES, "all"])
+    lines = [f"| {head} |", "| --- " * (len(PLACES) + 2) + "|"]
+    for row in [*sorted({model for model, _ in pooled}), "all"]:
+        chosen = {key: values for key, values in pooled.items() if row in {key[0], "all"}}
+        cells = [_share(chosen, (place,)) for place in PLACES]
+        lines.append(f"| {row} | " + " | ".join([*cells, _share(chosen, tuple(PLACES))]) + " |")
+    return "\n".join(lines)
+
+
+def _share(found: dict[tuple[str, str], list[float]], places: tuple[str, ...]) -> str:
+    scores_of = np.concatenate([values for (_, place), values in found.items() if place in places])
+    return f"{100 * np.mean(np.abs(scores_of) <= 2):.1f}"

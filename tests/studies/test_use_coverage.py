@@ -1,0 +1,15 @@
+"""The study of the uncertainty in use: every place has a score, and the scores are of order one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from studies.use_coverage import MODELS, PLACES, scores
+
+
+def test_a_unit_is_scored_at_every_place_by_every_model_with_one_run_and_with_three() -> None:
+    found = scores(1)
+    assert len(found) == 2 * len(MODELS) * len(PLACES)
+    values = np.abs([value for values in found.values() for value in values])
+    assert np.all(np.isfinite(values))
+    assert 0.05 < np.median(values) < 3
