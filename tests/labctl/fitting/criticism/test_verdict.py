@@ -1,4 +1,4 @@
-"""What a verdict may not say: a second name for a remainder, an unphysical one, one that predicts worse, one too sure."""
+"""What a verdict may not say: a second name for a remainder, an unphysical one, one that predicts worse."""
 
 from __future__ import annotations
 
