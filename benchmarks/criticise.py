@@ -11,7 +11,8 @@ import time
 from pathlib import Path
 
 from benchmarks.machine import describe
-from labctl.services.campaigns.execution import StartRequest, run_here
+from labctl.services.campaigns.execution import run_here
+from labctl.services.schemas.campaigns import StartRequest
 
 #: Limits that the project has set itself.
 LIMITS = {"triaxial_first_s": 20.0, "triaxial_again_s": 2.0, "single_axis_first_s": 2.0, "memory_gib": 2.0}

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock, SystemClock
-from instruments.drivers.arrick_c4 import ArrickC4
-from instruments.drivers.gyrostar import Gyrostar
-from instruments.drivers.kvh import KVH_DSP3000, KVH_RD2100, KvhGyro
-from instruments.drivers.stim300 import Stim300
+from instruments.drivers.registry import CHAMBERS, GYROS, TABLES
 from instruments.drivers.unit_handlers import ManualUnitHandler, RemoteUnitHandler
-from instruments.drivers.watlow_f4 import WatlowF4
-from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.errors import InstrumentError
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
@@ -23,15 +17,6 @@ from instruments.interfaces.table import RateTable
 from instruments.interfaces.unit_handler import UnitHandler
 from instruments.simulation import Simulation, open_simulation, simulated_links, simulated_unit_handler
 from instruments.transport.factory import Ports
-
-TABLES: dict[str, Callable[..., RateTable]] = {"arrick-c4": ArrickC4}
-CHAMBERS: dict[str, Callable[..., Chamber]] = {"watlow-f4": WatlowF4, "watlow-f4t": WatlowF4T}
-GYROS: dict[str, Callable[..., Gyro]] = {
-    "kvh-dsp3000": partial(KvhGyro, model=KVH_DSP3000),
-    "kvh-rd2100": partial(KvhGyro, model=KVH_RD2100),
-    "stim300": Stim300,
-    "gyrostar": Gyrostar,
-}
 
 
 @dataclass(frozen=True)

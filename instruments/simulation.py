@@ -39,7 +39,7 @@ class Simulation(Protocol):
 
 def open_simulation(bench: BenchFile, clock: Clock) -> Simulation:
     """Return the simulated instruments of a bench; raises ValueError for an unknown profile, setting or effect."""
-    from instruments.simulators.bench import SimulatedBench
+    from instruments.simulators.simulated_bench import SimulatedBench
 
     return SimulatedBench(bench, clock)
 

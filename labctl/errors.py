@@ -3,7 +3,6 @@
 LabctlError              exit 2, HTTP 400
 ├── BadInput             a file, an option or a request is wrong; nothing was changed
 │   ├── BadRecording     in a recording: names file, column, row and what was expected
-│   ├── BadRecipe        in a recipe or a plan
 │   ├── BadBench         in a bench file
 │   └── BadCalibrationFile   edited, truncated or of an unknown format
 ├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
@@ -39,12 +38,6 @@ class BadRecording(BadInput):
     """A recording is wrong; the text names file, column, row and what was expected."""
 
     slug = "bad-recording"
-
-
-class BadRecipe(BadInput):
-    """A recipe is wrong, or asks for what the bench or the unit cannot do."""
-
-    slug = "bad-recipe"
 
 
 class BadBench(BadInput):

@@ -12,7 +12,7 @@ from instruments.clock import VirtualClock
 from instruments.simulation import open_simulation
 from labctl.recording import Recording
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.simulation.walk import hidden_recording
+from labctl.services.simulation.plan_simulation import hidden_recording
 from procedures.planning.plan import Plan, make_plan
 
 #: name -> recipe, bench, readings per second, whether re-ordered

@@ -17,7 +17,7 @@ from instruments.simulation import open_simulation
 from labctl.fitting import fit
 from labctl.fitting.estimation.result import FitResult
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.simulation.walk import simulate
+from labctl.services.simulation.plan_simulation import simulate
 from procedures.planning.plan import make_plan
 
 SEEDS = 20

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from instruments.bench_config import BenchFile
 from labctl.services.campaigns import execution
-from labctl.services.campaigns.execution import prepare
-from labctl.services.campaigns.resume import ResumeRequest, prepare_resume
+from labctl.services.campaigns.preparation import prepare
+from labctl.services.campaigns.resume import prepare_resume
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import Store
 from studies.crashable_process import Killed, Life, MortalDatabase, World, all_readings, complete_data_sets
 

@@ -15,7 +15,7 @@ import numpy as np
 from instruments.simulation import hidden_defaults
 from labctl.fitting.criticism.effect_size import CLOSE
 from labctl.fitting.effects import CATALOGUE
-from labctl.services.simulation.sizing import Sizing
+from labctl.services.simulation.effect_sizes import Sizing
 from studies.campaigns import PROTOCOLS, protocol
 
 FILE = Path(__file__).with_name("effect_sizes.json")

@@ -18,7 +18,7 @@ from instruments.clock import VirtualClock
 from instruments.interfaces.gyro import Readings
 from instruments.simulation import Simulation, open_simulation
 from instruments.simulators.links.faults import FaultKind
-from labctl.services.campaigns import execution
+from labctl.services.campaigns import execution, preparation
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store, StoreJournal
 from labctl.store.connection.database import Database
@@ -164,7 +164,7 @@ def _campaign(seed: int, bench: BenchFile, armed: tuple[Armed, ...], folder: Pat
     store = Store(database)
     hung = False
     opened = open_bench(bench, clock, simulation)
-    prepared = execution.prepare(store, RECIPE, bench, clock, clip=False, opened=opened)
+    prepared = preparation.prepare(store, RECIPE, bench, clock, clip=False, opened=opened)
     journal = CountingJournal(database, prepared.id)
     store.campaigns.journal = lambda _: journal  # type: ignore[method-assign]  # what a study looks through
     for each in armed:

@@ -3,14 +3,20 @@
 import asyncio
 import os
 import shutil
-import signal
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
+from tests.helpers.leftovers import leftover_tasks, leftover_threads
+from tests.helpers.signal_defaults import default_signals
+
+#: The same examples every time and on every machine; a busy machine is slow, not wrong.
+settings.register_profile("labctl", derandomize=True, deadline=None, database=None)
+settings.load_profile("labctl")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
@@ -24,11 +30,18 @@ def cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPa
 
 @pytest.fixture(autouse=True)
 def signals() -> Iterator[None]:
-    """A command that was interrupted hears no signal any more until its process ends; the tests' process goes on."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    """Let each test begin with the default handlers; those that it leaves behind go."""
+    with default_signals():
+        yield
+
+
+@pytest.fixture(autouse=True)
+def nothing_left(signals: None) -> Iterator[None]:
+    """Fail a test that leaves a thread or an asyncio task of its own behind. Set up first, so looked at last."""
+    with leftover_threads() as threads, leftover_tasks() as tasks:
+        yield
+    assert not threads, f"threads that run on: {threads}"
+    assert not tasks, f"tasks that were cancelled with their loop: {tasks}"
 
 
 @pytest.fixture

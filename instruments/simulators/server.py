@@ -18,9 +18,9 @@ import tomli_w
 from instruments.bench_config import BenchFile, SimulationSettings, is_simulated_address
 from instruments.clock import Clock, ScaledClock
 from instruments.protocols.simulator_control import MOUNT, OK, POWER
-from instruments.simulators.bench import SimulatedBench
 from instruments.simulators.links.device import SimulatedDevice
 from instruments.simulators.links.real_ports import LOCALHOST, RealPorts
+from instruments.simulators.simulated_bench import SimulatedBench
 
 
 class SimulationServer:

@@ -9,10 +9,23 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from labctl import web
-from labctl.api import problems, swagger_ui, systemd
-from labctl.api.middleware import AccessMiddleware, AccessPolicy
-from labctl.api.routers import admin, calibrations, campaigns, health, plans, recordings, schedule, units
-from labctl.services.app import LabService
+from labctl.api import problems, systemd
+from labctl.api.access_policy import AccessPolicy
+from labctl.api.middleware import AccessMiddleware
+from labctl.api.routers import (
+    admin,
+    benches,
+    calibrations,
+    campaigns,
+    effects,
+    health,
+    plans,
+    recordings,
+    schedule,
+    swagger_ui,
+    units,
+)  # fmt: skip
+from labctl.services.lab_service import LabService
 
 DESCRIPTION = """
 Calibrations of gyroscopes by serial number, the campaigns that measured them, and the recordings behind them.
@@ -29,12 +42,16 @@ certifying and keys for an approver's.
 """
 
 
+#: In the order of the API's description.
+ROUTERS = (
+    health, units, benches, effects, calibrations, plans, campaigns, schedule, recordings, admin, swagger_ui,
+)  # fmt: skip
 #: The parser's own bound on parts of a form: a recording has at most three files.
 MOST_FILES = 4
 
 
 def create_app(service: LabService, access: AccessPolicy | None = None) -> FastAPI:
-    """Make the HTTP application of a house; closing the application closes the house, bench left safe."""
+    """Make the HTTP application of a service; closing the application closes the service, bench left safe."""
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -57,9 +74,8 @@ def create_app(service: LabService, access: AccessPolicy | None = None) -> FastA
     )
     app.state.service = service
     problems.install(app)
-    rooms = (health, units, calibrations, plans, campaigns, schedule, recordings, admin, swagger_ui)
-    for room in rooms:
-        app.include_router(room.router)
+    for each in ROUTERS:
+        app.include_router(each.router)
     web.install(app)
     app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy())
     return app

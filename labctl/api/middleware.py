@@ -1,52 +1,26 @@
-"""The door: every request is identified, its role weighed and its size bounded before anything else reads it."""
+"""Access middleware: identifies every request, checks its role and bounds its body before the application reads it."""
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
 from urllib.parse import unquote
 
-from fastapi import Depends, Request
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from labctl.actor import Actor, acting
+from labctl.api.access_policy import OPEN, READING, AccessPolicy, role_needed
 from labctl.api.problems import as_problem
 from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, TooLarge
-from labctl.services.admin.api_keys import Caller, Role, identify, require_role
-from labctl.services.app import LabService
+from labctl.services.admin.api_keys import identify, require_role
 from labctl.services.commands.remote import USER_HEADER
+from labctl.services.lab_service import LabService
+from labctl.services.schemas.admin import Caller, Role
 from labctl.web import is_page
-
-LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
-READING = frozenset({"GET", "HEAD", "OPTIONS"})
-#: Answered to anybody: a load balancer asks it.
-OPEN = frozenset({"/health"})
-#: Only asked by POST, because of what the question carries: nothing changes, so a viewer may.
-ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview")
-_ASKED = re.compile("|".join(re.sub(r"{\w+}", "[^/]+", path) for path in ASKING))
-UPLOAD = "/api/recordings"
-MIB = 1 << 20
-
-
-@dataclass(frozen=True)
-class AccessPolicy:
-    """Who may come in, and with how much.
-
-    Without keys the only callers are this machine's, so a request must have been sent to this machine by name: a page
-    of another origin that a browser here happens to show is not a caller. `hosts` are the names that are answered to;
-    None: any, for an application that nothing listens for.
-    """
-
-    keys: bool = False
-    hosts: frozenset[str] | None = None
-    body_bytes: int = MIB
-    upload_bytes: int = 2048 * MIB
 
 
 class AccessMiddleware:
-    """Wraps the application; what it refuses never reaches it."""
+    """Wraps the application; a refused request never reaches it."""
 
     def __init__(self, app: ASGIApp, service: LabService, access: AccessPolicy) -> None:
         self._app = app
@@ -54,17 +28,16 @@ class AccessMiddleware:
         self._access = access
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request in, or answer it with a problem document."""
-        if scope["type"] == "websocket":  # nothing here speaks it, and nobody would be asked for a key
+        """Pass a request on, or answer it with a problem document."""
+        if scope["type"] == "websocket":  # nothing here speaks it, and no key would be asked for
             await send({"type": "websocket.close", "code": 1008})
             return
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
         try:
-            caller = self._let_in(scope)
-            limit = self._access.upload_bytes if scope["path"] == UPLOAD else self._access.body_bytes
-            bounded = _bounded(receive, _declared(scope), limit)
+            caller = self._admit(scope)
+            bounded = _bounded(receive, _declared(scope), self._access.largest_body(scope["path"]))
         except LabctlError as error:
             await as_problem(error, scope["path"])(scope, receive, send)
             return
@@ -72,13 +45,13 @@ class AccessMiddleware:
         with acting(Actor(caller.name, caller.via) if caller else Actor("nobody")):
             await self._app(scope, bounded, send)
 
-    def _let_in(self, scope: Scope) -> Caller | None:
-        """Return who asks; None at a path that is open to anybody. Raises NotIdentified, NotAllowed, BadInput."""
+    def _admit(self, scope: Scope) -> Caller | None:
+        """Return the caller; None at a path that is open without a key. Raises NotIdentified, NotAllowed, BadInput."""
         if "\x00" in scope["path"] or b"%00" in scope["query_string"]:
             raise BadInput("the address holds a NUL character; nothing here has one in its name")
         try:
             caller = self._caller(scope)
-            require_role(caller, Role.VIEWER if _only_asks(scope) else Role.OPERATOR)
+            require_role(caller, role_needed(scope["method"], scope["path"]))
         except NotAllowed:
             if (scope["path"] in OPEN or is_page(scope["path"])) and scope["method"] in READING:
                 return None
@@ -91,12 +64,12 @@ class AccessMiddleware:
             return identify(self._service.store, authorization)
         if self._access.keys:
             raise NotIdentified("this service asks for a key: send `Authorization: Bearer KEY`")
-        self._refuse_strangers(scope["method"], headers)
+        self._refuse_foreign(scope["method"], headers)
         claimed = unquote(headers.get(USER_HEADER, ""))[:100]
         return Caller(claimed if claimed.isprintable() and claimed else "local", Role.APPROVER, "loopback")
 
-    def _refuse_strangers(self, method: str, headers: Headers) -> None:
-        """Raise NotAllowed for what did not start on this machine, though its last leg did."""
+    def _refuse_foreign(self, method: str, headers: Headers) -> None:
+        """Raise NotAllowed for a request that another site or machine sent through this one."""
         if self._access.hosts is None:
             return
         host = headers.get("host", "")
@@ -113,12 +86,6 @@ class AccessMiddleware:
             raise NotAllowed(f"a page of {origin} may not act here")
         if headers.get("sec-fetch-site", "none") not in {"none", "same-origin"}:
             raise NotAllowed("a page of another site may not act here")
-
-
-def _only_asks(scope: Scope) -> bool:
-    """Whether a request can change nothing."""
-    asked = scope["method"] == "POST" and _ASKED.fullmatch(scope["path"]) is not None
-    return asked or scope["method"] in READING
 
 
 def _name_of(host: str) -> str:
@@ -148,11 +115,3 @@ def _bounded(receive: Receive, declared: int, limit: int) -> Receive:
         return message
 
     return bounded
-
-
-def _approver(request: Request) -> None:
-    require_role(request.state.caller, Role.APPROVER)
-
-
-#: Of a route that asks for more than its method says; for `dependencies=[...]`.
-NEEDS_APPROVER = Depends(_approver)

@@ -25,7 +25,7 @@ def problem(status: int, slug: str, title: str, detail: str, instance: str) -> J
 
 
 def as_problem(error: LabctlError, path: str) -> JSONResponse:
-    """Make the problem document of an error of the house."""
+    """Make the problem document of a LabctlError."""
     answer = problem(error.status, error.slug, _title(type(error)), str(error), path)
     if isinstance(error, NotIdentified):
         answer.headers["WWW-Authenticate"] = 'Bearer realm="labctl"'
@@ -36,7 +36,7 @@ def _title(error: type[Exception]) -> str:
     return (error.__doc__ or error.__name__).split(";")[0].split(".")[0]
 
 
-def _of_the_house(request: Request, error: LabctlError) -> JSONResponse:
+def _of_labctl(request: Request, error: LabctlError) -> JSONResponse:
     return as_problem(error, request.url.path)
 
 
@@ -84,7 +84,7 @@ def _of_http(request: Request, error: HTTPException) -> JSONResponse:
 
 
 HANDLERS: Mapping[type[Exception], Callable[[Request, Any], JSONResponse]] = {
-    LabctlError: _of_the_house,
+    LabctlError: _of_labctl,
     InstrumentError: _of_an_instrument,
     ProcedureError: _of_a_procedure,
     RequestValidationError: _of_the_request,
@@ -96,6 +96,6 @@ HANDLERS: Mapping[type[Exception], Callable[[Request, Any], JSONResponse]] = {
 
 
 def install(app: FastAPI) -> None:
-    """Make every error of the house, and of the framework, leave as a problem document."""
+    """Answer every error, of labctl and of the framework, with a problem document."""
     for error, handler in HANDLERS.items():
         app.add_exception_handler(error, handler)

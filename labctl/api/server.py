@@ -13,15 +13,15 @@ import uvicorn
 
 from instruments.clock import Clock, WallClock
 from labctl.api import systemd
+from labctl.api.access_policy import LOOPBACK_NAMES, MIB, AccessPolicy
 from labctl.api.app import create_app
-from labctl.api.middleware import LOOPBACK_NAMES, MIB, AccessPolicy
 from labctl.config import default_database
 from labctl.errors import BadInput
 from labctl.services.admin.api_keys import require_an_api_key
-from labctl.services.app import LabService
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import clock_for
+from labctl.services.campaigns.preparation import clock_for
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database

@@ -1,4 +1,4 @@
-"""All commands under one roof."""
+"""The command line: every command under its name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,20 @@ from typing import Annotated
 import typer
 
 from labctl.actor import Actor, acting
-from labctl.cli import admin, bench, calibrations, campaign, campaign_control, criticism, recordings, server
+from labctl.cli.commands import (
+    audit,
+    bench,
+    calibrations,
+    campaign,
+    campaign_control,
+    criticism,
+    database,
+    effects,
+    keys,
+    recordings,
+    schedule,
+    server,
+)
 from labctl.cli.error_reporting import process_of_one_command
 from labctl.config import os_user
 
@@ -23,10 +36,11 @@ app = typer.Typer(
 )
 app.add_typer(bench.app, name="bench")
 app.add_typer(campaign.app, name="campaign")
+campaign.app.add_typer(schedule.app, name="schedule")
 campaign_control.add_to(campaign.app)
 app.add_typer(recordings.export_app, name="export")
-app.add_typer(admin.key_app, name="key")
-app.add_typer(admin.audit_app, name="audit")
+app.add_typer(keys.app, name="key")
+app.add_typer(audit.app, name="audit")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,
@@ -34,7 +48,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "simulate": recordings.simulate,
     "import": recordings.import_,
     "fit": calibrations.fit,
-    "effects": calibrations.effects,
+    "effects": effects.effects,
+    "verify": criticism.verify,
     "criticise": criticism.criticise,
     "improve": criticism.improve,
     "ladder": criticism.ladder,
@@ -42,8 +57,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "revoke": calibrations.revoke,
     "calibration": calibrations.calibration,
     "compensate": calibrations.compensate,
-    "backup": admin.backup,
-    "check": admin.check,
+    "backup": database.backup,
+    "check": database.check,
 }
 for name, command in COMMANDS.items():
     app.command(name)(command)

@@ -72,9 +72,11 @@ def _errors_as_lines() -> Iterator[None]:
         raise _exit(f"{error.filename or 'output'}: {error.strerror or error}; nothing was written there", 2) from error
     except KeyboardInterrupt as error:
         _ignore_signals()
-        # a second one, while what the first one stopped was being closed, changes nothing
-        stopped = error.__context__
-        raise _exit(str(stopped) if isinstance(stopped, Stopped) else "interrupted", 130) from None
+        # further ones, while what the first one stopped was being closed, change nothing
+        stopped: BaseException | None = error
+        while stopped is not None and not isinstance(stopped, Stopped):
+            stopped = stopped.__context__
+        raise _exit("interrupted" if stopped is None else str(stopped), 130) from None
 
 
 def _exit(text: str, status: int) -> typer.Exit:

@@ -16,6 +16,7 @@ BenchName = Annotated[
     str | None,
     typer.Option("--bench", metavar="FILE", help="Bench file, or the name of a bench that ships with labctl."),
 ]
+CampaignId = Annotated[int | None, typer.Argument(metavar="ID", help="Campaign; default: the newest.")]
 RecordingId = Annotated[
     int | None, typer.Option("--recording", metavar="ID", help="Recording; default: the unit's newest.")
 ]

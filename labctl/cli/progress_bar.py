@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from labctl.cli.output import stderr
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.answers import CampaignResponse
+    from labctl.services.schemas.campaigns import CampaignResponse
 
 
 class CampaignProgress:

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextvars import copy_context
 from typing import TYPE_CHECKING
 
-from instruments.clock import SystemClock
 from labctl.cli.output import stderr
 from labctl.config import os_user
 from labctl.errors import StoreError
@@ -25,6 +24,9 @@ LOOK_S = 0.5
 class TerminalOperator:
     """Prints each question and takes the next line for its answer: empty for done, anything else says why not."""
 
+    def __init__(self) -> None:
+        self._closed = threading.Event()
+
     def answer_prompts(self, operator: Operator, note: Callable[[str], None]) -> None:
         """Answer for an operator from now on, in the background; `note` is told of each answer.
 
@@ -35,13 +37,16 @@ class TerminalOperator:
             threading.Thread(target=here.run, args=(self._serve, operator, note), daemon=True).start()
 
     def _serve(self, operator: HumanOperator, note: Callable[[str], None]) -> None:
-        clock, asked = SystemClock(), ""
-        while True:
+        asked = ""
+        while not self._closed.wait(LOOK_S):
             prompt = operator.pending
             if prompt is not None and prompt.id != asked:
                 asked = prompt.id
                 self._put(operator, prompt, note)
-            clock.sleep(LOOK_S)
+
+    def close(self) -> None:
+        """Put no further question. One that waits for its line is left to the end of the process."""
+        self._closed.set()
 
     @staticmethod
     def _put(operator: HumanOperator, prompt: Prompt, note: Callable[[str], None]) -> None:

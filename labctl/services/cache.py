@@ -1,8 +1,7 @@
-"""Answers that take seconds, kept in the user's cache folder: nothing is worked out twice by the same code from the
-same readings.
+"""Result caches: files in the user's cache folder, and a few results in memory.
 
-A kept answer is named by all that it depends on, so it never has to be told that something changed; whatever is wrong
-with a file or a folder only costs the time to work the answer out again.
+A cached file is named by all that its result depends on, the code included, so it never has to be invalidated. A file
+or a folder that is damaged, missing or not writable only costs the time to compute the result again.
 """
 
 from __future__ import annotations
@@ -16,91 +15,145 @@ from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from typing import TypeVar
+from typing import Generic, TypeVar
 from weakref import WeakValueDictionary
+from zipfile import BadZipFile
 
 from platformdirs import user_cache_path
 
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.base import ResponseModel
 
-A = TypeVar("A", bound=ResponseModel)
-ROOMS = ("instruments", "labctl", "procedures")
+ResponseT = TypeVar("ResponseT", bound=ResponseModel)
+ResultT = TypeVar("ResultT")
+PACKAGES = ("instruments", "labctl", "procedures")
 LIBRARIES = ("numpy", "scipy")
-#: The oldest go when there are more; an answer has some 200 kB.
-MOST = 400
+#: What a damaged file raises while it is read.
+DAMAGED = (OSError, EOFError, ValueError, KeyError, BadZipFile)
 
 
-def cached(kind: type[A], question: Mapping[str, object], work: Callable[[], A]) -> A:
-    """Return the answer to a question (JSON values), worked out by `work` only when it is not kept yet."""
-    return cached_group(kind, question, lambda: [work()])
-
-
-def cached_group(kind: type[A], question: Mapping[str, object], work: Callable[[], Sequence[ResponseModel]]) -> A:
-    """Return the answer of one kind where one work gives answers of several: all of them are kept.
-
-    Whoever asks the same question meanwhile, also for another kind, waits for that work instead of doing it again.
-    """
-    file = _file(kind, question)
-    if (answer := _read(kind, file)) is not None:
-        return answer
-    with single_flight(json.dumps(question, sort_keys=True)):
-        if (answer := _read(kind, file)) is not None:
-            return answer
-        # What is kept is what is said, also the first time: one way through JSON, one answer.
-        said = {type(each): each.model_dump_json() for each in work()}
-        for each, text in said.items():
-            with suppress(OSError):
-                write_cached(_file(each, question), text.encode(), MOST)
-        return kind.model_validate_json(said[kind])
-
-
-def _file(kind: type[ResponseModel], question: Mapping[str, object]) -> Path:
-    asked = json.dumps({"by": code_digest(), "kind": kind.__name__, **question}, sort_keys=True)
-    return user_cache_path("labctl") / "answers" / f"{hashlib.sha256(asked.encode()).hexdigest()}.json"
-
-
-def _read(kind: type[A], file: Path) -> A | None:
-    with suppress(OSError, ValueError):
-        answer = kind.model_validate_json(file.read_bytes())
-        file.touch()
-        return answer
-    return None
-
-
-class _Turn:
-    """A lock that can be forgotten when nobody holds it."""
+class _Flight:
+    """A lock that is forgotten when no thread holds it."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
 
 
-_turns: WeakValueDictionary[str, _Turn] = WeakValueDictionary()
-_turns_guard = threading.Lock()
+_flights: WeakValueDictionary[str, _Flight] = WeakValueDictionary()
+_flights_guard = threading.Lock()
 
 
 @contextmanager
 def single_flight(asked: str) -> Iterator[None]:
     """Let one thread of this process at a time work at the same question."""
-    with _turns_guard:
-        turn = _turns.setdefault(asked, _Turn())
-    with turn.lock:
+    with _flights_guard:
+        flight = _flights.setdefault(asked, _Flight())
+    with flight.lock:
         yield
 
 
-def write_cached(file: Path, content: bytes, most: int) -> None:
-    """Write a file whole or not at all; of its folder's files only the `most` used last stay. Raises OSError."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with NamedTemporaryFile("wb", dir=file.parent, suffix=".part", delete=False) as part:
-        part.write(content)
-    Path(part.name).replace(file)
-    oldest_first = sorted(file.parent.iterdir(), key=lambda path: path.stat().st_mtime)
-    for old in oldest_first[:-most]:
-        old.unlink(missing_ok=True)
+class FileCache:
+    """Files of one kind in a folder of the user's cache; of them only the `most` used last stay."""
+
+    def __init__(self, folder: str, suffix: str, most: int) -> None:
+        self._folder, self._suffix, self.most = folder, suffix, most
+
+    def file(self, question: Mapping[str, object]) -> Path:
+        """Return the file of the result of a question (JSON values), as the present code answers it."""
+        asked = json.dumps({"by": code_digest(), **question}, sort_keys=True)
+        name = hashlib.sha256(asked.encode()).hexdigest()
+        return user_cache_path("labctl") / self._folder / f"{name}{self._suffix}"
+
+    def load(self, file: Path, decode: Callable[[bytes], ResultT]) -> ResultT | None:
+        """Return what a file holds; None where it is missing or damaged."""
+        with suppress(*DAMAGED):
+            found = decode(file.read_bytes())
+            file.touch()
+            return found
+        return None
+
+    def save(self, file: Path, content: bytes) -> None:
+        """Write a file whole or not at all, and remove the oldest; nothing where the folder cannot be written."""
+        with suppress(OSError):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            with NamedTemporaryFile("wb", dir=file.parent, suffix=".part", delete=False) as part:
+                part.write(content)
+            Path(part.name).replace(file)
+            oldest_first = sorted(file.parent.iterdir(), key=lambda path: path.stat().st_mtime)
+            for old in oldest_first[: -self.most]:
+                old.unlink(missing_ok=True)
+
+    def get(
+        self, question: Mapping[str, object], decode: Callable[[bytes], ResultT], make: Callable[[], bytes]
+    ) -> ResultT:
+        """Return the result of a question, made only when it is not cached yet; other threads wait for it."""
+        file = self.file(question)
+        if (found := self.load(file, decode)) is not None:
+            return found
+        with single_flight(str(file)):
+            if (found := self.load(file, decode)) is not None:
+                return found
+            content = make()
+            self.save(file, content)
+        return decode(content)
+
+
+#: A response has some 200 kB.
+RESPONSES = FileCache("answers", ".json", most=400)
+
+
+def cached(kind: type[ResponseT], question: Mapping[str, object], work: Callable[[], ResponseT]) -> ResponseT:
+    """Return the response to a question (JSON values), computed by `work` only when it is not cached yet."""
+    return cached_group(kind, question, lambda: [work()])
+
+
+def cached_group(
+    kind: type[ResponseT], question: Mapping[str, object], work: Callable[[], Sequence[ResponseModel]]
+) -> ResponseT:
+    """Return the response of one kind where one work gives responses of several: all of them are cached.
+
+    A thread that asks the same question meanwhile, also for another kind, waits for that work.
+    """
+
+    def file(of: type[ResponseModel]) -> Path:
+        return RESPONSES.file({"kind": of.__name__, **question})
+
+    if (response := RESPONSES.load(file(kind), kind.model_validate_json)) is not None:
+        return response
+    with single_flight(json.dumps(question, sort_keys=True)):
+        if (response := RESPONSES.load(file(kind), kind.model_validate_json)) is not None:
+            return response
+        # A fresh response takes the same way through JSON as a cached one, so both are equal.
+        made = {type(each): each.model_dump_json() for each in work()}
+        for each, text in made.items():
+            RESPONSES.save(file(each), text.encode())
+        return kind.model_validate_json(made[kind])
+
+
+class RecentResults(Generic[ResultT]):
+    """The `most` results used last, in memory; for any number of threads."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._found: dict[str, ResultT] = {}
+        self._guard = threading.Lock()
+
+    def get(self, question: str, work: Callable[[], ResultT]) -> ResultT:
+        """Return the result of a question, computed once also when several threads ask at the same time."""
+        with single_flight(f"{id(self)} {question}"):  # a cached response may be computed from it: another flight
+            with self._guard:
+                found = self._found.pop(question, None)
+            if found is None:
+                found = work()
+            with self._guard:
+                self._found[question] = found
+                for old in list(self._found)[: -self._most]:
+                    del self._found[old]
+        return found
 
 
 @lru_cache(maxsize=1)
 def code_digest() -> str:
-    """Return a digest of the code that answers, and of the libraries it calculates with."""
+    """Return a digest of the code that computes results, and of the libraries it calculates with."""
     digest = hashlib.sha256(" ".join(version(name) for name in LIBRARIES).encode())
     for source in _sources():
         digest.update(source.read_bytes())
@@ -109,5 +162,5 @@ def code_digest() -> str:
 
 def _sources() -> Iterator[Path]:
     home = Path(__file__).resolve().parents[2]
-    for room in ROOMS:
-        yield from sorted((home / room).rglob("*.py"))
+    for package in PACKAGES:
+        yield from sorted((home / package).rglob("*.py"))

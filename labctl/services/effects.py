@@ -1,16 +1,18 @@
-"""The catalogue of effects and models, to read."""
+"""The catalogue of effects and models, and effects that a user wrote as formulas."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from labctl.errors import BadInput
 from labctl.fitting import describe_effects, describe_presets
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.data.temperature_history import TemperatureHistory
-from labctl.fitting.effects import CATALOGUE, Reference, Term
+from labctl.fitting.effects import CATALOGUE, Effect, Formula, Reference, Term, formulas
 from labctl.fitting.models.error_model import is_exported
 
 #: Sizes that are not told as a coefficient: how far the thermometer is off.
@@ -47,3 +49,21 @@ def _units() -> dict[str, str]:
         term = Term(name, None, {each.name: each.low for each in kind.parameters})
         found[name] = kind.columns(channels, "z", term, Reference())[0].unit
     return found | OTHER_UNITS
+
+
+def catalogue_with(written: Sequence[Formula]) -> dict[str, Effect]:
+    """Return the catalogue with formulas that compete in it. Raises BadInput for a name that it has."""
+    for each in written:
+        if each.id in CATALOGUE:
+            raise BadInput(f"formula {each.id!r}: the catalogue has an effect of that name; choose another")
+    return {**CATALOGUE, **{each.id: each for each in written}}
+
+
+def with_files(sources: list[str]) -> list[Formula]:
+    """Return formulas from lines `name: expression` and from files of this machine; raises BadInput."""
+    return [each for source in sources for each in formulas(source)]
+
+
+def as_lines(sources: list[str]) -> list[str]:
+    """Return formulas as lines `name: expression`, with those of files read here; raises BadInput."""
+    return [f"{each.id}: {each.text}" for each in with_files(sources)]

@@ -27,8 +27,9 @@ from labctl.store.records import (
 from labctl.store.repositories.audit import Audit, Broken, Head
 from labctl.store.repositories.benches import Benches, BenchRow
 from labctl.store.repositories.calibrations import Calibrations, NewCalibration
+from labctl.store.repositories.campaign_journal import StoreJournal
+from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
-from labctl.store.repositories.journal import StoreJournal
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.recordings import Recordings
@@ -45,6 +46,7 @@ __all__ = [
     "CalibrationRecord",
     "Calibrations",
     "CampaignRow",
+    "CampaignSummary",
     "Campaigns",
     "CertificationRow",
     "Checked",

@@ -12,6 +12,7 @@ from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
 from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
 from procedures.monitoring.bench_snapshot import ReadingCounts
+from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.recorder import warning
 
 LEAD_S = 0.5  #: streams are cleared this long before the gate opens
@@ -125,8 +126,8 @@ def _header(context: ExecutionContext, step: Acquire, spin: Spin, gate: tuple[fl
         step=step,
         rate_dps=spin.rate_dps,
         asked_dps=spin.asked_dps,
-        gate_from_s=gate[0] - context.recorder.start_s,
-        gate_until_s=gate[1] - context.recorder.start_s,
+        gate_from_s=context.recorder.time.of(gate[0]),
+        gate_until_s=context.recorder.time.of(gate[1]),
         angle_from_deg=float(spin.angle_deg(np.array([gate[0]]))[0]),
         setpoint_c=context.monitor.setpoint_c,
         run=step.run + context.added_runs,
@@ -159,20 +160,20 @@ def _read_round(
         readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
         if len(readings):
             context.monitor.add_readings(name, gyro, readings)
-        kept = cut(readings, gate, context.recorder.start_s)
+        kept = cut(readings, gate, context.recorder.time)
         if len(kept) or kept.lost or kept.damaged:
             counts[name].add(kept)
             context.recorder.journal.readings(number, name, kept, context.monitor.chamber_c)
 
 
-def cut(readings: Readings, gate: tuple[float, float], start_s: float) -> Readings:
+def cut(readings: Readings, gate: tuple[float, float], time: CampaignTime) -> Readings:
     """Return the readings inside the gate [from, until) with their times in campaign time; both in clock seconds."""
     t_s = readings.t_s
     if len(t_s) and gate[0] <= t_s[0] and t_s[-1] < gate[1]:
-        return Readings(t_s - start_s, readings.raw, readings.valid, readings.lost, readings.damaged)
+        return Readings(time.of(t_s), readings.raw, readings.valid, readings.lost, readings.damaged)
     inside = (t_s >= gate[0]) & (t_s < gate[1])
     raw = {channel: values[inside] for channel, values in readings.raw.items()}
-    return Readings(t_s[inside] - start_s, raw, readings.valid[inside], readings.lost, readings.damaged)
+    return Readings(time.of(t_s[inside]), raw, readings.valid[inside], readings.lost, readings.damaged)
 
 
 def _demand_readings(counts: dict[str, ReadingCounts]) -> None:

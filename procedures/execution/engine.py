@@ -15,6 +15,7 @@ from procedures.execution.context import ExecutionContext
 from procedures.execution.resume import Restart, take_up
 from procedures.execution.shutdown import Outcome, Shutdown
 from procedures.execution.step_executor import StepExecutor
+from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.guards import Guards
 from procedures.monitoring.monitor import BenchMonitor
 from procedures.monitoring.progress import Observer, Progress, ProgressTracker
@@ -26,9 +27,9 @@ from procedures.planning.plan import Plan
 class Engine:
     """One run of a plan on a bench.
 
-    `run` blocks until the campaign is over; `control` and `progress` are for other threads. Journal times are clock
-    seconds since `start_s` (default: the clock's time when `run` is called). Without `guards` the recipe's own rules
-    are held against the limits of the bench.
+    `run` blocks until the campaign is over; `control` and `progress` are for other threads. Journal times are
+    campaign time: that of `time` for a resumed campaign, else seconds since `run` was called. Without `guards` the
+    recipe's own rules are held against the limits of the bench.
     """
 
     def __init__(
@@ -42,13 +43,12 @@ class Engine:
         control: Control | None = None,
         *,
         observer: Observer | None = None,
-        start_s: float | None = None,
+        time: CampaignTime | None = None,
     ) -> None:
         self.plan = plan
         self.control = control or Control()
         self._tracker = ProgressTracker(plan, clock, observer)
-        self._recorder = CampaignRecorder(journal, clock, self._tracker, clock.now_s() if start_s is None else start_s)
-        self._start_is_now = start_s is None
+        self._recorder = CampaignRecorder(journal, clock, self._tracker, time or CampaignTime(clock))
         active = ActiveBench.of(bench)
         guards = guards or Guards(
             plan.recipe.guards, lambda: BenchLimits.of(bench), bench.chamber.name, bench.table.name
@@ -76,8 +76,7 @@ class Engine:
         What the bench, a guard or a person ends is an Outcome. Anything else (a failing journal, Ctrl-C, a mistake in
         the program) is raised again once the bench is safe.
         """
-        if self._start_is_now:
-            self._recorder.start_s = self._context.clock.now_s()
+        self._recorder.time.begin()
         state, reason = CampaignState.FAILED, "ended by an error of the program"
         try:
             self._begin(start_at, restart)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from instruments.interfaces.gyro import Channel, Gyro, Readings
+from procedures.monitoring.campaign_time import CampaignTime
 
 
 @dataclass(frozen=True)
@@ -28,10 +29,10 @@ class LiveOutput:
     def __init__(self) -> None:
         self._last: dict[str, tuple[tuple[Channel, ...], Readings, float]] = {}
 
-    def heard(self, name: str, gyro: Gyro, readings: Readings, start_s: float) -> None:
-        """Take in what a unit sent; `start_s` is the clock's time of campaign time 0."""
+    def heard(self, name: str, gyro: Gyro, readings: Readings, time: CampaignTime) -> None:
+        """Keep the readings that a unit sent, whose times are the clock's."""
         if len(readings):
-            self._last[name] = (tuple(gyro.channels), readings, float(readings.t_s[-1]) - start_s)
+            self._last[name] = (tuple(gyro.channels), readings, time.of(float(readings.t_s[-1])))
 
     def forget(self, name: str | None = None) -> None:
         """Take in that a unit, or every unit, sends nothing any more."""

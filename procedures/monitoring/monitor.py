@@ -114,7 +114,7 @@ class BenchMonitor:
     def add_readings(self, name: str, gyro: Gyro, readings: Readings) -> None:
         """Take in that a unit sent readings."""
         self.links.heard(name)
-        self._recorder.tracker.live.heard(name, gyro, readings, self._recorder.start_s)
+        self._recorder.tracker.live.heard(name, gyro, readings, self._recorder.time)
         if (temperature_c := gyro_temperature_c(gyro, readings)) is not None:
             self._gyro_c[name] = temperature_c
 

@@ -5,25 +5,23 @@ from __future__ import annotations
 from instruments.clock import Clock
 from procedures.contracts.journal import CampaignState, Event, Journal
 from procedures.contracts.steps import StepResult
+from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.progress import ProgressTracker
 
 
 class CampaignRecorder:
-    """Writes to the journal and updates the progress with every entry.
+    """Writes to the journal and updates the progress with every entry."""
 
-    Campaign time is clock seconds since `start_s`, the clock's reading when the campaign began.
-    """
-
-    def __init__(self, journal: Journal, clock: Clock, tracker: ProgressTracker, start_s: float) -> None:
+    def __init__(self, journal: Journal, clock: Clock, tracker: ProgressTracker, time: CampaignTime) -> None:
         self.journal = journal
         self.clock = clock
         self.tracker = tracker
-        self.start_s = start_s
+        self.time = time
         self.state = CampaignState.PLANNED
 
     def t_s(self) -> float:
-        """Return the present campaign time."""
-        return self.clock.now_s() - self.start_s
+        """Return the present campaign time in s."""
+        return self.time.now_s()
 
     def change_state(self, state: CampaignState, reason: str) -> None:
         """Record a change of the campaign's state."""

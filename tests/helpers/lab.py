@@ -27,9 +27,9 @@ class Lab:
         assert result.exit_code == status, result.output + result.stderr + repr(result.exception)
         return result
 
-    def json(self, *arguments: str) -> Any:
-        """Return the JSON document that a command prints with --json."""
-        return json.loads(self.run(*arguments, "--json").stdout)
+    def json(self, *arguments: str, status: int = 0) -> Any:
+        """Return the JSON document that a command prints with --json; it must end with this exit status."""
+        return json.loads(self.run(*arguments, "--json", status=status).stdout)
 
     def content(self) -> str:
         """Return a digest of every row of the database."""

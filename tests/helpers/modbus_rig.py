@@ -13,10 +13,10 @@ from instruments.clock import VirtualClock
 from instruments.drivers.gyrostar import Gyrostar
 from instruments.drivers.watlow_f4 import WatlowF4
 from instruments.drivers.watlow_f4t import WatlowF4T
-from instruments.simulators.bench import SimulatedBench
 from instruments.simulators.links.device import SimulatedDevice
 from instruments.simulators.links.factory import SimulatedLinks
 from instruments.simulators.links.faults import Faults
+from instruments.simulators.simulated_bench import SimulatedBench
 from instruments.transport.factory import Ports
 
 

@@ -11,8 +11,8 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.recording import Recording
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database

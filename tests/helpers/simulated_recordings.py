@@ -7,7 +7,7 @@ from typing import Any
 
 from labctl.recording import Recording
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.simulation.walk import hidden_recording
+from labctl.services.simulation.plan_simulation import hidden_recording
 from procedures.planning.plan import make_plan
 
 

@@ -37,7 +37,7 @@ def test_a_real_bench_does_not_load_the_simulators() -> None:
 
 
 def test_a_simulated_bench_does() -> None:
-    assert "instruments.simulators.bench" in loaded_by("single-axis-sim")
+    assert "instruments.simulators.simulated_bench" in loaded_by("single-axis-sim")
 
 
 def test_a_real_bench_has_no_simulation_and_needs_a_person() -> None:

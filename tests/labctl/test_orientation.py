@@ -133,7 +133,7 @@ def test_the_simulated_gyrostar_drifts_less_than_a_degree_a_minute() -> None:
     gyro = bench.gyros["gyrostar"]
     output = gyro.identify().output["z"]
     volts = gyro.channels[0]
-    bench.hand.power(on=True)
+    bench.unit_handler.power(on=True)
     gyro.start()
 
     def read(seconds: float) -> tuple[np.ndarray, np.ndarray]:

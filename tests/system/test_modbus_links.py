@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 
 import pytest
 
 from instruments.bench_config import BenchFile, read_bench
-from instruments.clock import Clock, ScaledClock
+from instruments.clock import Clock, ScaledClock, VirtualClock
 from instruments.drivers.gyrostar import Gyrostar
 from instruments.drivers.watlow_f4 import WatlowF4
 from instruments.drivers.watlow_f4t import WatlowF4T
-from instruments.errors import InstrumentError, LinkError
+from instruments.errors import InstrumentError, LinkError, NoReply
+from instruments.protocols.modbus_registers import Register
 from instruments.simulators.server import SimulationServer
 from instruments.transport.factory import Ports
+from instruments.transport.modbus import Registers
 
 SPEED = 10.0
+AIR = Register(100, "air temperature", "int16", "counts")
 
 
 @pytest.fixture
@@ -67,3 +71,22 @@ def test_an_f4t_and_an_adam_on_real_tcp(serve: Callable[[str], tuple[BenchFile, 
     finally:
         chamber.close()
         gyro.stop()
+
+
+def test_a_real_port_on_which_nobody_answers_is_silence_too() -> None:
+    ours, theirs = os.openpty()
+    try:
+        clock = VirtualClock()
+        port = os.ttyname(theirs)
+        registers = Registers(
+            "chamber",
+            1,
+            clock,
+            lambda: Ports(clock).modbus_rtu(port, device="chamber", baudrate=19200, timeout_s=1.0),
+        )
+        with pytest.raises(NoReply, match="no answer to read air temperature"):
+            registers.get(AIR)
+        registers.close()
+    finally:
+        os.close(ours)
+        os.close(theirs)

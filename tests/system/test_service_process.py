@@ -3,75 +3,35 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import socket
 import subprocess
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
-from instruments.clock import SystemClock
 from labctl.config import os_user
-from labctl.services.admin.api_keys import KeyRequest, Role, create_key
+from labctl.services.admin.api_keys import create_key
+from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import check, holder_of, open_store
 from tests.helpers.paths import EXAMPLES
+from tests.helpers.processes import WAIT_S, ServiceProcess, end_of, labctl, running
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
 
-class Service:
-    """`labctl serve` in a process of its own, and other commands beside it on the same database."""
-
-    def __init__(self, database: Path, *options: str) -> None:
-        self.database = database
-        command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json", *options]
-        self.process = subprocess.Popen(
-            self.command(*command), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        assert self.process.stdout is not None
-        self.url = json.loads(self.process.stdout.readline())["url"]
-        self.http = httpx.Client(base_url=self.url, timeout=30)
-
-    def command(self, *arguments: str) -> list[str]:
-        return [sys.executable, "-m", "labctl", *arguments, "--database", str(self.database)]
-
-    def run(self, *arguments: str, status: int = 0, key: str = "") -> Any:
-        environment = {**os.environ, "LABCTL_KEY": key}
-        done = subprocess.run(self.command(*arguments), capture_output=True, text=True, check=False, env=environment)
-        assert done.returncode == status, done.stderr
-        return done
-
-
-@contextmanager
-def running(database: Path, *options: str) -> Iterator[Service]:
-    made = Service(database, *options)
-    try:
-        yield made
-    finally:
-        made.http.close()
-        made.process.kill()
-        made.process.wait()
-        for stream in (made.process.stdout, made.process.stderr):
-            assert stream is not None
-            stream.close()
-
-
 @pytest.fixture
-def service(tmp_path: Path) -> Iterator[Service]:
+def service(tmp_path: Path) -> Iterator[ServiceProcess]:
     with running(tmp_path / "lab.sqlite") as made:
         yield made
 
 
-def test_commands_ask_the_service_that_holds_the_database(service: Service) -> None:
+def test_commands_ask_the_service_that_holds_the_database(service: ServiceProcess) -> None:
     assert json.loads(service.run("import", str(EXAMPLES / "osu-fog"), "--json").stdout)["datasets"] == 695
     fitted = json.loads(service.run("fit", "OSU-FOG-2024", "--model", "ojeda2000", "--json").stdout)
     assert fitted["version"] == 1
@@ -86,12 +46,12 @@ def test_commands_ask_the_service_that_holds_the_database(service: Service) -> N
     assert service.http.get("/api/units/OSU-FOG-2024/calibration").status_code == 404
 
 
-def test_a_second_service_is_refused_and_told_where_the_first_is(service: Service) -> None:
+def test_a_second_service_is_refused_and_told_where_the_first_is(service: ServiceProcess) -> None:
     refused = service.run("serve", "--port", "0", status=2)
     assert service.url in refused.stderr
 
 
-def test_a_campaign_is_aborted_from_the_command_line(service: Service) -> None:
+def test_a_campaign_is_aborted_from_the_command_line(service: ServiceProcess) -> None:
     campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
     busy = service.http.post("/api/campaigns", json={"recipe": "short"})
     assert busy.status_code == 409
@@ -104,9 +64,8 @@ def test_a_campaign_is_aborted_from_the_command_line(service: Service) -> None:
 
 def test_a_service_begins_what_was_entered_before_it_ran_and_while_it_runs(tmp_path: Path) -> None:
     database = tmp_path / "lab.sqlite"
-    command = [sys.executable, "-m", "labctl", "campaign", "start", "short", "--at", "now", "--json"]
-    bench = ["--bench", "single-axis-sim", "--database", str(database)]
-    before = json.loads(subprocess.run([*command, *bench], capture_output=True, text=True, check=True).stdout)
+    command = labctl(database, "campaign", "start", "short", "--at", "now", "--json", "--bench", "single-axis-sim")
+    before = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert (before["state"], "no service runs" in before["note"]) == ("waiting", True)
     with running(database) as service:
         assert begun(service, before["id"])["campaign"] == 1
@@ -117,7 +76,7 @@ def test_a_service_begins_what_was_entered_before_it_ran_and_while_it_runs(tmp_p
         assert begun(service, queued["id"])["campaign"] == 2
 
 
-def begun(service: Service, start: int) -> Any:
+def begun(service: ServiceProcess, start: int) -> Any:
     """Wait until an entry's first start was begun."""
     while True:
         history = service.http.get(f"/api/schedule/{start}").json()["history"]
@@ -126,7 +85,7 @@ def begun(service: Service, start: int) -> Any:
             return history[0]
 
 
-def test_sigterm_ends_the_campaign_in_the_safe_state(service: Service) -> None:
+def test_sigterm_ends_the_campaign_in_the_safe_state(service: ServiceProcess) -> None:
     campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
     service.process.send_signal(signal.SIGTERM)
     assert service.process.wait(timeout=60) in {0, -signal.SIGTERM}
@@ -135,15 +94,9 @@ def test_sigterm_ends_the_campaign_in_the_safe_state(service: Service) -> None:
     assert "the service stops" in answer["reason"]
 
 
-def state_of(service: Service, campaign: int) -> str:
-    with open_store(str(service.database), write=False) as store:
-        return store.campaigns.get(campaign).state
-
-
-def test_a_listener_does_not_keep_a_service_from_making_its_bench_safe(service: Service) -> None:
+def test_a_listener_does_not_keep_a_service_from_making_its_bench_safe(service: ServiceProcess) -> None:
     campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
-    with service.http.stream("GET", f"/api/campaigns/{campaign}/events") as stream:
-        told = stream.iter_lines()
+    with service.following(campaign) as told:
         next(told)
         service.process.send_signal(signal.SIGTERM)
         assert "event: state" in list(told)  # the stream ends by itself, with the campaign
@@ -156,25 +109,24 @@ def test_a_listener_does_not_keep_a_service_from_making_its_bench_safe(service: 
     assert (row.ended_at - row.started_at).total_seconds() < 0.5 * row.expected_s  # not at its own end
 
 
-def test_a_request_that_never_ends_does_not_either(service: Service) -> None:
+def test_a_request_that_never_ends_does_not_either(service: ServiceProcess) -> None:
     campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
     address = service.url.partition("://")[2]
     with socket.create_connection(("127.0.0.1", int(address.rpartition(":")[2]))) as stalled:
         body = "Content-Type: multipart/form-data; boundary=x\r\nContent-Length: 1000\r\n\r\n"
         stalled.sendall(f"POST /api/recordings HTTP/1.1\r\nHost: {address}\r\n{body}".encode())
         assert service.http.get("/health").status_code == 200  # by now it waits for that body
-        service.process.send_signal(signal.SIGTERM)
-        for _ in range(600):
-            if state_of(service, campaign) == "aborted":
-                break
-            SystemClock().sleep(0.1)  # another process has its own pace
-        assert state_of(service, campaign) == "aborted"
+        with service.following(campaign) as told:
+            next(told)
+            service.process.send_signal(signal.SIGTERM)
+            assert "event: state" in list(told)  # the stream ends with the campaign
+        assert end_of(service.database, campaign)[0] == "aborted"
         service.process.send_signal(signal.SIGINT)
         assert service.process.wait(timeout=60) == 0
     assert holder_of(str(service.database)) is None
 
 
-def test_a_page_that_a_browser_was_led_to_cannot_reach_the_service(service: Service) -> None:
+def test_a_page_that_a_browser_was_led_to_cannot_reach_the_service(service: ServiceProcess) -> None:
     assert service.http.get("/api/units").status_code == 200
     assert service.http.get("/api/units", headers={"Host": "evil.example"}).status_code == 403
     origin = {"Origin": "http://evil.example"}
@@ -182,7 +134,7 @@ def test_a_page_that_a_browser_was_led_to_cannot_reach_the_service(service: Serv
     assert service.http.head("/api/units/NOBODY/calibrations").status_code == 404
 
 
-def test_a_backup_of_a_database_that_a_service_holds(service: Service, tmp_path: Path) -> None:
+def test_a_backup_of_a_database_that_a_service_holds(service: ServiceProcess, tmp_path: Path) -> None:
     answer = json.loads(service.run("backup", str(tmp_path / "copy.sqlite"), "--json").stdout)
     assert (answer["noted"], answer["findings"]) == (True, [])
     (row,) = service.http.get("/api/audit").json()
@@ -208,8 +160,19 @@ def test_a_service_with_keys_asks_the_command_line_too(tmp_path: Path) -> None:
         assert service.http.get("/health").json().keys() == {"status", "version"}
 
 
+def test_a_service_that_is_interrupted_twice_ends_its_campaign_first(service: ServiceProcess) -> None:
+    service.run("campaign", "start", "short")
+    service.wait_for_data_set(1)
+    service.process.send_signal(signal.SIGINT)
+    service.process.send_signal(signal.SIGINT)
+    _, said = service.process.communicate(timeout=WAIT_S)
+    assert "stopped; bench single-axis-sim is safe" in said
+    state, reason = end_of(service.database)
+    assert (state, "the service stops" in reason) == ("aborted", True)
+
+
 def test_a_proxy_of_the_laboratory_is_neither_asked_nor_told_a_key(
-    service: Service, monkeypatch: pytest.MonkeyPatch
+    service: ServiceProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
     monkeypatch.setenv("ALL_PROXY", "http://127.0.0.1:9")

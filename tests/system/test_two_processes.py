@@ -15,7 +15,8 @@ import tomli_w
 from numpy.typing import NDArray
 
 from instruments.bench_config import read_bench
-from labctl.services.campaigns.execution import StartRequest, run_here
+from labctl.services.campaigns.execution import run_here
+from labctl.services.schemas.campaigns import StartRequest
 from labctl.store import open_store
 
 #: A unit counts as silent after 2 s of the bench, a quarter of a second of the wall: a machine that is busy otherwise

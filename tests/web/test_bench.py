@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from instruments.clock import SystemClock
-from labctl.services.campaigns import execution
+from labctl.services.campaigns import preparation
 from procedures.contracts.operator import HumanOperator
 from tests.helpers.browser import Faults, Service
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.timeout(300)
 @pytest.fixture
 def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     """A bench on which a person turns and switches the units."""
-    monkeypatch.setattr(execution, "operator_of", lambda _: HumanOperator())
+    monkeypatch.setattr(preparation, "operator_of", lambda _: HumanOperator())
     serving = Service(tmp_path)
     serving.start()
     yield serving
@@ -102,13 +102,15 @@ def test_says_that_it_is_stale_and_goes_on_where_it_was(
 
 
 def test_a_service_without_a_bench_says_how_to_start_one(tmp_path: Path, chromium: object) -> None:
+    from playwright.sync_api import expect
+
     serving = Service(tmp_path / "none", bench=None)
     (tmp_path / "none").mkdir()
     serving.start()
     try:
         page = chromium.new_page()
         page.goto(f"{serving.url}/bench")
-        page.get_by_text("labctl serve --simulate").wait_for()
+        expect(page.get_by_text("labctl serve --simulate")).to_be_visible()
         page.close()
     finally:
         serving.stop()

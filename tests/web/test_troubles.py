@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import httpx
 import pytest
 
-from labctl.services.admin.api_keys import KeyRequest, Role
+from labctl.services.commands.registry import CREATE_KEY
+from labctl.services.schemas.admin import KeyRequest, Role
 from tests.helpers.browser import Faults, Service, settled
 from tests.helpers.paths import EXAMPLES
 
@@ -101,7 +102,7 @@ def guarded(tmp_path: Path) -> Iterator[tuple[Service, str, str]]:
     service = Service(tmp_path, keys=True)
     service.start()
     made = [
-        service.lab_service.commands().create_key(KeyRequest(name=role.name.lower(), role=role)).key
+        service.lab_service.execute(CREATE_KEY, KeyRequest(name=role.name.lower(), role=role)).key
         for role in (Role.VIEWER, Role.OPERATOR)
     ]
     headers = {"Authorization": f"Bearer {made[1]}"}

@@ -1,4 +1,4 @@
-"""API keys, the audit trail, and notes of backups: what an approver looks after."""
+"""API keys, the audit trail, and notes of backups: administration."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from labctl.api.dependencies import ServiceDep
-from labctl.api.middleware import NEEDS_APPROVER
-from labctl.services.admin.api_keys import KeyRequest, KeyResponse, NewKeyResponse, list_keys
-from labctl.services.admin.audit import AuditResponse, list_audit
-from labctl.services.commands.protocol import BackupNote, ReasonRequest
+from labctl.api.access_policy import NEEDS_APPROVER
+from labctl.api.dependencies import ServiceDep, command_route
+from labctl.services.admin.api_keys import list_keys
+from labctl.services.admin.audit import list_audit
+from labctl.services.commands.registry import CREATE_KEY, NOTE_BACKUP, REVOKE_KEY
+from labctl.services.commands.requests import ToKey
+from labctl.services.schemas.admin import AuditResponse, BackupNote, KeyRequest, KeyResponse, NewKeyResponse
+from labctl.services.schemas.campaigns import ReasonRequest
 
 router = APIRouter(prefix="/api", tags=["keys and audit"])
 
@@ -22,16 +25,16 @@ def keys(service: ServiceDep) -> list[KeyResponse]:
     return list_keys(service.store)
 
 
-@router.post("/keys", summary="Make a key", status_code=201, dependencies=[NEEDS_APPROVER])
+@command_route(router, CREATE_KEY, "Make a key", dependencies=[NEEDS_APPROVER])
 def create_key(request: KeyRequest, service: ServiceDep) -> NewKeyResponse:
     """Make a key. The answer is the only place where it is ever shown. Asks for an approver."""
-    return service.commands().create_key(request)
+    return service.execute(CREATE_KEY, request)
 
 
-@router.post("/keys/{name}/revoke", summary="Revoke a key", dependencies=[NEEDS_APPROVER])
+@command_route(router, REVOKE_KEY, "Revoke a key", dependencies=[NEEDS_APPROVER])
 def revoke_key(name: str, request: ReasonRequest, service: ServiceDep) -> KeyResponse:
     """Take a key's power away, at once. Asks for an approver."""
-    return service.commands().revoke_key(name, request.reason)
+    return service.execute(REVOKE_KEY, ToKey(name, request))
 
 
 @router.get("/audit", summary="The audit trail")
@@ -45,7 +48,7 @@ def audit(
     return list_audit(service.store, since, after, limit)
 
 
-@router.post("/backups", summary="Note a backup", status_code=204)
+@command_route(router, NOTE_BACKUP, "Note a backup")
 def note_backup(note: BackupNote, service: ServiceDep) -> None:
     """Write down in the audit trail that a backup was made; `labctl backup` sends it."""
-    service.commands().note_backup(note)
+    service.execute(NOTE_BACKUP, note)

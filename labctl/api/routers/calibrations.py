@@ -6,27 +6,42 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
 
-from labctl.api.dependencies import ServiceDep
-from labctl.api.middleware import NEEDS_APPROVER
+from labctl.api.access_policy import NEEDS_APPROVER
+from labctl.api.dependencies import ServiceDep, command_route
 from labctl.fitting.effects import read_formula
 from labctl.services.calibrations import fitting as services
-from labctl.services.calibrations.revision import PreviewResponse, preview_unit
-from labctl.services.calibrations.surface import SurfaceResponse, surface_of
-from labctl.services.calibrations.uncertainty import UncertaintyResponse, uncertainty_at
-from labctl.services.commands.protocol import CertifyRequest, FitRequest, ImproveRequest
+from labctl.services.calibrations.certification import list_certifications
+from labctl.services.calibrations.revision import preview_unit
+from labctl.services.calibrations.surface import surface_of
+from labctl.services.calibrations.uncertainty import uncertainty_at
+from labctl.services.commands.registry import CERTIFY, FIT, IMPROVE, REVOKE
+from labctl.services.commands.requests import ToNewestOrVersion, ToUnit, ToVersion
 from labctl.services.criticism import criticise as criticism_services
-from labctl.services.criticism.plots import PictureResponse, pictures_unit
-from labctl.services.schemas.answers import (
+from labctl.services.criticism.ladder import ladder as ladder_of
+from labctl.services.criticism.plots import pictures_unit
+from labctl.services.criticism.verification import verify_unit
+from labctl.services.schemas.calibrations import (
     CalibrationRow,
     CertificationResponse,
-    CriticismResponse,
+    CertifyRequest,
+    FitRequest,
     FitResponse,
+    ImproveRequest,
     LadderResponse,
-    ResidualsResponse,
+    PreviewResponse,
+    SurfaceResponse,
+    UncertaintyResponse,
     VersionResponse,
+)
+from labctl.services.schemas.criticism import (
+    CriticismResponse,
+    PictureResponse,
+    ResidualsResponse,
+    VerificationResponse,
 )
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
+OtherUnit = Annotated[bool, Query(description="The recording may be of another unit.")]
 RecordingNumber = Annotated[int | None, Query(description="Recording; default: the unit's newest.")]
 
 
@@ -57,16 +72,16 @@ def calibrations(serial: str, service: ServiceDep) -> list[CalibrationRow]:
     return services.list_calibrations(service.store, serial)
 
 
-@router.post("/calibrations", summary="Fit a model", status_code=201)
+@command_route(router, FIT, "Fit a model")
 def fit(serial: str, request: FitRequest, service: ServiceDep) -> FitResponse:
     """Fit a model to a recording; it becomes the unit's next version."""
-    return service.commands().fit(serial, request)
+    return service.execute(FIT, ToUnit(serial, request))
 
 
-@router.post("/calibrations/{version}/improve", summary="Change a model", status_code=201)
+@command_route(router, IMPROVE, "Change a model")
 def improve(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> FitResponse:
     """Add effects to a version, or take some out, and fit everything again; it becomes the unit's next version."""
-    return service.commands().improve(serial, request.model_copy(update={"version": version}))
+    return service.execute(IMPROVE, ToNewestOrVersion(serial, version, request))
 
 
 @router.get("/calibrations/{version}", summary="One version")
@@ -78,7 +93,15 @@ def one_version(serial: str, version: int, service: ServiceDep) -> VersionRespon
 @router.get("/certifications", summary="What was certified and revoked")
 def certifications(serial: str, service: ServiceDep) -> list[CertificationResponse]:
     """Every act of certifying and revoking a version of the unit, newest first: who, why, when, and due when."""
-    return services.list_certifications(service.store, serial)
+    return list_certifications(service.store, serial)
+
+
+@router.get("/calibrations/{version}/verification", summary="Apply a version to a recording")
+def verification(
+    serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None, other_unit: OtherUnit = False
+) -> VerificationResponse:
+    """What the version leaves of the recording as it is, nothing refitted, and whether that is as expected of it."""
+    return verify_unit(service.store, serial, version, recording, other_unit=other_unit)
 
 
 @router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")
@@ -87,11 +110,14 @@ def criticism(
     version: int,
     service: ServiceDep,
     recording: RecordingNumber = None,
+    other_unit: OtherUnit = False,
     formula: Annotated[list[str] | None, Query(description="Effects of your own that compete: 'name: expr'.")] = None,
 ) -> CriticismResponse:
     """What the model leaves, where, which effect may be missing, and what this recording cannot say."""
     competing = [read_formula(line) for line in formula or []]
-    return criticism_services.criticise_unit(service.store, serial, version, recording, competing)
+    return criticism_services.criticise_unit(
+        service.store, serial, version, recording, competing, other_unit=other_unit
+    )
 
 
 @router.get("/calibrations/{version}/residuals", summary="What a model leaves, data set by data set")
@@ -140,21 +166,25 @@ def uncertainty(
 
 @router.head("/ladder", include_in_schema=False)
 @router.get("/ladder", summary="The error, version by version")
-def ladder(serial: str, service: ServiceDep) -> LadderResponse:
-    """Every version's errors, oldest first, down to the noise floor."""
-    return criticism_services.ladder(service.store, serial)
+def ladder(
+    serial: str,
+    service: ServiceDep,
+    recording: Annotated[int | None, Query(description="Recording; default: that of the newest version.")] = None,
+) -> LadderResponse:
+    """The errors of the versions fitted to one recording, each after its parent, and the noise floor."""
+    return ladder_of(service.store, serial, recording)
 
 
-@router.post("/calibrations/{version}/certify", summary="Make a version current", dependencies=[NEEDS_APPROVER])
+@command_route(router, CERTIFY, "Make a version current", dependencies=[NEEDS_APPROVER])
 def certify(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
     """Make a version the one in force: who, why, and when it is due again. An older version again is a rollback.
 
     Asks for an approver.
     """
-    return service.commands().certify(serial, version, request)
+    return service.execute(CERTIFY, ToVersion(serial, version, request))
 
 
-@router.post("/calibrations/{version}/revoke", summary="Take a version out of force", dependencies=[NEEDS_APPROVER])
+@command_route(router, REVOKE, "Take a version out of force", dependencies=[NEEDS_APPROVER])
 def revoke(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
     """Take the version out of force; the unit then has no certified calibration. Asks for an approver."""
-    return service.commands().revoke(serial, version, request)
+    return service.execute(REVOKE, ToVersion(serial, version, request))

@@ -1,4 +1,4 @@
-"""Campaigns: start, look, follow, abort."""
+"""Campaigns: start, status, plan, events and control."""
 
 from __future__ import annotations
 
@@ -8,25 +8,38 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
-from labctl.api.dependencies import ServiceDep
-from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
-from labctl.services.planning.planner import CampaignPlanResponse, campaign_plan
-from labctl.services.schedule.queue import is_scheduled
-from labctl.services.schemas.answers import CampaignResponse, ScheduledResponse
+from labctl.api.dependencies import ServiceDep, command_route
+from labctl.services.campaigns.plan_view import campaign_plan
+from labctl.services.commands.registry import (
+    ABORT_CAMPAIGN,
+    CONFIRM_PROMPT,
+    PAUSE_CAMPAIGN,
+    RESUME_CAMPAIGN,
+    START_CAMPAIGN,
+)
+from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.schemas.campaigns import (
+    CampaignRequest,
+    CampaignResponse,
+    ConfirmRequest,
+    ReasonRequest,
+    ResumeRequest,
+)
+from labctl.services.schemas.plans import CampaignPlanResponse
+from labctl.services.schemas.schedule import ScheduledResponse
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
 
 
-@router.post("", summary="Run a recipe", status_code=201, responses={202: {"model": ScheduledResponse}})
+@command_route(router, START_CAMPAIGN, "Run a recipe", response_model=CampaignResponse | ScheduledResponse)
 def start(request: CampaignRequest, service: ServiceDep, response: Response) -> CampaignResponse | ScheduledResponse:
     """Run a recipe on this service's bench, now (201) or, with `at` or `cron`, later (202: an entry of the schedule).
 
     Refused when the bench or a unit cannot do it, naming the limit.
     """
-    if is_scheduled(request):
-        response.status_code = 202
-        return service.commands().schedule_campaign(request)
-    return service.bench_runner().start(request)
+    answer = service.execute(START_CAMPAIGN, CampaignStart(request))
+    response.status_code = START_CAMPAIGN.status_of(answer)
+    return answer
 
 
 @router.get("", summary="All campaigns")
@@ -47,28 +60,28 @@ def plan(campaign: int, service: ServiceDep) -> CampaignPlanResponse:
     return campaign_plan(service.store, campaign)
 
 
-@router.post("/{campaign}/abort", summary="End a campaign")
+@command_route(router, ABORT_CAMPAIGN, "End a campaign")
 def abort(campaign: int, request: ReasonRequest, service: ServiceDep) -> CampaignResponse:
     """End a running campaign now, in the safe state. What was measured is kept."""
-    return service.commands().abort_campaign(campaign, request.text)
+    return service.execute(ABORT_CAMPAIGN, ToCampaign(campaign, request))
 
 
-@router.post("/{campaign}/pause", summary="Hold a campaign")
+@command_route(router, PAUSE_CAMPAIGN, "Hold a campaign")
 def pause(campaign: int, request: ReasonRequest, service: ServiceDep) -> CampaignResponse:
     """Hold after the present data set. `wish` says that it was asked; `state` becomes `paused` when it holds."""
-    return service.commands().pause_campaign(campaign, request)
+    return service.execute(PAUSE_CAMPAIGN, ToCampaign(campaign, request))
 
 
-@router.post("/{campaign}/resume", summary="Let a campaign go on")
+@command_route(router, RESUME_CAMPAIGN, "Let a campaign go on")
 def resume(campaign: int, request: ResumeRequest, service: ServiceDep) -> CampaignResponse:
     """Let a paused campaign go on, or take up one that was interrupted, failed or aborted, safe state first."""
-    return service.commands().resume_campaign(campaign, request)
+    return service.execute(RESUME_CAMPAIGN, CampaignResume(campaign, request))
 
 
-@router.post("/{campaign}/confirm", summary="Answer a campaign's question")
+@command_route(router, CONFIRM_PROMPT, "Answer a campaign's question")
 def confirm(campaign: int, request: ConfirmRequest, service: ServiceDep) -> CampaignResponse:
     """Answer the question with this id; an answer to an older one is refused."""
-    return service.commands().confirm(campaign, request)
+    return service.execute(CONFIRM_PROMPT, ToCampaign(campaign, request))
 
 
 @router.get("/{campaign}/events", summary="Follow a campaign", response_class=StreamingResponse)

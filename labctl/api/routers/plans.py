@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from labctl.api.dependencies import ServiceDep
-from labctl.services.commands.protocol import PlanRequest
 from labctl.services.planning import planner as services
-from labctl.services.planning.planner import PlannedResponse, RecipeResponse
+from labctl.services.schemas.plans import PlannedResponse, PlanRequest, RecipeResponse
+from labctl.services.simulation.visibility import visibility
 
 router = APIRouter(prefix="/api", tags=["campaigns"])
 
@@ -24,4 +24,4 @@ def recipes(service: ServiceDep) -> list[RecipeResponse]:
 @router.post("/plans", summary="Plan a recipe")
 def plan(request: PlanRequest, service: ServiceDep) -> PlannedResponse:
     """What a campaign would do, step by step, and what it could find. Nothing moves, nothing is kept."""
-    return services.plan_steps(request, service.bench)
+    return services.plan_steps(request, service.bench, visibility)

@@ -1,4 +1,4 @@
-"""Recordings: import and look."""
+"""Recordings: import, simulate, list, read and download."""
 
 from __future__ import annotations
 
@@ -7,38 +7,47 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Query, UploadFile
 from fastapi.responses import StreamingResponse
 
-from labctl.api.dependencies import ServiceDep
-from labctl.services.commands.protocol import ExampleRequest, SimulatedRequest
+from labctl.api.dependencies import ServiceDep, command_route
+from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_RECORDING, SIMULATE_RECORDING
+from labctl.services.commands.requests import RecordingFolder
 from labctl.services.recordings import catalogue
-from labctl.services.recordings import transfer as services
-from labctl.services.recordings.allan import AllanResponse, allan_unit
-from labctl.services.recordings.catalogue import DataSetsResponse, RecordingResponse
-from labctl.services.recordings.downloads import zip_recording
-from labctl.services.recordings.examples import SimulatedRecordingResponse
-from labctl.services.recordings.traces import TraceResponse
+from labctl.services.recordings.allan import allan_unit
 from labctl.services.recordings.traces import trace as trace_of
-from labctl.services.schemas.answers import ImportResponse
+from labctl.services.recordings.transfer import import_files, zip_recording
+from labctl.services.schemas.recordings import (
+    AllanResponse,
+    DataSetsResponse,
+    ExampleRequest,
+    ImportResponse,
+    RecordingResponse,
+    SimulatedRecordingResponse,
+    SimulatedRequest,
+    TraceResponse,
+)
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
 
-@router.post("", summary="Import a recording", status_code=201)
+@command_route(router, IMPORT_RECORDING, "Import a recording")
 def import_recording(files: list[UploadFile], service: ServiceDep) -> ImportResponse:
     """Take in a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
     environment file, as parts of one multipart form. All of it or nothing; an error names file, column and row."""
-    return services.import_files(service.commands(), [(file.filename or "", file.file) for file in files])
+    return import_files(
+        [(file.filename or "", file.file) for file in files],
+        lambda folder: service.execute(IMPORT_RECORDING, RecordingFolder(folder)),
+    )
 
 
-@router.post("/simulated", summary="Simulate a recording", status_code=201)
+@command_route(router, SIMULATE_RECORDING, "Simulate a recording")
 def simulated(request: SimulatedRequest, service: ServiceDep) -> SimulatedRecordingResponse:
     """Walk through a recipe in simulation, with effects hidden in the unit, and take in what it would have given."""
-    return service.commands().simulate_recording(request)
+    return service.execute(SIMULATE_RECORDING, request)
 
 
-@router.post("/example", summary="Take in an example", status_code=201)
+@command_route(router, IMPORT_EXAMPLE, "Take in an example")
 def example(request: ExampleRequest, service: ServiceDep) -> ImportResponse:
     """Take in one of the recordings of real gyros that come with labctl."""
-    return service.commands().import_example(request)
+    return service.execute(IMPORT_EXAMPLE, request)
 
 
 @router.get("", summary="All recordings")
@@ -54,7 +63,7 @@ def recording(
     points: Annotated[bool, Query(description="With the means of its data sets.")] = True,
 ) -> dict[str, Any]:
     """What the recording is: unit, axes, channels, data sets."""
-    return services.describe_recording(service.store, recording, points=points)
+    return catalogue.describe_recording(service.store, recording, points=points)
 
 
 @router.get("/{recording}/datasets", summary="Its data sets")
@@ -106,4 +115,4 @@ def samples(
     limit: Annotated[int, Query(ge=1, le=100_000, description="At most this many readings.")] = 10_000,
 ) -> dict[str, Any]:
     """The readings of one data set, column by column, in the units named beside them."""
-    return services.dataset_samples(service.store, recording, dataset, limit)
+    return catalogue.dataset_samples(service.store, recording, dataset, limit)

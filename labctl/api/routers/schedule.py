@@ -6,9 +6,11 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from labctl.api.dependencies import ServiceDep
+from labctl.api.dependencies import ServiceDep, command_route
+from labctl.services.commands.registry import CANCEL_START
+from labctl.services.commands.requests import ToStart
 from labctl.services.schedule import queue
-from labctl.services.schemas.answers import ScheduledResponse
+from labctl.services.schemas.schedule import ScheduledResponse
 
 router = APIRouter(prefix="/api/schedule", tags=["campaigns"])
 
@@ -27,7 +29,7 @@ def start(start: int, service: ServiceDep) -> ScheduledResponse:
     return queue.start_status(service.store, start)
 
 
-@router.delete("/{start}", summary="Cancel an entry")
+@command_route(router, CANCEL_START, "Cancel an entry")
 def cancel(start: int, service: ServiceDep) -> ScheduledResponse:
     """Take an entry out of the schedule. A campaign that it has begun runs on."""
-    return service.commands().cancel_start(start)
+    return service.execute(CANCEL_START, ToStart(start))

@@ -15,11 +15,12 @@ from instruments.clock import VirtualClock
 from labctl.cli.progress_bar import CampaignProgress
 from labctl.fitting import FitData, fit_data_of
 from labctl.services.calibrations.fitting import fit_unit
-from labctl.services.campaigns.execution import prepare, run
+from labctl.services.campaigns.execution import run
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import answer_of
-from labctl.services.commands.protocol import FitRequest
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import CampaignResponse, FitResponse
+from labctl.services.schemas.calibrations import FitRequest, FitResponse
+from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
 from procedures.monitoring.progress import Progress
 

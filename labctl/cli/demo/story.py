@@ -10,8 +10,8 @@ from instruments.clock import VirtualClock
 from labctl.cli.demo import example_data, find_missing_effect, serve_calibrations, single_axis, triaxial
 from labctl.cli.demo.runner import DemoRunner, maybe_silent
 from labctl.errors import BadInput
-from labctl.services.calibrations.fitting import certify
-from labctl.services.commands.protocol import CertifyRequest
+from labctl.services.calibrations.certification import certify
+from labctl.services.schemas.calibrations import CertifyRequest
 from labctl.store import open_store
 
 DATABASE = "demo.sqlite"

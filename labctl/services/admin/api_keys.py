@@ -5,68 +5,16 @@ from __future__ import annotations
 import hashlib
 import hmac
 import secrets
-from dataclasses import dataclass
 from datetime import datetime
-from enum import StrEnum
-from typing import Annotated
-
-from pydantic import Field, StringConstraints
 
 from labctl.errors import BadInput, NotAllowed, NotIdentified
-from labctl.services.commands.protocol import Request
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.admin import Caller, KeyRequest, KeyResponse, NewKeyResponse, Role
 from labctl.store import KeyRow, Store
 
 PREFIX = "labctl_"
 #: Of a key's random part. Nobody guesses 256 bits, so a slow hash would add nothing but time to every request.
 RANDOM_BYTES = 32
 SCHEME = "bearer"
-
-
-class Role(StrEnum):
-    """What a key may do; each may also do what those before it may."""
-
-    VIEWER = "viewer"  #: read
-    OPERATOR = "operator"  #: import, fit, improve, run campaigns
-    APPROVER = "approver"  #: certify, revoke, make and revoke keys
-
-    def may(self, needed: Role) -> bool:
-        """Return whether this role reaches as far as another."""
-        order = list(Role)
-        return order.index(self) >= order.index(needed)
-
-
-@dataclass(frozen=True)
-class Caller:
-    """Who asks, and what they may do."""
-
-    name: str
-    role: Role
-    via: str
-
-
-class KeyRequest(Request):
-    """A key to make."""
-
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._@-]{0,99}$")] = Field(
-        description="Whose it is: the name that the audit trail will show. Used once."
-    )
-    role: Role
-
-
-class KeyResponse(ResponseModel):
-    """A key as it may be seen later: without the key."""
-
-    name: str
-    role: Role
-    created_at: datetime
-    revoked_at: datetime | None
-
-
-class NewKeyResponse(KeyResponse):
-    """A key that was just made. This is the only time that it is shown."""
-
-    key: str
 
 
 def create_key(store: Store, request: KeyRequest, at: datetime) -> NewKeyResponse:

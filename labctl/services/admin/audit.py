@@ -3,33 +3,10 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import Any
 
 from labctl.errors import BadInput
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.admin import AuditResponse, AuditVerificationResponse
 from labctl.store import Head, Store
-
-
-class AuditResponse(ResponseModel):
-    """One act: who did what, when, and why."""
-
-    id: int
-    at: datetime
-    who: str
-    action: str
-    subject: str
-    detail: dict[str, Any]
-    hash: str
-
-
-class AuditVerificationResponse(ResponseModel):
-    """Whether the trail is whole; the anchor is worth noting down where nobody here can write."""
-
-    ok: bool
-    rows: int
-    anchor: str | None
-    row: int | None = None
-    text: str = ""
 
 
 def list_audit(store: Store, since: datetime | None = None, after: int = 0, limit: int = 1000) -> list[AuditResponse]:

@@ -1,44 +1,14 @@
-"""Keeping what was measured: checking a database, and backing it up while it is in use."""
+"""Maintenance of a database: checking it, and backing it up while it is in use."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from labctl.config import default_database
 from labctl.errors import LabctlError
-from labctl.services.commands.local import open_commands
-from labctl.services.commands.protocol import BackupNote
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.admin import BackupNote, BackupResponse, CheckResponse, FindingResponse
 from labctl.store import Progress, check, copy_database
-
-
-class FindingResponse(ResponseModel):
-    """Something that is not as it was written."""
-
-    part: str
-    text: str
-
-
-class CheckResponse(ResponseModel):
-    """What was looked at, and what was found."""
-
-    ok: bool
-    database: str
-    blocks: int
-    calibrations: int
-    audit_rows: int
-    findings: list[FindingResponse]
-
-
-class BackupResponse(ResponseModel):
-    """A backup that is on the disk."""
-
-    file: str
-    bytes: int
-    sha256: str
-    noted: bool
-    remark: str = ""
-    findings: list[FindingResponse]
 
 
 def check_database(database: str | None, progress: Progress | None = None) -> CheckResponse:
@@ -55,18 +25,18 @@ def check_database(database: str | None, progress: Progress | None = None) -> Ch
     )
 
 
-def back_up(database: str | None, target: Path, progress: Progress | None = None) -> BackupResponse:
+def back_up(
+    database: str | None, target: Path, note: Callable[[BackupNote], object], progress: Progress | None = None
+) -> BackupResponse:
     """Copy a database, also while a service or a campaign uses it, and check the copy.
 
-    A copy in hand is worth more than a row about it: when nobody can write that row now, the copy stays and the answer
-    says so. Raises BadInput, StoreError; then nothing is left of the copy.
+    `note` records the backup in the audit trail. When that is impossible now, the copy stays and the
+    response says so. Raises BadInput, StoreError; then nothing is left of the copy.
     """
     made = copy_database(database or default_database(), target)
-    note = BackupNote(file=target.name, bytes=made.bytes, sha256=made.sha256)
     remark = ""
     try:
-        with open_commands(database) as commands:
-            commands.note_backup(note)
+        note(BackupNote(file=target.name, bytes=made.bytes, sha256=made.sha256))
     except LabctlError as error:
         remark = f"the backup is made, but could not be noted in the audit trail: {error}"
     return BackupResponse(

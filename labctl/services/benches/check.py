@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,8 @@ from instruments.bench_config import shipped_benches
 from instruments.clock import ScaledClock, SystemClock, VirtualClock
 from instruments.simulation import serve_simulation
 from labctl.errors import BadInput
-from labctl.services.campaigns.status import abandoned_campaigns, describe_interrupted, outlives_its_process
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import BenchStatus, DeviceCheck
-from labctl.store import BenchRow, Store
+from labctl.services.schemas.benches import DeviceCheck
 
 
 def check_bench(source: str) -> list[DeviceCheck]:
@@ -33,23 +30,6 @@ def shipped() -> list[dict[str, Any]]:
         units = ", ".join(f"{gyro.serial} ({gyro.driver})" for gyro in bench.gyros)
         found.append({"name": name, "text": f"{bench.table.driver}, {bench.chamber.driver}, {units}"})
     return found
-
-
-def bench_status(row: BenchRow) -> BenchStatus:
-    """Return a bench as it leaves the house."""
-    return BenchStatus(**asdict(row))
-
-
-def bench_statuses(store: Store) -> list[BenchStatus]:
-    """Return every bench that was used, with the campaigns that were left on it by a process that is gone.
-
-    Those of simulated benches are left out: such a bench ended with its process.
-    """
-    left: dict[str, list[str]] = {}
-    for answer in abandoned_campaigns(store):
-        if outlives_its_process(store.campaigns.get(answer.id)):
-            left.setdefault(answer.bench, []).append(describe_interrupted(answer))
-    return [bench_status(row).model_copy(update={"left": left.get(row.name, [])}) for row in store.benches.all()]
 
 
 def serve_simulator(

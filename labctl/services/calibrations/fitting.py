@@ -1,19 +1,23 @@
-"""Calibrations: fitted, kept, certified, handed out."""
+"""Calibrations: fit, versions, and files for consumers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
-from typing import Any, Literal
+from datetime import datetime
+from typing import Any
 
-from labctl.actor import actor
 from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
-from labctl.services.commands.protocol import CertifyRequest, FitRequest
-from labctl.services.recordings.transfer import newest_row, points_of
-from labctl.services.schemas.answers import CalibrationRow, CertificationResponse, FitResponse, VersionResponse
-from labctl.store import CertificationRow, NewCalibration, Store
+from labctl.services.calibrations.certification import certification_response, version_in_force
+from labctl.services.recordings.loading import newest_row, points_of
+from labctl.services.schemas.calibrations import (
+    CalibrationRow,
+    FitRequest,
+    FitResponse,
+    VersionResponse,
+)
+from labctl.store import NewCalibration, Store
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
 
 def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
     """Return a unit's versions, newest first. Raises NotFound."""
-    in_force = _in_force(store, serial)
+    in_force = version_in_force(store, serial)
     return [
         CalibrationRow(
             serial=row.serial,
@@ -78,7 +82,7 @@ def one_version(store: Store, serial: str, version: int) -> VersionResponse:
     row = store.calibrations.get(store.units.get(serial).serial, version)
     history = store.calibrations.history(serial)
     in_force = bool(history) and history[0].act == "certify" and history[0].version == version
-    last = next((_certified(act) for act in history if act.version == version), None)
+    last = next((certification_response(act) for act in history if act.version == version), None)
     beside = {
         "parent": row.parent, "recording": row.recording, "created_at": row.created_at, "hash": row.hash,
         "in_force": in_force, "due": last.due if last is not None and in_force else None, "certification": last,
@@ -86,26 +90,9 @@ def one_version(store: Store, serial: str, version: int) -> VersionResponse:
     return VersionResponse.model_validate({**row.answer, **beside})
 
 
-def list_certifications(store: Store, serial: str) -> list[CertificationResponse]:
-    """Return every act of certifying and revoking, newest first. Raises NotFound."""
-    return [_certified(row) for row in store.calibrations.history(store.units.get(serial).serial)]
-
-
-def _certified(row: CertificationRow) -> CertificationResponse:
-    act: Literal["certify", "revoke"] = "certify" if row.act == "certify" else "revoke"
-    return CertificationResponse(
-        serial=row.serial, version=row.version, act=act, by=row.by, reason=row.reason, at=row.at, due=row.due_at
-    )
-
-
 def _error(answer: Any, key: str) -> float | None:
     value = answer["error"][key]
     return None if value is None else float(value)
-
-
-def _in_force(store: Store, serial: str) -> int | None:
-    history = store.calibrations.history(serial)
-    return history[0].version if history and history[0].act == "certify" else None
 
 
 def calibration_file(store: Store, serial: str, version: int | None, format_name: str) -> CalibrationFile:
@@ -118,22 +105,3 @@ def calibration_file(store: Store, serial: str, version: int | None, format_name
         return CalibrationFile(document, "application/json", hash_)
     content, media_type = export_calibration(document, format_name)
     return CalibrationFile(content, media_type, f"{hash_}-{format_name}")
-
-
-def certify(
-    store: Store,
-    serial: str,
-    version: int,
-    act: Literal["certify", "revoke"],
-    request: CertifyRequest,
-    at: datetime,
-) -> CertificationResponse:
-    """Put a version in force, or take it out of force. Raises NotFound, Conflict."""
-    store.units.get(serial)
-    due = at + timedelta(days=request.due_days) if request.due_days and act == "certify" else None
-    door = actor()
-    row = store.calibrations.certify(
-        serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due,
-        who=door.name if door.via == "key" else request.by,
-    )  # fmt: skip
-    return CertificationResponse(serial=serial, version=version, act=act, by=row.by, reason=row.reason, at=at, due=due)

@@ -9,7 +9,6 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
@@ -21,43 +20,19 @@ from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.recording import Recording
-from labctl.services.cache import cached
-from labctl.services.commands.protocol import ImproveRequest
-from labctl.services.criticism.criticise import version_of
+from labctl.services.cache import RecentResults, cached
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, load_reduced_readings
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.recordings.transfer import newest_row
-from labctl.services.schemas.answers import (
-    ErrorFigures,
+from labctl.services.criticism.versions import version_of
+from labctl.services.recordings.loading import newest_row
+from labctl.services.schemas.calibrations import (
     FitResponse,
-    ModelResponse,
-    ResidualColumns,
-    ResponseModel,
-    Validity,
+    ImproveRequest,
+    PreviewResponse,
 )
+from labctl.services.schemas.criticism import ResidualColumns
 from labctl.store import CalibrationRecord, NewCalibration, RecordingRow, Store
-
-
-class PreviewResponse(ResponseModel):
-    """What a changed model would be; nothing was kept, so it has no version of its own."""
-
-    serial: str
-    improved_from: int
-    recording: int
-    model: ModelResponse
-    axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
-    error: ErrorFigures
-    before: ErrorFigures
-    validity: Validity
-    plausible: dict[str, dict[str, Any]] = Field(description="Effect -> the usual range, and whether it is inside.")
-    left_out: list[dict[str, Any]] = Field(description="Effects that would not leave the house with a calibration.")
-    residuals: ResidualColumns = Field(description="What the changed model leaves, data set by data set.")
-
-
-#: Changes whose fits are at hand, by what was asked.
-_RECENT: dict[str, _Change] = {}
-MOST_RECENT = 4
 
 
 @dataclass(frozen=True)
@@ -78,6 +53,10 @@ class _Change:
             **self.after.to_json(), "recording": self.recording.id, "improved_from": self.row.version,
             "before": self.before.error.to_dict(), "plausible": plausible(self.after, technology),
         }  # fmt: skip
+
+
+#: Changes that were fitted a moment ago: a preview is often kept as the next version.
+_RECENT: RecentResults[_Change] = RecentResults(most=4)
 
 
 def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> FitResponse:
@@ -122,15 +101,11 @@ def _residuals(store: Store, change: _Change) -> ResidualColumns:
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
-    """Fit a changed model, or take the fit of a moment ago: who has looked at a preview often keeps it next."""
+    """Fit a changed model, or return the fit of a moment ago."""
     row = version_of(store, serial, request.version)
     measured = newest_row(store, serial, request.recording)
     asked = json.dumps(_question(store, row, measured, request), sort_keys=True)
-    change = _RECENT.get(asked) or _fitted(row, Measurements(store, measured), request)
-    _RECENT[asked] = change
-    for old in list(_RECENT)[:-MOST_RECENT]:
-        _RECENT.pop(old, None)
-    return change
+    return _RECENT.get(asked, lambda: _fitted(row, Measurements(store, measured), request))
 
 
 def _refuse_what_changes_nothing(

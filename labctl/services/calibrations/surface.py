@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
@@ -13,32 +12,11 @@ from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.numeric.arrays import Array
-from labctl.services.schemas.answers import ResponseModel, Validity
+from labctl.services.schemas.calibrations import Surface, SurfaceResponse, Validity
 from labctl.store import CalibrationRecord, Store
 
 #: Rounds in which a law of the output is solved for the output; each shrinks the rest a hundredfold or so.
 ROUNDS, CLOSE_DPS = 100, 1e-12
-
-
-class Surface(ResponseModel):
-    """One axis, turned about itself, the others at rest."""
-
-    rate_dps: list[float]
-    temperature_c: list[float]
-    error_dps: list[list[float]] = Field(
-        description="Output minus true rate: a row per temperature, one per rate in it."
-    )
-
-
-class SurfaceResponse(ResponseModel):
-    """What a calibration takes off, within what was calibrated."""
-
-    serial: str
-    version: int
-    validity: Validity
-    held: dict[str, float] = Field(description="Channels that the model needs besides: their means in its recording.")
-    left_out: list[dict[str, Any]] = Field(description="Effects of the fit that do not leave with the calibration.")
-    axes: dict[str, Surface]
 
 
 def surface_of(store: Store, serial: str, version: int, rate_points: int, temperature_points: int) -> SurfaceResponse:

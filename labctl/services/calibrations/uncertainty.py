@@ -4,35 +4,10 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from pydantic import Field
-
 from labctl.calibration import Calibration, read_calibration
 from labctl.fitting.uncertainty import COVERAGE, RateUncertainty, rate_uncertainty
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.calibrations import AxisUncertainty, UncertaintyResponse
 from labctl.store import Store
-
-
-class AxisUncertainty(ResponseModel):
-    """One axis, deg/s."""
-
-    coefficients_dps: float = Field(description="Standard uncertainty from the coefficients' covariance.")
-    model_dps: float | None = Field(
-        description="What held-out temperatures show beyond the noise floor; null: unknown."
-    )
-    combined_dps: float
-    expanded_dps: float = Field(description="Combined, times the coverage factor.")
-
-
-class UncertaintyResponse(ResponseModel):
-    """The uncertainty of a corrected rate; the noise of a single reading comes on top."""
-
-    serial: str
-    version: int
-    rate_dps: float
-    temperature_c: float
-    coverage_factor: float
-    inside: bool = Field(description="Whether rate and temperature are within what was calibrated.")
-    axes: dict[str, AxisUncertainty]
 
 
 def uncertainty_at(

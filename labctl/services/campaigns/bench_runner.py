@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,14 +9,21 @@ from typing import Any
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
-from instruments.errors import InstrumentError
-from labctl.errors import BenchBusy, Conflict, LabctlError, StoreError
+from labctl.errors import BenchBusy, Conflict, StoreError
 from labctl.services.benches.lease import BenchHold
-from labctl.services.campaigns.execution import Prepared, prepare, run
-from labctl.services.campaigns.resume import as_it_was, leave_safe, prepare_resume, too_often
+from labctl.services.campaigns.execution import run
+from labctl.services.campaigns.listeners import ChangeListeners
+from labctl.services.campaigns.preparation import Prepared, prepare
+from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
+from labctl.services.campaigns.resume import prepare_resume, with_original_simulation
 from labctl.services.campaigns.status import ENDED, answer_of, campaign_status
-from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest, ResumeRequest
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import (
+    CampaignRequest,
+    CampaignResponse,
+    ConfirmRequest,
+    ReasonRequest,
+    ResumeRequest,
+)
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.store import CampaignRow, Store
 from procedures.contracts.control import Control
@@ -43,14 +49,6 @@ class _Job:
     thread: threading.Thread | None = None
 
 
-@dataclass(frozen=True)
-class _Unsaid:
-    """A campaign that ended when the database could not be written: its rows do not say so yet."""
-
-    campaign: int
-    why: str
-
-
 class BenchRunner:
     """The one that drives this service's bench."""
 
@@ -63,11 +61,10 @@ class BenchRunner:
         self._make_clock = make_clock
         self._guard = threading.Lock()
         self._job: _Job | None = None
-        self._left = False  #: a campaign was left half done here, and nobody has taken it up yet
-        self._unsaid: _Unsaid | None = None
+        self._recovery = CampaignRecovery(store, bench, make_clock)
         self._stops = False
         self.used = False  #: whether anything was asked of the bench here
-        self._listeners: list[Callable[[], None]] = []
+        self._listeners = ChangeListeners()
 
     @property
     def bench(self) -> BenchFile:
@@ -82,8 +79,7 @@ class BenchRunner:
     @property
     def free(self) -> bool:
         """Whether a campaign may begin now: nothing runs, or waits to be taken up, and the bench may be driven."""
-        nothing_open = self._job is None and not self._left and self._unsaid is None
-        return nothing_open and not self._stops and self._may_drive
+        return self._job is None and not self._recovery.pending and not self._stops and self._may_drive
 
     @property
     def _may_drive(self) -> bool:
@@ -113,7 +109,7 @@ class BenchRunner:
             raise BenchBusy(
                 f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
             )
-        self._say_end()
+        self._recovery.record_end()
         if self._hold is not None:
             self._hold.check()
 
@@ -142,60 +138,31 @@ class BenchRunner:
             else:
                 self._refuse_unless_free()
                 make_clock = self._make_clock
-                bench = as_it_was(self._store.campaigns.get(campaign), self._bench)
+                bench = with_original_simulation(self._store.campaigns.get(campaign), self._bench)
                 self._begin(prepare_resume(self._store, campaign, bench, lambda _: make_clock(), request))
         return self.status(campaign) or campaign_status(self._store, campaign)
 
-    def take_up_left(self) -> None:
-        """Take up the campaign that was left half done on this bench; what hinders it becomes its reason.
+    def resume_unfinished(self) -> None:
+        """Resume the campaign that was left unfinished on this bench; what prevents it becomes its reason.
 
-        Without the lease nothing is touched: whoever has it by now may be taking it up.
+        Without the lease nothing is changed: the process that has it by now may be resuming the campaign.
         """
-        self._left = True
-        if not self._may_drive:
-            return
-        taken_up = None
-        for row in self._store.campaigns.unfinished():  # newest first
-            if row.bench_name != self._bench.name:
-                continue
-            if taken_up is not None:
-                text = f"not taken up: campaign {taken_up} goes on here; then `labctl campaign resume {row.id}`"
-                self._store.campaigns.close_unfinished(row.id, text, self._make_clock().utc())
-                continue
-            why_not = too_often(self._store.resume_points.of_campaign(row.id))
-            try:
-                if why_not is None:
-                    self.resume(row.id, ResumeRequest(by="the service"))
-                    taken_up = row.id
-                    continue
-            except BenchBusy:  # somebody was quicker, or the lease went just now
-                return
-            except (LabctlError, InstrumentError) as error:
-                why_not = f"not taken up: {error}"
-            with self._guard:  # whatever hinders the campaign, its last process may have left the bench as it was
-                self.used = True
-                leave_safe(self._store, self._bench, self._make_clock())
-            self._store.campaigns.close_unfinished(row.id, why_not, self._make_clock().utc())
-        self._left = False
+        self._recovery.expect_resume()
+        if self._may_drive:
+            self._recovery.resume_newest(
+                lambda number: self.resume(number, ResumeRequest(by="the service")), self._secure
+            )
 
-    def take_up_cut_short(self) -> None:
-        """Once the bench may be driven again, take up the campaign that was cut short when it was lost."""
-        self._say_end()
-        if self._left and self._job is None and self._may_drive:
-            self.take_up_left()
+    def _secure(self) -> None:
+        with self._guard:
+            self.used = True
+            secure_bench(self._store, self._bench, self._make_clock())
 
-    def _say_end(self) -> None:
-        """Write down the end of a campaign that could not be written when it came. Raises StoreError."""
-        if (unsaid := self._unsaid) is None:
-            return
-        at = self._make_clock().utc()
-        text = (
-            f"campaign {unsaid.campaign} ended while nothing could be written; whether the bench is safe is not known"
-        )
-        self._store.benches.mark(self._bench.name, text, at)
-        if self._store.campaigns.get(unsaid.campaign).state not in ENDED:
-            self._store.campaigns.close_unfinished(unsaid.campaign, unsaid.why, at)
-        self._unsaid = None
+    def resume_interrupted(self) -> None:
+        """Once the bench may be driven again, resume the campaign that was interrupted when it was lost."""
+        self._recovery.record_end()
+        if self._recovery.has_unfinished and self._job is None and self._may_drive:
+            self.resume_unfinished()
 
     def pause(self, campaign: int, request: ReasonRequest) -> CampaignResponse:
         """Ask the running campaign to hold after the present data set. Raises Conflict when it does not run here."""
@@ -227,35 +194,22 @@ class BenchRunner:
     def _run(self, job: _Job, prepared: Prepared) -> None:
         def seen(progress: Progress) -> None:
             job.progress = progress
-            self._ring()
+            self._listeners.notify()
 
         try:
             answer = run(self._store, prepared, job.control, seen)
-            self._left = self._left or answer.state == CampaignState.INTERRUPTED
+            if answer.state == CampaignState.INTERRUPTED:
+                self._recovery.expect_resume()
         except StoreError as error:
-            self._unsaid = _Unsaid(job.row.id, str(error))
+            self._recovery.expect_end(job.row.id, str(error))
             raise
         finally:
             self._job = None
-            self._ring()
-
-    def _ring(self) -> None:
-        for listener in tuple(self._listeners):
-            try:
-                listener()
-            except RuntimeError:  # its loop has ended: nobody listens there any more
-                with contextlib.suppress(ValueError):
-                    self._listeners.remove(listener)
+            self._listeners.notify()
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
-        self._listeners.append(listener)
-
-        def stop() -> None:
-            with contextlib.suppress(ValueError):
-                self._listeners.remove(listener)
-
-        return stop
+        return self._listeners.add(listener)
 
     def status(self, campaign: int) -> CampaignResponse | None:
         """Return the live picture of a campaign that runs here."""

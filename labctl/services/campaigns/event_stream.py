@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Hashable
 from typing import Any, TypeVar, cast
 
 from labctl.services.campaigns.status import ENDED, event_answer
-from labctl.services.schemas.answers import CampaignResponse, EventResponse
+from labctl.services.schemas.campaigns import CampaignResponse, EventResponse
 from labctl.store import Store
 
 #: An open event stream says that it is alive after this long without an event.
@@ -101,7 +101,7 @@ class CampaignEventStream:
         """
 
         def look() -> tuple[str, list[EventResponse]]:
-            state = self._store.campaigns.get(campaign).state
+            state = self._store.campaigns.state(campaign)
             return state, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
 
         return await self._status_cache.at(("told", campaign, after), look)

@@ -3,39 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import closing
 
 from pydantic import ValidationError
 
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, VirtualClock
-from instruments.errors import InstrumentError
 from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.services.benches.host import boot_id, power_failed
 from labctl.services.benches.lease import holding, open_for
-from labctl.services.campaigns.execution import (
-    Attend,
-    Observe,
-    Prepared,
-    clock_for,
-    operator_of,
-    refuse_unconfirmed,
-    run_attended,
-)
-from labctl.services.campaigns.status import from_rows, how_far
-from labctl.services.commands.protocol import ResumeRequest
+from labctl.services.campaigns.execution import Attend, Observe, run_attended
+from labctl.services.campaigns.preparation import Prepared, clock_for, operator_of, refuse_unconfirmed
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
 from labctl.store import CampaignRow, ResumePoint, Store, TakeUp, open_store
 from procedures.execution.resume import Restart
-from procedures.execution.safe_state import make_safe
+from procedures.monitoring.campaign_time import CampaignTime
 from procedures.planning.plan import Plan
 from procedures.recipe.recipe import Recipe
-
-#: A campaign that was taken up so often without finishing a step needs a person.
-MOST_TRIES = 5
 
 
 def plan_of(store: Store, row: CampaignRow) -> Plan:
@@ -48,7 +34,7 @@ def plan_of(store: Store, row: CampaignRow) -> Plan:
     )
 
 
-def as_it_was(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
+def with_original_simulation(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
     """Return a simulated bench with the simulation that a campaign was begun in: the same units, on the same day.
 
     A real bench is what it is. Raises Conflict for a simulation that this labctl does not know any more.
@@ -112,7 +98,9 @@ def prepare_resume(
         dropped=standing.dropped,
         skipped=standing.skipped,
     )
-    return Prepared(campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, clock.now_s() - t_s)
+    return Prepared(
+        campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, CampaignTime(clock, t_s)
+    )
 
 
 def _refuse_other_units(row: CampaignRow, bench_file: BenchFile) -> None:
@@ -122,40 +110,6 @@ def _refuse_other_units(row: CampaignRow, bench_file: BenchFile) -> None:
             f"campaign {row.id} measures {', '.join(sorted(row.recordings))}, bench {bench_file.name} carries "
             f"{', '.join(sorted(here))}; name the campaign's own bench with --bench"
         )
-
-
-def too_often(standing: ResumePoint) -> str | None:
-    """Return why a campaign is not taken up by itself any more, or None."""
-    if standing.tries < MOST_TRIES:
-        return None
-    return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
-
-
-def to_be_taken_up(store: Store, bench: str) -> str:
-    """Say which campaign a service finds left on its bench when it starts, and what becomes of it; empty for none."""
-    row = next((row for row in store.campaigns.unfinished() if row.bench_name == bench), None)
-    if row is None:
-        return ""
-    text = how_far(from_rows(store, row))
-    if store.benches.unconfirmed(bench):
-        return f"{text} and is not taken up: bench {bench} was not confirmed safe"
-    if why_not := too_often(store.resume_points.of_campaign(row.id)):
-        return f"{text} and is not taken up: {why_not}"
-    return f"{text} and is taken up now, safe state first"
-
-
-def leave_safe(store: Store, bench_file: BenchFile, clock: Clock) -> None:
-    """Make a bench safe whose campaign is not taken up; what cannot be confirmed stays on its status."""
-    if bench_file.is_simulated:  # it ended with its process
-        return
-    complaints: tuple[str, ...] = ()
-    try:
-        with closing(open_bench(bench_file, clock)) as bench:
-            complaints = make_safe(bench, clock)
-    except (InstrumentError, OSError) as error:
-        complaints = (*complaints, str(error))
-    if complaints:
-        store.benches.mark(bench_file.name, "; ".join(complaints), clock.utc())
 
 
 def resume_here(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import timedelta
 from typing import Literal
 
 from instruments.bench_config import BenchFile
-from labctl.services.schemas.answers import CampaignResponse, EventResponse, OutputResponse, PromptResponse
-from labctl.store import CampaignRow, EventRow, Store
+from labctl.services.schemas.campaigns import CampaignResponse, EventResponse, OutputResponse, PromptResponse
+from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
 from procedures.contracts.control import ControlRequest
 from procedures.monitoring.progress import Progress
 
@@ -55,14 +55,17 @@ def _open_request(request: ControlRequest, state: str) -> Literal["pause", "abor
 
 def from_rows(store: Store, row: CampaignRow) -> CampaignResponse:
     """Return a campaign as the database tells it."""
-    steps = store.campaigns.steps(row.id)
-    begun = [step for step in steps if step.started_s is not None]
-    done_s = sum(step.expected_s for step in steps if step.state == "done")
-    there = store.campaigns.last_environment(row.id) or {}
-    current = begun[-1] if begun else None
-    left_s = sum(step.expected_s for step in steps if step.state in {"planned", "running"})
-    events = store.campaigns.events(row.id, limit=1_000_000)
-    faults = [event for event in events if event.level == "error"]
+    return statuses_of(store, [row])[0]
+
+
+def statuses_of(store: Store, rows: Sequence[CampaignRow]) -> list[CampaignResponse]:
+    """Return campaigns as the database tells them, in the order of the rows."""
+    summaries = store.campaigns.summaries([row.id for row in rows])
+    return [_from_summary(row, summaries[row.id]) for row in rows]
+
+
+def _from_summary(row: CampaignRow, seen: CampaignSummary) -> CampaignResponse:
+    current, there = seen.current, seen.environment
     over = row.state in ENDED
     return CampaignResponse(
         id=row.id,
@@ -71,17 +74,17 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignResponse:
         state=row.state,
         reason=row.reason,
         step=None if current is None else current.number + 1,
-        steps=len(steps),
+        steps=seen.steps,
         step_text="" if current is None else current.kind.replace("_", " "),
-        progress=1.0 if row.state == "done" else min(done_s / max(row.expected_s, 1e-9), 1.0),
-        expected_end=None if over or not events else events[-1].at + timedelta(seconds=left_s),
-        t_s=max([there.get("t_s") or 0.0, *(event.t_s for event in events[-1:])]) if events else None,
-        chamber_c=there.get("chamber_c"),
-        setpoint_c=there.get("chamber_setpoint_c"),
-        gyro_c=there.get("temperature_c"),
+        progress=1.0 if row.state == "done" else min(seen.done_s / max(row.expected_s, 1e-9), 1.0),
+        expected_end=None if over or seen.last_at is None else seen.last_at + timedelta(seconds=seen.left_s),
+        t_s=None if seen.last_t_s is None else max(there.t_s or 0.0, seen.last_t_s),
+        chamber_c=there.chamber_c,
+        setpoint_c=there.setpoint_c,
+        gyro_c=there.temperature_c,
         rate_dps=None if current is None else current.body.get("rate_dps", 0.0),
-        last_error=faults[-1].message if faults else None,
-        dropped=store.resume_points.of_campaign(row.id).dropped,
+        last_error=seen.last_error,
+        dropped=dict(seen.dropped),
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
@@ -90,20 +93,20 @@ def from_rows(store: Store, row: CampaignRow) -> CampaignResponse:
 
 def list_campaigns(store: Store) -> list[CampaignResponse]:
     """Return every campaign, newest first."""
-    return _told(store, store.campaigns.all)
+    return _statuses(store, store.campaigns.all)
 
 
 def campaign_status(store: Store, campaign: int | None) -> CampaignResponse:
     """Return where a campaign is; without a number the newest. Raises NotFound."""
     number = store.campaigns.newest().id if campaign is None else campaign
-    return _told(store, lambda: [store.campaigns.get(number)])[0]
+    return _statuses(store, lambda: [store.campaigns.get(number)])[0]
 
 
-def _told(store: Store, read: Callable[[], list[CampaignRow]]) -> list[CampaignResponse]:
-    """Return campaigns as the database tells them, those that nobody runs as left.
+def _statuses(store: Store, read: Callable[[], list[CampaignRow]]) -> list[CampaignResponse]:
+    """Return campaigns as the database tells them; those that no process runs are marked as abandoned.
 
-    Whoever wrote to the database may have ended its campaign after the rows were read and let go before the lock was
-    looked at: rows are read again before anything is called left.
+    The writing process may have ended its campaign after the rows were read, and released the lock before it was
+    tested: rows are read again before a campaign is called abandoned.
     """
     rows = read()
     left = {row.id for row in rows if row.state not in ENDED}
@@ -111,12 +114,12 @@ def _told(store: Store, read: Callable[[], list[CampaignRow]]) -> list[CampaignR
         left.clear()
     if left:
         rows = read()
-    return [looked_after(from_rows(store, row), by_somebody=row.id not in left) for row in rows]
+    return [mark_abandoned(answer, attended=answer.id not in left) for answer in statuses_of(store, rows)]
 
 
 def abandoned_campaigns(store: Store) -> list[CampaignResponse]:
     """Return the campaigns that no process runs any more and that have not ended, newest first."""
-    return [answer for answer in _told(store, store.campaigns.unfinished) if answer.abandoned]
+    return [answer for answer in _statuses(store, store.campaigns.unfinished) if answer.abandoned]
 
 
 def how_far(answer: CampaignResponse) -> str:
@@ -136,9 +139,9 @@ def outlives_its_process(row: CampaignRow) -> bool:
     return not BenchFile.model_validate({**row.bench, "simulation": None}).is_simulated
 
 
-def looked_after(answer: CampaignResponse, *, by_somebody: bool) -> CampaignResponse:
-    """Say so when no process runs a campaign that has not ended."""
-    if answer.state in ENDED or by_somebody:
+def mark_abandoned(answer: CampaignResponse, *, attended: bool) -> CampaignResponse:
+    """Return the status, marked as abandoned when no process runs a campaign that has not ended."""
+    if answer.state in ENDED or attended:
         return answer
     why = answer.reason if answer.state == "interrupted" else "no process runs it any more: look after the bench"
     reason = (
@@ -149,7 +152,7 @@ def looked_after(answer: CampaignResponse, *, by_somebody: bool) -> CampaignResp
 
 
 def event_answer(row: EventRow) -> EventResponse:
-    """Return an event as it leaves the house."""
+    """Return the response of an event."""
     return EventResponse(
         id=row.id, at=row.at, t_s=row.t_s, kind=row.kind, level=row.level, message=row.message, device=row.device,
         value=row.value, limit=row.limit, unit=row.unit,

@@ -1,16 +1,78 @@
-"""The store to read from: all that a command begins with which changes nothing."""
+"""Opening a database for a command: in this process, or through the service that holds it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
+from instruments.clock import SystemClock
 from labctl.config import default_database
-from labctl.store import Store, open_store
+from labctl.services.campaigns.status import campaign_status
+from labctl.services.commands.command import Command, CommandExecutor, LocalExecutor, RequestT, ResponseT
+from labctl.services.commands.context import CommandContext
+from labctl.services.commands.foreground import ForegroundControl, OpenTerminal, no_terminal
+from labctl.services.schemas.campaigns import CampaignResponse
+from labctl.store import Store, holder_of, open_store
 
 
 @contextmanager
 def open_readonly(database: str | None) -> Iterator[Store]:
-    """Give the store to read from, also while another process writes."""
+    """Open the store for reading, also while another process writes."""
     with open_store(database or default_database(), write=False) as store:
         yield store
+
+
+def service_url(database: str | None) -> str | None:
+    """Return the address of the service that holds the database; None when no service does."""
+    holder = holder_of(database or default_database())
+    return holder.url if holder is not None else None
+
+
+@contextmanager
+def open_commands(database: str | None, open_terminal: OpenTerminal = no_terminal) -> Iterator[CommandExecutor]:
+    """Give the executor of commands on a database: the service that holds it, or else this process.
+
+    `open_terminal` opens the terminal of a campaign that runs in the foreground of this process.
+    """
+    location = database or default_database()
+    if url := service_url(location):
+        from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415  an HTTP client only where one is needed
+
+        yield HttpExecutor(url)
+        return
+    with ExitStack() as opened:
+
+        def open_writable() -> Store:
+            return opened.enter_context(open_store(location, write=True))
+
+        yield LocalExecutor(CommandContext(open_writable, SystemClock(), ForegroundControl(location, open_terminal)))
+
+
+def execute(database: str | None, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
+    """Execute one command on a database. Raises LabctlError."""
+    with open_commands(database) as commands:
+        return commands.execute(command, request)
+
+
+def current_status(database: str | None, campaign: int | None) -> CampaignResponse:
+    """Return where a campaign is: live from the service that holds the database, else as the database tells.
+
+    Without a number: the newest campaign. Raises NotFound.
+    """
+    with open_readonly(database) as store:
+        answer = campaign_status(store, campaign)
+    if url := service_url(database):
+        from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415
+
+        return HttpExecutor(url).fetch(f"/api/campaigns/{answer.id}", CampaignResponse)
+    return answer
+
+
+def campaign_to_resume(database: str | None, campaign: int | None) -> int | None:
+    """Return the campaign that a resume without a number means.
+
+    With a service the newest campaign; None without one: the newest that is unfinished, as the resume itself finds it.
+    """
+    if campaign is None and service_url(database) is not None:
+        return current_status(database, None).id
+    return campaign

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from labctl.errors import BadInput
+from labctl.errors import BadInput, LabctlError
 from labctl.fitting.criticism import criticise
 from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
@@ -15,8 +15,9 @@ from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.next_experiment import experiments_for
 from labctl.services.criticism.report_text import answer_of
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.formulas import catalogue_with
-from labctl.services.schemas.answers import CriticismResponse, ResidualsResponse
+from labctl.services.criticism.verification import verify
+from labctl.services.effects import catalogue_with
+from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse, VerificationResponse
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 
@@ -32,10 +33,19 @@ def evaluate(
     columns = residual_columns(found.data, found.residuals, measured.points, found.base)
     serial, version = calibration.serial, calibration.version
     experiments = experiments_for(store, recording.campaign, found)
+    criticism = answer_of(serial, version, recording.id, found, experiments)
     return (
-        answer_of(serial, version, recording.id, found, experiments),
+        criticism.model_copy(update={"applied": _applied(store, calibration, measured)}),
         ResidualsResponse(serial=serial, version=version, recording=recording.id, columns=columns),
     )
+
+
+def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:
+    """Return the version as it is on the recording; None where it cannot be applied there: a channel is missing."""
+    try:
+        return verify(store, calibration, measured)
+    except LabctlError:
+        return None
 
 
 def model_of(row: CalibrationRecord) -> ErrorModel:

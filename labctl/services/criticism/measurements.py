@@ -10,7 +10,7 @@ import numpy as np
 from labctl.errors import BadInput
 from labctl.fitting.criticism import decimate
 from labctl.recording import Recording
-from labctl.services.recordings.transfer import points_of
+from labctl.services.recordings.loading import points_of
 from labctl.store import RecordingRow, Store
 
 

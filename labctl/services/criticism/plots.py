@@ -4,30 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import Any
-
-from pydantic import Field
 
 from labctl.services.cache import cached
-from labctl.services.criticism.criticise import criticise_unit, ladder
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.criticism.ladder import ladder
+from labctl.services.schemas.criticism import PictureResponse, PicturesResponse
 from labctl.store import Store
-
-
-class PictureResponse(ResponseModel):
-    """One picture."""
-
-    id: str
-    title: str
-    how_to_read: str
-    effects: list[str] = Field(description="Effects that would draw something there.")
-    figure: dict[str, Any] = Field(description="Plotly: data and layout.")
-
-
-class PicturesResponse(ResponseModel):
-    """All of them, as they are kept: drawing takes a second."""
-
-    pictures: list[PictureResponse]
 
 
 def pictures_unit(store: Store, serial: str, version: int | None, recording: int | None) -> list[PictureResponse]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from labctl.plots import report_html
-from labctl.services.criticism.criticise import ladder
-from labctl.services.schemas.answers import CriticismResponse
+from labctl.services.criticism.ladder import ladder
+from labctl.services.schemas.criticism import CriticismResponse
 from labctl.store import Store
 
 

@@ -19,7 +19,7 @@ from labctl.fitting.criticism import (
     worst_data_sets,
 )
 from labctl.fitting.effects import CATALOGUE, kind_of
-from labctl.services.schemas.answers import CriticismResponse
+from labctl.services.schemas.criticism import CriticismResponse
 
 #: Channels that run on while temperatures rise.
 HISTORY = frozenset({"t_s", "power_s"})

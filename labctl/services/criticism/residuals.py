@@ -13,7 +13,7 @@ from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
-from labctl.services.schemas.answers import ResidualColumns
+from labctl.services.schemas.criticism import ResidualColumns
 
 
 def residual_columns(

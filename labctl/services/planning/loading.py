@@ -15,7 +15,7 @@ from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
 from instruments.interfaces.table import TableLimits
 from labctl.errors import BadBench
-from labctl.services.schemas.answers import PlanResponse, Visibility
+from labctl.services.schemas.plans import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
@@ -133,8 +133,3 @@ def plan_answer(plan: Plan, bench_file: BenchFile, look: Look | None = None) -> 
         schedule_hash=plan.schedule_hash,
         visibility=look(plan, bench_file) if look else None,
     )
-
-
-def shipped_recipe_names() -> dict[str, Path]:
-    """Return the recipes that come with labctl."""
-    return shipped_recipes()

@@ -1,92 +1,33 @@
-"""Plans to look at: the recipes there are, a plan's steps as columns, and what became of a campaign's."""
+"""Plans before anything moves: the shipped recipes, and the steps of a plan."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
-
-import tomli_w
-from pydantic import Field, ValidationError
+from collections.abc import Sequence
+from typing import Any
 
 from instruments.bench_config import BenchFile
 from labctl.errors import BadInput
-from labctl.services.commands.protocol import PlanRequest
 from labctl.services.planning.loading import (
+    Look,
     bench_for,
     limits_of,
     load_bench,
     load_recipe,
     plan_answer,
-    recipe_document,
 )
-from labctl.services.schemas.answers import PlanResponse, ResponseModel
-from labctl.services.simulation.visibility import visibility
-from labctl.store import StepRow, Store
+from labctl.services.planning.timeline import timeline_columns
+from labctl.services.schemas.plans import (
+    PlannedResponse,
+    PlanRequest,
+    RecipeResponse,
+    TimelineColumns,
+)
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.plan import make_plan
-from procedures.recipe.recipe import Recipe, shipped_recipes
+from procedures.recipe.recipe import shipped_recipes
 
 #: What a plan could find is worked out by walking through it second by second; a longer one is refused.
 LONGEST_LOOK_S = 14 * 86_400.0
-
-StepState = Literal["to come", "running", "done", "failed", "interrupted", "skipped"]
-
-
-class RecipeResponse(ResponseModel):
-    """A recipe that comes with labctl, and what it would take."""
-
-    name: str
-    description: str
-    text: str = Field(description="The recipe itself, TOML.")
-    bench: str
-    steps: int | None = None
-    datasets: int | None = None
-    expected_s: float | None = None
-    refused: str | None = Field(default=None, description="Why this bench cannot do it; then there are no figures.")
-    remark: str = Field(default="", description="What speaks against it although the bench can do it.")
-
-
-class TimelineColumns(ResponseModel):
-    """The steps of a plan in order, as lists of equal length."""
-
-    number: list[int] = Field(description="From 1.")
-    kind: list[str]
-    start_s: list[float] = Field(description="From the beginning, if every step takes as long as expected.")
-    expected_s: list[float]
-    temperature_c: list[float | None] = Field(description="Set point in force; null: none was set yet.")
-    rate_dps: list[float | None] = Field(description="Of data sets; null: the table is at rest.")
-    position: list[str | None] = Field(description="In which the units are; null: as they were found.")
-    dataset: list[int | None]
-
-
-class PlannedResponse(PlanResponse):
-    """What a campaign would do, with its steps."""
-
-    timeline: TimelineColumns
-
-
-class RunColumns(TimelineColumns):
-    """The steps of a campaign, with what became of each."""
-
-    state: list[StepState]
-    started_s: list[float | None] = Field(description="Campaign time.")
-    ended_s: list[float | None]
-    forecast_s: list[float] = Field(description="When it began, or will if all that is left takes as expected.")
-
-
-class CampaignPlanResponse(ResponseModel):
-    """The plan of a campaign, and how far it is."""
-
-    campaign: int
-    recipe: str
-    text: str = Field(description="The recipe as it was run, TOML; empty: by an older labctl.")
-    bench: str
-    state: str
-    schedule_hash: str
-    steps: int
-    datasets: int
-    expected_s: float
-    timeline: RunColumns
 
 
 def list_recipes(bench: BenchFile | None) -> list[RecipeResponse]:
@@ -116,8 +57,8 @@ def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
     return ""
 
 
-def plan_steps(request: PlanRequest, bench: BenchFile | None) -> PlannedResponse:
-    """Plan a recipe on a bench, or on the simulated one that fits it best.
+def plan_steps(request: PlanRequest, bench: BenchFile | None, look: Look) -> PlannedResponse:
+    """Plan a recipe on a bench, or on the simulated one that fits it best; `look` returns what the plan could find.
 
     Raises RecipeError, PlanRefused, BadInput.
     """
@@ -129,75 +70,6 @@ def plan_steps(request: PlanRequest, bench: BenchFile | None) -> PlannedResponse
             f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days; what it could find is worked out for up "
             f"to {LONGEST_LOOK_S / 86_400:.0f}"
         )
-    answer = plan_answer(plan, on, visibility if request.visibility else None)
-    columns = _columns([step.model_dump(mode="json") for step in plan.steps])
+    answer = plan_answer(plan, on, look if request.visibility else None)
+    columns = timeline_columns([step.model_dump(mode="json") for step in plan.steps])
     return PlannedResponse(**answer.model_dump(), timeline=TimelineColumns(**columns))
-
-
-def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
-    """Return a campaign's steps as they were written down, with what became of each. Raises NotFound."""
-    row = store.campaigns.get(campaign)
-    steps = store.campaigns.steps(campaign)
-    columns = _columns([step.body for step in steps])
-    timeline = RunColumns(
-        **columns,
-        state=[_state(step.state) for step in steps],
-        started_s=[step.started_s for step in steps],
-        ended_s=[step.ended_s for step in steps],
-        forecast_s=_forecast(steps),
-    )
-    return CampaignPlanResponse(
-        campaign=campaign, recipe=row.recipe_name, text=_text(row.recipe), bench=row.bench_name, state=row.state,
-        schedule_hash=row.schedule_hash, steps=len(steps),
-        datasets=sum(number is not None for number in columns["dataset"]), expected_s=row.expected_s,
-        timeline=timeline,
-    )  # fmt: skip
-
-
-def _text(recipe: Mapping[str, Any]) -> str:
-    """Return a recipe as text; nothing where it was written by a labctl whose recipes had other keys."""
-    try:
-        return tomli_w.dumps(recipe_document(Recipe.model_validate(dict(recipe))))
-    except ValidationError:
-        return ""
-
-
-def _state(word: str) -> StepState:
-    match word:
-        case "planned":
-            return "to come"
-        case "running" | "done" | "failed" | "skipped":
-            return word
-        case _:
-            return "interrupted"
-
-
-def _forecast(steps: Sequence[StepRow]) -> list[float]:
-    """Return when each step began or will begin, campaign time in s."""
-    found: list[float] = []
-    free_s = 0.0
-    for step in steps:
-        begun = step.started_s if step.started_s is not None and step.state != "planned" else free_s
-        found.append(begun)
-        if step.state == "skipped":
-            continue
-        over = step.ended_s is not None and step.state in {"done", "failed"}
-        free_s = step.ended_s if over and step.ended_s is not None else begun + step.expected_s
-    return found
-
-
-def _columns(steps: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Return the steps of a plan (JSON) as columns; set point and position stay in force until the next."""
-    found: dict[str, list[Any]] = {name: [] for name in TimelineColumns.model_fields}
-    start_s, temperature_c, position = 0.0, None, None
-    for number, step in enumerate(steps, start=1):
-        temperature_c, position = step.get("temperature_c", temperature_c), step.get("position", position)
-        row = {
-            "number": number, "kind": step["kind"], "start_s": start_s, "expected_s": step["expected_s"],
-            "temperature_c": temperature_c, "rate_dps": step.get("rate_dps"), "position": position,
-            "dataset": step.get("dataset"),
-        }  # fmt: skip
-        for name, value in row.items():
-            found[name].append(value)
-        start_s += step["expected_s"]
-    return found

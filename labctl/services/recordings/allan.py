@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.static_record import StaticRecord, static_record
@@ -14,23 +13,11 @@ from labctl.fitting.numeric.allan import LEAST_READINGS, allan
 from labctl.recording import Recording, RecordingInfo
 from labctl.recording.points import temperature_of
 from labctl.services.cache import cached
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.recordings import AllanResponse
 from labctl.store import Store
 
 #: What a static record is looked for in, beside the outputs.
 NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "temperature_c", "chamber_c", "valid")
-
-
-class AllanResponse(ResponseModel):
-    """An overlapping Allan deviation, axis by axis, and the figures of IEEE Std 952 that it shows."""
-
-    recording: int
-    datasets: list[int] = Field(description="First and last data set of the stretch.")
-    temperature_c: float | None
-    duration_s: float | None
-    axes: dict[str, dict[str, Any]] = Field(
-        description="tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K."
-    )
 
 
 def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanResponse:

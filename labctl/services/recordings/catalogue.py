@@ -2,55 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from labctl.recording import Recording
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.recordings import ChannelColumns, DataSetsResponse, RecordingResponse
 from labctl.store import MeanRow, RecordingRow, Store
-
-
-class RecordingResponse(ResponseModel):
-    """One line of the list of recordings."""
-
-    id: int
-    serial: str
-    kind: str = Field(description="samples, points or coefficients.")
-    campaign: int | None = Field(description="The campaign that made it; null: it was imported.")
-    datasets: int
-    readings: int
-    created_at: datetime
-    notes: str = ""
-
-
-class ChannelColumns(ResponseModel):
-    """A channel's figures by data set, in the channel's unit; null: none."""
-
-    mean: list[float | None]
-    std: list[float | None]
-
-
-class DataSetsResponse(ResponseModel):
-    """The data sets of a recording, as lists of equal length."""
-
-    recording: int
-    number: list[int]
-    state: list[str]
-    reason: list[str] = Field(description="Why it is not complete; empty where it is.")
-    position: list[str]
-    run: list[int]
-    mounting: list[int]
-    table_rate_dps: list[float]
-    t_from_s: list[float | None]
-    t_until_s: list[float | None]
-    n: list[int]
-    lost: list[int]
-    damaged: list[int]
-    chamber_setpoint_c: list[float | None]
-    channels: dict[str, ChannelColumns]
 
 
 def list_recordings(store: Store) -> list[RecordingResponse]:
@@ -122,3 +80,34 @@ def _of_table(numbers: list[int], points: Recording) -> dict[str, ChannelColumns
 
 def _numbers(values: np.ndarray[Any, Any]) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def describe_recording(store: Store, recording: int, *, points: bool = True) -> dict[str, Any]:
+    """Return what a recording is and, if asked for, the means of its data sets."""
+    row = store.recordings.get(recording)
+    about = {
+        "id": row.id,
+        "serial": row.serial,
+        "campaign": row.campaign,
+        "kind": row.kind,
+        "info": dict(row.info),
+        "created_at": row.created_at.isoformat(),
+        "datasets": row.datasets,
+        "readings": row.readings,
+    }
+    if not points:
+        return about
+    columns = store.recordings.points(recording).columns
+    return {**about, "points": {name: np.asarray(values).tolist() for name, values in columns.items()}}
+
+
+def dataset_samples(store: Store, recording: int, dataset: int, limit: int) -> dict[str, Any]:
+    """Return the readings of one data set, at most `limit`."""
+    columns = store.recordings.dataset(recording, dataset)
+    n = len(next(iter(columns.values()), ()))
+    return {
+        "recording": recording,
+        "dataset": dataset,
+        "readings": n,
+        "columns": {name: np.asarray(values)[:limit].tolist() for name, values in columns.items()},
+    }

@@ -1,30 +1,24 @@
-"""Envelopes of a recording's readings: least, largest and mean in bins of each data set, made once, kept as a file.
+"""Envelopes of a recording's readings: least, largest and mean in bins of each data set, made once and cached as files.
 
-They let millions of readings be drawn without reading them again. A file is named by all that it depends on, as kept
-answers are; a damaged or missing one only costs the time to make it again.
+With them millions of readings are drawn without being read again.
 """
 
 from __future__ import annotations
 
-import hashlib
 import io
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
-from typing import IO, Any
-from zipfile import BadZipFile
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from platformdirs import user_cache_path
 
-from labctl.services.cache import code_digest, single_flight, write_cached
+from labctl.services.cache import FileCache
 from labctl.store import Store
 
 #: Bins of a data set: so many, or one for this many readings where it is far longer than others, up to a limit.
 LEAST_BINS, READINGS_A_BIN, MOST_BINS = 64, 128, 4096
-#: A file has some 24 bytes a bin, and a recording up to a dozen files; the oldest go when there are more.
-MOST_FILES = 200
+#: A file has some 24 bytes a bin, and a recording up to a dozen files.
+ENVELOPES = FileCache("envelopes", ".npz", most=200)
 #: Columns that are no measured course.
 NO_COURSE = frozenset({"dataset", "t_s", "run", "mounting", "valid"})
 
@@ -55,37 +49,21 @@ def courses_of(columns: dict[str, NDArray[Any]]) -> list[str]:
 def envelope_of(store: Store, recording: int, channel: str) -> Envelope:
     """Return the envelope of one channel over all complete data sets; empty where none has it.
 
-    Each channel is made when it is looked at: whoever opens a recording waits for one, not for twelve.
+    Each channel is made when it is asked for: opening a recording waits for one channel, not for twelve.
     """
-    asked = f"envelope {code_digest()} {store.recordings.fingerprint(recording, complete=True)} {channel}"
-    name = hashlib.sha256(asked.encode()).hexdigest()
-    file = user_cache_path("labctl") / "envelopes" / f"{name}.npz"
-    if (found := _read(file)) is not None:
-        return found
-    with single_flight(asked):
-        if (found := _read(file)) is not None:
-            return found
-        made = _made(store, recording, channel)
-        packed = io.BytesIO()
-        np.savez(packed, t_s=made.t_s, bounds=np.stack([made.low, made.high, made.mean, made.n]).astype(np.float32))
-        with suppress(OSError):
-            write_cached(file, packed.getvalue(), MOST_FILES)
-    packed.seek(0)
-    return _taken(packed)
+    readings = store.recordings.fingerprint(recording, complete=True)
+    question = {"kind": "envelope", "readings": readings, "channel": channel}
+    return ENVELOPES.get(question, _decoded, lambda: _encoded(_made(store, recording, channel)))
 
 
-def _read(file: Path) -> Envelope | None:
-    try:
-        with file.open("rb") as source:
-            found = _taken(source)
-        file.touch()
-        return found
-    except (OSError, EOFError, ValueError, KeyError, BadZipFile):
-        return None
+def _encoded(made: Envelope) -> bytes:
+    packed = io.BytesIO()
+    np.savez(packed, t_s=made.t_s, bounds=np.stack([made.low, made.high, made.mean, made.n]).astype(np.float32))
+    return packed.getvalue()
 
 
-def _taken(source: IO[bytes]) -> Envelope:
-    with np.load(source, allow_pickle=False) as arrays:
+def _decoded(content: bytes) -> Envelope:
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
         low, high, mean, n = arrays["bounds"].astype(np.float64)
         return Envelope(arrays["t_s"], low, high, mean, n)
 

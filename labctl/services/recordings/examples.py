@@ -6,23 +6,11 @@ from datetime import datetime
 from importlib import resources
 from pathlib import Path
 
-from pydantic import Field
-
 from labctl.errors import BadInput
-from labctl.services.commands.protocol import SimulatedRequest
 from labctl.services.recordings.transfer import suggested_model
-from labctl.services.schemas.answers import ImportResponse
+from labctl.services.schemas.recordings import SimulatedRecordingResponse, SimulatedRequest
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from labctl.store import Store
-
-
-class SimulatedRecordingResponse(ImportResponse):
-    """A simulated recording that is now in the database."""
-
-    recipe: str
-    bench: str
-    seed: int
-    hidden: dict[str, float] = Field(description="Effect -> size that is hidden in the unit.")
 
 
 def examples() -> dict[str, Path]:

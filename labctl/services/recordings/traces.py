@@ -7,34 +7,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
 from labctl.recording.columns import BY_NAME
 from labctl.services.recordings.envelopes import Array, Envelope, bins_of, courses_of, envelope_of
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.recordings import TraceResponse
 from labctl.store import DataSetRow, Store
 
 #: More readings than this are not read for one picture; their envelope is drawn.
 MOST_RAW = 2_000_000
-
-
-class TraceResponse(ResponseModel):
-    """One channel over a window of time, in bins that hold readings, as lists of equal length."""
-
-    recording: int
-    channel: str
-    unit: str
-    from_s: float | None
-    until_s: float | None
-    raw: bool = Field(description="Binned from the readings themselves; else from envelopes of each data set.")
-    t_s: list[float] = Field(description="Mean time of the bin's readings.")
-    min: list[float]
-    max: list[float]
-    mean: list[float]
-    n: list[int]
-    channels: list[str] = Field(description="What can be asked for.")
 
 
 def trace(

@@ -1,25 +1,24 @@
-"""Recordings: taken in, given out, looked at."""
+"""Import and export of recordings in the interchange format."""
 
 from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Literal
+from typing import IO, BinaryIO, Literal
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
-import numpy as np
+from labctl.errors import BadRecording
+from labctl.recording import RecordingInfo, read_recording, write_recording
+from labctl.services.schemas.recordings import ImportResponse
+from labctl.store import Store
 
-from labctl.errors import BadRecording, NotEnoughData, NotFound
-from labctl.recording import Recording, RecordingInfo, read_recording, write_recording
-from labctl.recording.points import with_pieces
-from labctl.services.schemas.answers import ImportResponse
-from labctl.store import RecordingRow, Store
-
-if TYPE_CHECKING:
-    from labctl.services.commands.protocol import Commands
-
+CHUNK_BYTES = 1 << 20
+#: CSV shrinks to a fifth at the quickest; Parquet is packed already.
+EFFORT = 1
 STEMS = ("samples", "points", "coefficients", "environment")
 FILE_NAMES = frozenset({"recording.toml", *(f"{stem}.{suffix}" for stem in STEMS for suffix in ("csv", "parquet"))})
 
@@ -47,8 +46,13 @@ def suggested_model(info: RecordingInfo) -> str:
     return "yang2018" if len(info.axes) > 1 else "ojeda2000"
 
 
-def import_files(commands: Commands, files: Sequence[tuple[str, BinaryIO]]) -> ImportResponse:
-    """Take in a recording from uploaded files; their names may only be the format's. Raises BadRecording."""
+def import_files(
+    files: Sequence[tuple[str, BinaryIO]], import_from: Callable[[Path], ImportResponse]
+) -> ImportResponse:
+    """Import a recording from uploaded files; their names may only be the format's. Raises BadRecording.
+
+    `import_from` imports the folder that they are written to.
+    """
     names = [name for name, _ in files]
     for name in names:
         if name not in FILE_NAMES:
@@ -60,7 +64,7 @@ def import_files(commands: Commands, files: Sequence[tuple[str, BinaryIO]]) -> I
             with (Path(folder) / name).open("wb") as target:
                 shutil.copyfileobj(content, target)
         try:
-            return commands.import_recording(Path(folder))
+            return import_from(Path(folder))
         except BadRecording as error:
             raise BadRecording(str(error).replace(f"{folder}/", "")) from None
 
@@ -73,68 +77,37 @@ def export_recording(
     return write_recording(taken, folder, file_format)
 
 
-def points_of(store: Store, row: RecordingRow) -> Recording:
-    """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces."""
-    points = store.recordings.points(row.id, head=row)
-    if row.kind != "samples":
-        return points
-    return with_pieces(points, lambda dataset: store.recordings.dataset(row.id, dataset))
+@dataclass(frozen=True)
+class Download:
+    """A file without a name on the disk: it goes when it is closed, or with the process."""
+
+    name: str
+    size: int
+    content: IO[bytes]
+
+    def chunks(self) -> Iterator[bytes]:
+        """Yield the bytes, then close the file; also when whoever reads goes away."""
+        with self.content:
+            while chunk := self.content.read(CHUNK_BYTES):
+                yield chunk
 
 
-def newest_recording(store: Store, serial: str, recording: int | None) -> int:
-    """Return the number of `newest_row`. Raises NotFound, NotEnoughData."""
-    return newest_row(store, serial, recording).id
-
-
-def newest_row(store: Store, serial: str, recording: int | None) -> RecordingRow:
-    """Return the recording asked for, checked to be the unit's, or the newest in which something was measured.
-
-    Raises NotFound, NotEnoughData where no data set is complete yet.
-    """
-    store.units.get(serial)
-    rows = store.recordings.of_unit(serial) if recording is None else [store.recordings.get(recording)]
-    if not rows:
-        raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign makes one")
-    row = next((row for row in rows if _measured(row)), rows[0])
-    if row.serial != serial:
-        raise NotFound(f"recording {recording} is of unit {row.serial!r}, not of {serial!r}")
-    if not _measured(row):
-        raise NotEnoughData(
-            f"recording {row.id} of unit {serial!r} holds no complete data set yet; wait for its first, or name another"
-        )
-    return row
-
-
-def _measured(row: RecordingRow) -> bool:
-    return row.kind != "samples" or row.datasets > 0
-
-
-def describe_recording(store: Store, recording: int, *, points: bool = True) -> dict[str, Any]:
-    """Return what a recording is and, if asked for, the means of its data sets."""
-    row = store.recordings.get(recording)
-    about = {
-        "id": row.id,
-        "serial": row.serial,
-        "campaign": row.campaign,
-        "kind": row.kind,
-        "info": dict(row.info),
-        "created_at": row.created_at.isoformat(),
-        "datasets": row.datasets,
-        "readings": row.readings,
-    }
-    if not points:
-        return about
-    columns = store.recordings.points(recording).columns
-    return {**about, "points": {name: np.asarray(values).tolist() for name, values in columns.items()}}
-
-
-def dataset_samples(store: Store, recording: int, dataset: int, limit: int) -> dict[str, Any]:
-    """Return the readings of one data set, at most `limit`."""
-    columns = store.recordings.dataset(recording, dataset)
-    n = len(next(iter(columns.values()), ()))
-    return {
-        "recording": recording,
-        "dataset": dataset,
-        "readings": n,
-        "columns": {name: np.asarray(values)[:limit].tolist() for name, values in columns.items()},
-    }
+def zip_recording(store: Store, recording: int, file_format: Literal["parquet", "csv"]) -> Download:
+    """Return a recording in the interchange format as a zip with one folder. Raises NotFound."""
+    name = f"recording-{recording}"
+    with tempfile.TemporaryDirectory(prefix="labctl-export-") as made:
+        folder = Path(made) / name
+        written = export_recording(store, recording, folder, file_format)
+        target = tempfile.TemporaryFile(prefix="labctl-export-")  # noqa: SIM115  closed by whoever sends it
+        try:
+            packing = ZIP_DEFLATED if file_format == "csv" else ZIP_STORED
+            with ZipFile(target, "w", packing, compresslevel=EFFORT) as archive:
+                for file in written:
+                    archive.write(folder / file, f"{name}/{file}")
+                    (folder / file).unlink()
+            size = target.tell()
+            target.seek(0)
+        except BaseException:
+            target.close()
+            raise
+    return Download(f"{name}.zip", size, target)

@@ -6,10 +6,10 @@ from datetime import datetime
 
 from instruments.bench_config import BenchFile
 from labctl.errors import BadInput
-from labctl.services.commands.protocol import CampaignRequest
 from labctl.services.planning.loading import limits_of, load_recipe
 from labctl.services.schedule import times
-from labctl.services.schemas.answers import ScheduledResponse, StartEventResponse
+from labctl.services.schemas.campaigns import CampaignRequest
+from labctl.services.schemas.schedule import ScheduledResponse, StartEventResponse
 from labctl.store import NewStart, StartRow, Store
 from procedures.planning.plan import make_plan
 

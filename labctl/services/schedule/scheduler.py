@@ -14,9 +14,8 @@ from typing import Protocol
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
 from labctl.errors import BenchBusy, LabctlError
-from labctl.services.commands.protocol import CampaignRequest
 from labctl.services.schedule import times
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse
 from labctl.store import StartEventRow, StartRow, Store
 from procedures.contracts.errors import ProcedureError
 
@@ -33,7 +32,7 @@ class Runs(Protocol):
         """Whether a campaign may begin now."""
         ...
 
-    def take_up_cut_short(self) -> None:
+    def resume_interrupted(self) -> None:
         """Take up what was cut short, once that may be."""
         ...
 
@@ -100,7 +99,7 @@ class Scheduler:
             if self._owes:
                 self.settle()
                 self._owes = False
-            self._runner.take_up_cut_short()
+            self._runner.resume_interrupted()
             now = self._clock.utc()
             for row in self._store.starts.due(self._bench, now):
                 due = row.due_at if row.cron is None else self._last_due(row, row.cron, now)

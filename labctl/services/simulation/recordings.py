@@ -12,12 +12,11 @@ from pydantic import Field
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
 from labctl.errors import BadInput
 from labctl.recording import Recording, write_recording
-from labctl.services.commands.protocol import Request
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
-from labctl.services.schemas.answers import ResponseModel
+from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.simulation.effect_sizes import Sizing
 from labctl.services.simulation.hidden_effects import hidden_sizes, is_in_noise_units
-from labctl.services.simulation.sizing import Sizing
-from labctl.services.simulation.walk import simulate
+from labctl.services.simulation.plan_simulation import simulate
 from procedures.planning.plan import Plan, make_plan
 
 DEFAULT_RATE_HZ = 10.0

@@ -7,8 +7,8 @@ from dataclasses import asdict
 from instruments.bench_config import BenchFile
 from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.services.schemas.answers import Visibility
-from labctl.services.simulation.walk import hidden_recording
+from labctl.services.schemas.plans import Visibility
+from labctl.services.simulation.plan_simulation import hidden_recording
 from procedures.planning.plan import Plan
 
 #: Readings per second at which a plan is walked through: its channels are slow.

@@ -14,8 +14,9 @@ from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.records import CampaignRow, EventRow, NewUnit, StepRow
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.journal import StoreJournal
-from labctl.store.repositories.recording_writer import new_recording
+from labctl.store.repositories.campaign_journal import StoreJournal
+from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
+from labctl.store.repositories.recording_import import new_recording
 from labctl.store.schema import tables
 
 
@@ -39,6 +40,11 @@ class Campaigns:
 
     def __init__(self, database: Database) -> None:
         self._database = database
+        self._summaries = CampaignSummaries(database)
+
+    def summaries(self, campaigns: Sequence[int]) -> dict[int, CampaignSummary]:
+        """Return how far each campaign is, by its number."""
+        return self._summaries.of(campaigns)
 
     def create(self, new: NewCampaign, at: datetime) -> int:
         """Write down a whole campaign before anything moves; returns its number."""
@@ -123,11 +129,25 @@ class Campaigns:
         )  # fmt: skip
         with self._database.reading() as connection:
             rows = [dict(row) for row in connection.execute(query.where(condition).order_by(c.id.desc())).mappings()]
-            made = connection.execute(sa.select(r.campaign_id, r.serial, r.id).where(r.campaign_id.is_not(None))).all()
+            chosen = sa.select(c.id).where(condition)
+            made = connection.execute(sa.select(r.campaign_id, r.serial, r.id).where(r.campaign_id.in_(chosen))).all()
         recordings: dict[int, dict[str, int]] = {}
         for campaign, serial, recording in made:
             recordings.setdefault(campaign, {})[serial] = recording
         return [CampaignRow(**row, recordings=recordings.get(row["id"], {})) for row in rows]
+
+    def state(self, campaign: int) -> str:
+        """Return the state of one campaign; raises NotFound."""
+        with self._database.reading() as connection:
+            found = connection.scalar(sa.select(tables.campaigns.c.state).where(tables.campaigns.c.id == campaign))
+        if found is None:
+            raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows them")
+        return str(found)
+
+    def states(self) -> list[str]:
+        """Return the state of every campaign."""
+        with self._database.reading() as connection:
+            return list(connection.scalars(sa.select(tables.campaigns.c.state)))
 
     def steps(self, campaign: int) -> list[StepRow]:
         """Return the whole plan with what became of each step."""
@@ -153,20 +173,6 @@ class Campaigns:
         )
         with self._database.reading() as connection:
             return [EventRow(*row) for row in connection.execute(query)]
-
-    def last_environment(self, campaign: int) -> Mapping[str, Any] | None:
-        """Return the newest environment row of a campaign: temperatures as they were logged last."""
-        e, r = tables.environment.c, tables.recordings.c
-        query = (
-            sa.select(e.t_s, e.temperature_c, e.chamber_c, e.chamber_setpoint_c)
-            .join(tables.recordings, r.id == e.recording_id)
-            .where(r.campaign_id == campaign)
-            .order_by(e.id.desc())
-            .limit(1)
-        )
-        with self._database.reading() as connection:
-            row = connection.execute(query).mappings().first()
-        return None if row is None else dict(row)
 
     def unfinished(self) -> list[CampaignRow]:
         """Return campaigns that a process left without an end."""

@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from labctl.errors import Conflict
 from labctl.store.connection.database import Database
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.journal import StoreJournal
+from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.sample_blocks import blocks_of
 from labctl.store.schema import tables
 from procedures.contracts.journal import DataSetState

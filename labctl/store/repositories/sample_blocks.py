@@ -21,8 +21,9 @@ def _blocks_query() -> sa.Select[int, int, int, bytes]:
     return sa.select(b.n, b.codec, b.crc32, b.data).where(*ours).order_by(b.seq)
 
 
-#: Made once: it is asked for every data set of a recording.
+#: Made once: each data set of a recording asks them.
 _BLOCKS = _blocks_query()
+_ADD_BLOCK = sa.insert(tables.sample_blocks)
 
 
 def block_row(recording: int, number: int, seq: int, block: sample_codec.Block) -> dict[str, Any]:
@@ -36,6 +37,11 @@ def block_row(recording: int, number: int, seq: int, block: sample_codec.Block) 
         "crc32": block.crc32,
         "data": block.data,
     }
+
+
+def write_block(connection: sa.Connection, recording: int, number: int, seq: int, block: sample_codec.Block) -> None:
+    """Write one block of the readings of a data set; `seq` counts the blocks of a data set from 0."""
+    connection.execute(_ADD_BLOCK, block_row(recording, number, seq, block))
 
 
 def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[Any]]]:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from instruments.bench import CHAMBERS, GYROS, TABLES
 from instruments.bench_config import read_bench, shipped_benches
+from instruments.drivers.registry import CHAMBERS, GYROS, TABLES
 from instruments.errors import InstrumentError, LimitError, LinkError
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
@@ -139,10 +139,12 @@ def test_a_bad_wire_gives_a_right_answer_or_an_instrument_error(one: Any, fault:
 
 def test_closing_twice_does_no_harm(one: Any) -> None:
     talk(one)
+    identity = one.driver.identify()
     close = one.driver.stop if one.kind == "gyro" else one.driver.close
     close()
     close()
     talk(one)
+    assert one.driver.identify() == identity
 
 
 def test_limits_are_refused_before_anything_moves(one: Any) -> None:

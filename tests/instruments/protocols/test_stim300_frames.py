@@ -78,7 +78,7 @@ def slow_scan(data: bytes, layout: Layout) -> tuple[list[bytes], bytes]:
     return frames, bytes(data[at:])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     kind=st.sampled_from([0x90, 0x94, 0xA7]),
     crlf=st.booleans(),

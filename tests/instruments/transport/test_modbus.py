@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -232,7 +231,7 @@ def test_a_write_must_be_echoed(make_bench: Callable[..., Bench], answer: str) -
         bench.registers.put(SETPOINT, -221)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.sampled_from(["tcp", "rtu"]), st.lists(st.binary(max_size=40), min_size=3, max_size=3))
 def test_no_garbage_ever_raises_anything_else(framing: str, answers: list[bytes]) -> None:
     bench = Bench(framing)
@@ -243,7 +242,7 @@ def test_no_garbage_ever_raises_anything_else(framing: str, answers: list[bytes]
     assert bench.clock.now_s() < 10 * ALL_TRIES_S
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.sampled_from(["tcp", "rtu"]), st.binary(max_size=300))
 @example("tcp", b"\0\0\0")
 @example("tcp", b"\0\0\0\0\0\xff\1\3")
@@ -329,22 +328,3 @@ def test_a_real_host_that_refuses_is_named() -> None:
 def test_a_real_port_that_is_not_there_is_named() -> None:
     with pytest.raises(LinkError, match="chamber: serial port /dev/no-such-port cannot be opened; check its name"):
         Ports(VirtualClock()).modbus_rtu("/dev/no-such-port", device="chamber", baudrate=9600, timeout_s=1.0)
-
-
-def test_a_real_port_on_which_nobody_answers_is_silence_too() -> None:
-    ours, theirs = os.openpty()
-    try:
-        clock = VirtualClock()
-        port = os.ttyname(theirs)
-        registers = Registers(
-            "chamber",
-            1,
-            clock,
-            lambda: Ports(clock).modbus_rtu(port, device="chamber", baudrate=19200, timeout_s=1.0),
-        )
-        with pytest.raises(NoReply, match="no answer to read air temperature"):
-            registers.get(AIR)
-        registers.close()
-    finally:
-        os.close(ours)
-        os.close(theirs)

@@ -13,10 +13,11 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock
 from labctl import web
 from labctl.api import create_app
-from labctl.api.middleware import ASKING, LOOPBACK_NAMES, AccessPolicy
+from labctl.api.access_policy import ASKING, LOOPBACK_NAMES, AccessPolicy
 from labctl.errors import BadInput, Conflict, NotFound
-from labctl.services.admin.api_keys import KeyRequest, Role, create_key, digest_of, require_an_api_key, revoke_key
-from labctl.services.app import LabService
+from labctl.services.admin.api_keys import create_key, digest_of, require_an_api_key, revoke_key
+from labctl.services.lab_service import LabService
+from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 

@@ -11,8 +11,8 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
@@ -161,7 +161,7 @@ def test_a_campaign_runs_and_can_be_followed(client: TestClient) -> None:
 
 def test_a_service_that_starts_again_says_what_was_left(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
-    from labctl.services.campaigns.execution import prepare
+    from labctl.services.campaigns.preparation import prepare
 
     store = Store(Database(location, write=True))
     prepare(store, "short", load_bench("single-axis-sim"), VirtualClock(), clip=False).bench.close()

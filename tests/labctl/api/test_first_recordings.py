@@ -11,9 +11,9 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import prepare
+from labctl.services.campaigns.preparation import prepare
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.examples import examples
 from labctl.services.simulation.hidden_effects import with_hidden_effects

@@ -8,8 +8,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from instruments.clock import VirtualClock
-from labctl.services.campaigns.execution import prepare
-from labctl.services.planning.planner import _forecast
+from labctl.services.campaigns.plan_view import _forecast
+from labctl.services.campaigns.preparation import prepare
 from labctl.store import StepRow, Store
 from procedures.recipe.recipe import shipped_recipes
 from tests.helpers.service import service_of

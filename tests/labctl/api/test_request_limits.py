@@ -15,11 +15,13 @@ from starlette.websockets import WebSocketDisconnect
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.api.middleware import AccessPolicy
-from labctl.services.app import LabService
+from labctl.api.access_policy import AccessPolicy
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.commands.protocol import FitRequest
+from labctl.services.commands.registry import FIT, IMPORT_RECORDING
+from labctl.services.commands.requests import RecordingFolder, ToUnit
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES, RECIPES
@@ -32,8 +34,8 @@ UNIT = "OSU-FOG-2024"
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     store = Store(Database(str(tmp_path_factory.mktemp("limits") / "lab.sqlite"), write=True))
     lab_service = LabService(store, SystemClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
-    lab_service.commands().import_recording(EXAMPLES / "osu-fog")
-    lab_service.commands().fit(UNIT, FitRequest(effects=["bias", "scale_factor"]))
+    lab_service.execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
+    lab_service.execute(FIT, ToUnit(UNIT, FitRequest(effects=["bias", "scale_factor"])))
     with TestClient(create_app(lab_service, AccessPolicy(body_bytes=BODY, upload_bytes=UPLOAD))) as opened:
         yield opened
 

@@ -11,7 +11,7 @@ import uvicorn
 
 from instruments.clock import WallClock
 from labctl.api.server import ServeRequest, serve_forever
-from labctl.services.app import LabService
+from labctl.services.lab_service import LabService
 from labctl.store import open_store
 from procedures.execution.signals import ENDING
 

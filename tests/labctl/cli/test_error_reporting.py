@@ -58,3 +58,24 @@ def test_a_process_that_ends_with_its_command_ignores_signals_to_its_exit(error:
     with pytest.raises(typer.Exit), process_of_one_command(), one_clear_line():
         raise error
     assert set(handlers().values()) == {signal.SIG_IGN}
+
+
+def stop_and_interrupt(times: int) -> None:
+    """Act as a campaign that was stopped, while what it had opened is closed in spite of further signals."""
+    try:
+        if times == 0:
+            raise Stopped("campaign 1 was stopped")
+        stop_and_interrupt(times - 1)
+    finally:
+        if times:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("times", [0, 1, 3])
+def test_signals_while_a_stopped_campaign_is_closed_take_nothing_from_the_message(
+    times: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(typer.Exit) as ended, one_clear_line():
+        stop_and_interrupt(times)
+    assert ended.value.exit_code == 130
+    assert capsys.readouterr().err == "labctl: campaign 1 was stopped\n"

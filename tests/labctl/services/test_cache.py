@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from labctl.services import cache as keeping
-from labctl.services.cache import cached, cached_group
+from labctl.services import cache as result_cache
+from labctl.services.cache import RecentResults, cached, cached_group
 from labctl.services.criticism import measurements
-from labctl.services.schemas.answers import CertificationResponse, LadderResponse, ResponseModel
+from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.calibrations import CertificationResponse, LadderResponse
 from labctl.store import open_store
 from tests.helpers.lab import Lab
 from tests.helpers.simulated_recordings import single_axis
@@ -74,7 +75,7 @@ def test_other_code_answers_anew(
     work: Work, ask: Callable[..., LadderResponse], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ask(version=1)
-    monkeypatch.setattr(keeping, "code_digest", lambda: "changed")
+    monkeypatch.setattr(result_cache, "code_digest", lambda: "changed")
     ask(version=1)
     assert work.times == 2
 
@@ -99,7 +100,7 @@ def test_a_cache_that_cannot_be_written_costs_only_time(
 
 
 def test_the_oldest_go(ask: Callable[..., LadderResponse], cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(keeping, "MOST", 3)
+    monkeypatch.setattr(result_cache.RESPONSES, "most", 3)
     for version in range(6):
         ask(version=version)
     assert len(list(cache.rglob("*.json"))) == 3
@@ -132,3 +133,38 @@ def test_criticise_looks_at_the_readings_once(tmp_path: Path, monkeypatch: pytes
     assert lab.json("criticise", "FOG-0001") == first
     with pytest.raises(AssertionError, match="read again"):
         lab.run("criticise", "FOG-0001", "--formula", "wet: supply_v - 5")
+
+
+def test_threads_that_ask_the_same_at_once_share_one_result_in_memory() -> None:
+    recent: RecentResults[list[int]] = RecentResults(most=2)
+    begun, go_on, times = threading.Event(), threading.Event(), []
+
+    def work() -> list[int]:
+        times.append(1)
+        begun.set()
+        assert go_on.wait(30)
+        return [len(times)]
+
+    with ThreadPoolExecutor(2) as pool:
+        first = pool.submit(recent.get, "same", work)
+        assert begun.wait(30)
+        second = pool.submit(recent.get, "same", work)
+        go_on.set()
+        assert first.result() is second.result()
+    assert len(times) == 1
+
+
+def test_of_results_in_memory_only_those_used_last_stay() -> None:
+    recent: RecentResults[str] = RecentResults(most=2)
+    made: list[str] = []
+
+    def ask(question: str) -> str:
+        def work() -> str:
+            made.append(question)
+            return question
+
+        return recent.get(question, work)
+
+    for question in "abacbc":
+        assert ask(question) == question
+    assert made == ["a", "b", "c", "b"]

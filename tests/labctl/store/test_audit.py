@@ -17,18 +17,18 @@ from typer.testing import CliRunner
 from instruments.clock import SystemClock, VirtualClock
 from labctl.actor import Actor, acting
 from labctl.api import create_app
-from labctl.api.middleware import ASKING
+from labctl.api.access_policy import ASKING
 from labctl.cli.app import app
 from labctl.config import os_user
 from labctl.errors import BadInput
 from labctl.services.admin.audit import anchor_of, verify_audit
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import prepare, run
+from labctl.services.campaigns.execution import run
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
-from labctl.services.commands.protocol import CampaignRequest, ConfirmRequest, ReasonRequest
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.store import Store, migrate, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES

@@ -19,12 +19,15 @@ from instruments.clock import VirtualClock
 from labctl.cli.app import app
 from labctl.errors import DiskFull, StoreError
 from labctl.recording import read_recording
-from labctl.services.campaigns.execution import prepare, run
-from labctl.services.commands.local import LocalCommands
-from labctl.services.commands.protocol import CertifyRequest, FitRequest
+from labctl.services.campaigns.execution import run
+from labctl.services.campaigns.preparation import prepare
+from labctl.services.commands.registry import CERTIFY, FIT, IMPORT_RECORDING
+from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.calibrations import CertifyRequest, FitRequest
 from labctl.store import Store, check, copy_database, open_store
 from labctl.store.connection import commit_counter as seals
+from tests.helpers.commands import local_executor
 from tests.helpers.paths import EXAMPLES
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -37,10 +40,10 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     clock = VirtualClock()
     with open_store(str(path), write=True) as store:
         run(store, prepare(store, "short", load_bench("single-axis-sim"), clock, clip=False))
-        commands = LocalCommands(store, clock)
-        commands.import_recording(EXAMPLES / "osu-fog")
-        commands.fit("OSU-FOG-2024", FitRequest(effects=["bias", "scale_factor"]))
-        commands.certify("OSU-FOG-2024", 1, CertifyRequest(by="A", reason="B"))
+        commands = local_executor(store, clock)
+        commands.execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
+        commands.execute(FIT, ToUnit("OSU-FOG-2024", FitRequest(effects=["bias", "scale_factor"])))
+        commands.execute(CERTIFY, ToVersion("OSU-FOG-2024", 1, CertifyRequest(by="A", reason="B")))
     return path
 
 
@@ -174,7 +177,7 @@ def crashed(kept: Path, folder: Path) -> str:
     shutil.copy(kept, path)
     shutil.copy(f"{kept}.seal", f"{path}.seal")
     with open_store(str(path), write=True) as store:
-        LocalCommands(store, VirtualClock()).import_recording(EXAMPLES / "osu-fog")
+        local_executor(store, VirtualClock()).execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
         left = folder / "left"
         left.mkdir()
         for file in folder.glob("crashed.sqlite*"):
@@ -284,11 +287,11 @@ def test_a_full_disk_is_one_clear_error_and_nothing_is_half_written(store: Store
     before = [row.id for row in store.audit.rows()], [unit.serial for unit in store.units.all()]
     fill(store, 2)
     with pytest.raises(DiskFull, match="the disk is full; nothing of this act was kept"):
-        LocalCommands(store, VirtualClock()).import_recording(EXAMPLES / "osu-fog")
+        local_executor(store, VirtualClock()).execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
     assert before == ([row.id for row in store.audit.rows()], [unit.serial for unit in store.units.all()])
     assert check(location).findings == ()
     fill(store, 1_000_000)
-    LocalCommands(store, VirtualClock()).import_recording(EXAMPLES / "osu-fog")
+    local_executor(store, VirtualClock()).execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
     assert check(location).findings == ()
 
 

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from instruments.clock import VirtualClock
 from instruments.interfaces.gyro import Channel, Readings
+from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.live_output import LiveOutput, Output
 from procedures.monitoring.progress import Progress
 from tests.helpers.engine_rig import Rig
@@ -21,19 +23,25 @@ def readings(values: list[int], valid: list[bool]) -> Readings:
     return Readings(100.0 + np.arange(len(values)), raw, np.array(valid, dtype=bool))
 
 
+def begun_at(clock_s: float) -> CampaignTime:
+    clock = VirtualClock()
+    clock.sleep(clock_s)
+    return CampaignTime(clock)
+
+
 def test_only_valid_readings_count_in_their_unit() -> None:
     live = LiveOutput()
-    live.heard("imu", UNIT, readings([2, 4, 900], [True, True, False]), 40.0)
+    live.heard("imu", UNIT, readings([2, 4, 900], [True, True, False]), begun_at(40.0))
     (output,) = live.outputs()
     assert output == Output("imu", "gyro_z", "deg/s", 2.5, pytest.approx(0.5**0.5), 2, 62.0)
 
 
 def test_nothing_is_said_of_what_sends_nothing() -> None:
     live = LiveOutput()
-    live.heard("imu", UNIT, readings([], []), 0.0)
-    live.heard("other", UNIT, readings([1], [False]), 0.0)
+    live.heard("imu", UNIT, readings([], []), begun_at(0.0))
+    live.heard("other", UNIT, readings([1], [False]), begun_at(0.0))
     assert live.outputs() == ()
-    live.heard("other", UNIT, readings([1], [True]), 0.0)
+    live.heard("other", UNIT, readings([1], [True]), begun_at(0.0))
     live.forget("other")
     assert live.outputs() == ()
 

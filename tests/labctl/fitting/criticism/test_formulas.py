@@ -17,7 +17,7 @@ from labctl.fitting.effects import CATALOGUE, Reference, Term, formulas
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import Recording
-from labctl.services.simulation.walk import hidden_recording
+from labctl.services.simulation.plan_simulation import hidden_recording
 from tests.helpers.criticism import held
 from tests.helpers.simulated_recordings import plan_on, single_axis, three_axes
 

@@ -16,7 +16,8 @@ from instruments.clock import Clock, VirtualClock
 from labctl.errors import Conflict, StoreError
 from labctl.services.benches.lease import RENEW_S, STOP_S, TERM_S, BenchHold, this_machine
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import prepare, run
+from labctl.services.campaigns.execution import run
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import load_bench
 from labctl.store import LeaseRow, Store, open_store
 from labctl.store.connection.database import Database
@@ -235,7 +236,7 @@ def test_a_table_is_at_rest_before_a_lease_that_was_not_renewed_ends(store: Stor
 
 
 def test_a_service_that_lost_its_bench_begins_nothing(shared: Store) -> None:
-    from labctl.services.commands.protocol import CampaignRequest
+    from labctl.services.schemas.campaigns import CampaignRequest
 
     clock = VirtualClock(AT)
     hold = BenchHold(shared, BENCH, clock)

@@ -20,20 +20,23 @@ from instruments.errors import NoReply
 from labctl.api.server import ServeRequest, create_service
 from labctl.cli.app import app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
-from labctl.services.app import LabService
-from labctl.services.campaigns import bench_runner, resume
+from labctl.services.campaigns import recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
+from labctl.services.campaigns.execution import run, run_here
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status, list_campaigns
-from labctl.services.commands.local import LocalCommands
-from labctl.services.commands.protocol import CampaignRequest
+from labctl.services.commands.registry import ABORT_CAMPAIGN
+from labctl.services.commands.requests import ToCampaign
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.recordings.transfer import newest_recording
+from labctl.services.recordings.loading import newest_row
+from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control
 from procedures.contracts.journal import NOT_SAFE, CampaignState, Event
 from procedures.execution.signals import defer_signals
+from tests.helpers.commands import local_executor
 
 BENCH = load_bench("single-axis-sim")
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -74,9 +77,10 @@ def test_a_bench_that_is_silent_when_its_campaign_is_to_be_taken_up_is_not_held_
     def silent(*_: Any) -> None:
         raise NoReply("table", "no answer")
 
+    monkeypatch.setattr(recovery, "open_bench", silent)
     monkeypatch.setattr(resume, "open_bench", silent)
     runner = BenchRunner(store, BENCH, VirtualClock)
-    runner.take_up_left()
+    runner.resume_unfinished()
     assert store.campaigns.get(1).state == "failed"
     assert "no answer" in store.benches.unconfirmed(BENCH.name)
     with pytest.raises(Conflict, match="not confirmed safe"):
@@ -92,9 +96,9 @@ def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, m
         states.append(store.campaigns.get(1).state)
         return ("table to rest: it still moves",)
 
-    monkeypatch.setattr(bench_runner, "too_often", lambda _: "taken up 5 times")
-    monkeypatch.setattr(resume, "make_safe", safe)
-    BenchRunner(store, BENCH, VirtualClock).take_up_left()
+    monkeypatch.setattr(recovery, "retries_exhausted", lambda _: "taken up 5 times")
+    monkeypatch.setattr(recovery, "make_safe", safe)
+    BenchRunner(store, BENCH, VirtualClock).resume_unfinished()
     assert states == ["running"]
     assert store.campaigns.get(1).reason == "taken up 5 times"
     assert store.benches.unconfirmed(BENCH.name) == "table to rest: it still moves"
@@ -112,19 +116,19 @@ def test_what_is_not_safe_is_on_the_bench_before_the_campaign_ends(store: Store)
 def test_a_recording_in_which_nothing_was_measured_yet_is_no_newest_one(store: Store) -> None:
     left_running(store)
     with pytest.raises(NotEnoughData, match="no complete data set yet"):
-        newest_recording(store, "FOG-0001", None)
+        newest_row(store, "FOG-0001", None)
     prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
     run(store, prepared)
     left_running(store)
-    assert newest_recording(store, "FOG-0001", None) == 2
+    assert newest_row(store, "FOG-0001", None).id == 2
     with pytest.raises(NotEnoughData, match="recording 3"):
-        newest_recording(store, "FOG-0001", 3)
+        newest_row(store, "FOG-0001", 3)
 
 
 def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say_so(store: Store) -> None:
     older, newer = left_running(store), left_running(store)
     runner = BenchRunner(store, BENCH, VirtualClock)
-    runner.take_up_left()
+    runner.resume_unfinished()
     rest(runner)
     assert store.campaigns.get(newer).state == "done"
     row = store.campaigns.get(older)
@@ -134,13 +138,17 @@ def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say
 @pytest.mark.usefixtures("real")
 def test_ending_by_hand_what_no_process_runs_says_that_nobody_made_the_bench_safe(store: Store) -> None:
     campaign = left_running(store)
-    answer = LocalCommands(store, VirtualClock()).abort_campaign(campaign, "the computer died")
+    answer = local_executor(store, VirtualClock()).execute(
+        ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason="the computer died"))
+    )
     assert (answer.state, "Nobody has made bench" in answer.reason) == ("aborted", True)
     assert f"campaign {campaign} ended before" in store.benches.unconfirmed(BENCH.name)
 
 
 def test_a_simulated_bench_ended_with_its_process(store: Store) -> None:
-    answer = LocalCommands(store, VirtualClock()).abort_campaign(left_running(store), "enough")
+    answer = local_executor(store, VirtualClock()).execute(
+        ABORT_CAMPAIGN, ToCampaign(left_running(store), ReasonRequest(reason="enough"))
+    )
     assert (answer.state, store.benches.unconfirmed(BENCH.name)) == ("aborted", "")
 
 
@@ -174,7 +182,7 @@ def test_an_end_that_could_not_be_written_is_written_before_anything_else_begins
     with pytest.raises(StoreError, match="the disk is full"):
         runner.start(CampaignRequest(recipe="short"))
     disk.full = False
-    runner.take_up_cut_short()
+    runner.resume_interrupted()
     row = store.campaigns.get(campaign)
     assert (row.state, "the disk is full" in row.reason) == ("failed", True)
     assert f"campaign {campaign} ended while" in store.benches.unconfirmed(BENCH.name)
@@ -193,7 +201,7 @@ def test_a_bench_is_closed_even_if_what_is_wrong_with_it_cannot_be_written(
         raise StoreError("the disk is full")
 
     monkeypatch.setattr(store.benches, "mark", full)
-    monkeypatch.setattr("labctl.store.repositories.journal.benches.mark", full)
+    monkeypatch.setattr("labctl.store.repositories.campaign_journal.benches.mark", full)
     control = Control()
     control.abort("enough")
     with pytest.raises(StoreError):

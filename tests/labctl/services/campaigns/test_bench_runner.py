@@ -14,19 +14,22 @@ from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
 from labctl.actor import Actor, acting
 from labctl.api import create_app
-from labctl.api.middleware import AccessPolicy
+from labctl.api.access_policy import AccessPolicy
 from labctl.errors import BenchBusy, Conflict
-from labctl.services.admin.api_keys import KeyRequest, Role, create_key
-from labctl.services.app import LabService
+from labctl.services.admin.api_keys import create_key
 from labctl.services.benches import lease
 from labctl.services.benches.lease import STOP_S, BenchHold
-from labctl.services.campaigns import execution, resume
+from labctl.services.campaigns import preparation, recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import prepare
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
-from labctl.services.commands.protocol import CampaignRequest, ResumeRequest
+from labctl.services.commands.registry import CANCEL_START, START_CAMPAIGN
+from labctl.services.commands.requests import CampaignStart, ToStart
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import start_status
+from labctl.services.schemas.admin import KeyRequest, Role
+from labctl.services.schemas.campaigns import CampaignRequest, ResumeRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from procedures.contracts.operator import HumanOperator
@@ -50,7 +53,7 @@ class Lab:
 
     def enter(self, **when: Any) -> int:
         request = CampaignRequest.model_validate({"recipe": "short", **when})
-        return self.lab_service.commands().schedule_campaign(request).id
+        return self.lab_service.execute(START_CAMPAIGN, CampaignStart(request)).id
 
     def tick(self) -> None:
         self.scheduler.tick()
@@ -98,7 +101,7 @@ def lab(tmp_path: Path) -> Iterator[Lab]:
 def moves(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Whenever a bench is opened."""
     opened: list[str] = []
-    for module in (execution, resume):
+    for module in (preparation, recovery, resume):
         real = module.open_bench
 
         def opening(bench: Any, clock: Any, real: Any = real) -> Any:
@@ -163,7 +166,7 @@ def test_a_campaign_whose_bench_was_lost_is_taken_up_before_the_queue_goes_on(la
 def test_a_campaign_that_waits_keeps_its_bench_and_lets_it_go_when_it_is_lost(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(execution, "operator_of", lambda _: HumanOperator())
+    monkeypatch.setattr(preparation, "operator_of", lambda _: HumanOperator())
     seen: list[str] = []
 
     def heard() -> None:
@@ -190,7 +193,7 @@ def test_without_the_lease_nothing_is_taken_up_and_nothing_moves(tmp_path: Path,
     left.bench.close()
     moves.clear()
     first.lose()
-    first.runner.take_up_left()
+    first.runner.resume_unfinished()
     with pytest.raises(BenchBusy, match="may not be driven"):
         first.runner.resume(left.id, ResumeRequest(by="Ada"))
     assert (moves, first.states()) == ([], ["planned"])
@@ -248,6 +251,7 @@ def test_what_cannot_be_taken_up_waits_for_a_person_and_the_queue_goes_on(
     def silent(*_: Any) -> None:
         raise NoReply("table", "no answer")
 
+    monkeypatch.setattr(recovery, "open_bench", silent)
     monkeypatch.setattr(resume, "open_bench", silent)
     lab.tick()
     left = campaign_status(lab.store, 1)
@@ -262,7 +266,7 @@ def test_entries_and_what_became_of_them_are_in_the_audit_trail(lab: Lab) -> Non
         lab.enter(at="now")
         cancelled = lab.enter(cron="0 2 * * *", time_zone="UTC")
         lab.enter(at="2026-01-05T08:01Z", late_limit_s=0)
-        lab.lab_service.commands().cancel_start(cancelled)
+        lab.lab_service.execute(CANCEL_START, ToStart(cancelled))
     lab.tick()
     lab.clock.sleep(3600)
     lab.hold.renew()

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import hashlib
+import signal
 import sqlite3
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from instruments.bench_config import read_bench
 from instruments.clock import VirtualClock
+from labctl.errors import Stopped
 from labctl.fitting import fit
-from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
+from labctl.services.campaigns import execution
+from labctl.services.campaigns.execution import run, run_here
+from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.campaigns import StartRequest
 from labctl.store import open_store
 from procedures.contracts.control import Control
+from procedures.monitoring.progress import Progress
 
 TINY = """format = "labctl-recipe/1"
 name = "tiny"
@@ -93,6 +100,26 @@ def test_readings_are_kept_when_a_campaign_is_aborted(tmp_path: Path) -> None:
         table, chamber = prepared.bench.table, prepared.bench.chamber
         assert not table.is_moving()
         assert chamber.read().setpoint_c == read_bench("single-axis-sim").chamber.safe_c
+
+
+def test_a_second_interrupt_does_not_take_away_how_the_campaign_was_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = execution._stopped
+
+    def interrupted_again(*arguments: Any) -> str:
+        signal.raise_signal(signal.SIGINT)
+        return said(*arguments)
+
+    def interrupt(progress: Progress) -> None:
+        if "data set 2" in progress.step_text:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(execution, "_stopped", interrupted_again)
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        prepared = prepare(store, "short", load_bench("single-axis-sim"), VirtualClock(), clip=False)
+        with pytest.raises(Stopped, match="campaign 1 was stopped; bench single-axis-sim is safe"):
+            run(store, prepared, observe=interrupt)
 
 
 def test_the_whole_plan_is_written_down_before_the_first_move(tmp_path: Path) -> None:

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,25 +11,21 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
-from labctl.errors import Conflict, StoreError
-from labctl.services.app import LabService
-from labctl.services.campaigns import execution
+from labctl.services.campaigns import preparation
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.store import Store, open_store
+from labctl.store import Store
 from labctl.store.connection.database import Database
 from procedures.contracts.operator import HumanOperator
 from tests.helpers.service import service_of
 from tests.helpers.waiting import wait_until
 
-PATIENCE = 2000  #: looks at a campaign before a test gives up
-WAIT_S = 60.0  #: for the next sign of life
-
 
 @pytest.fixture
 def runner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> BenchRunner:
     """A bench on which a person turns and switches the units."""
-    monkeypatch.setattr(execution, "operator_of", lambda _: HumanOperator())
+    monkeypatch.setattr(preparation, "operator_of", lambda _: HumanOperator())
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     return BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
 
@@ -46,7 +38,7 @@ def client(runner: BenchRunner) -> Iterator[TestClient]:
 
 def until(client: TestClient, wanted: Any) -> Any:
     """Look at campaign 1, whenever its runner says that something happened, until it is as wanted."""
-    runner = service_of(client).bench_runner()
+    runner = service_of(client).bench_runner
     return wait_until(runner.listen, lambda: client.get("/api/campaigns/1").json(), wanted)
 
 
@@ -118,85 +110,3 @@ def test_a_bench_that_is_not_confirmed_safe_is_on_its_status_until_it_is_cleared
     assert (cleared.status_code, cleared.json()["unconfirmed"]) == (200, "")
     assert client.get("/health").json()["status"] == "ok"
     assert client.post("/api/benches/nobody/clear", json={"by": "Ada"}).status_code == 404
-
-
-def command(database: Path, *arguments: str) -> list[str]:
-    return [sys.executable, "-m", "labctl", *arguments, "--database", str(database)]
-
-
-def begun(database: Path) -> None:
-    """Wait until the first data set of a campaign in another process is being taken."""
-    for _ in range(PATIENCE):
-        with contextlib.suppress(Conflict, StoreError):  # the other process is making the database
-            if database.exists():
-                with open_store(str(database), write=False) as store:
-                    if any(step.kind == "acquire" and step.started_s for step in store.campaigns.steps(1)):
-                        return
-        SystemClock().sleep(0.05)  # another process has its own pace
-    raise AssertionError("no data set was ever taken")
-
-
-def ended(database: Path) -> tuple[str, str]:
-    with open_store(str(database), write=False) as store:
-        row = store.campaigns.get(1)
-        return row.state, row.reason
-
-
-@contextlib.contextmanager
-def campaigning(database: Path) -> Iterator[subprocess.Popen[str]]:
-    """A campaign at a terminal of its own that has begun to measure."""
-    arguments = ("campaign", "start", "short", "--bench", "single-axis-sim", "--speed", "15", "--json")
-    with subprocess.Popen(
-        command(database, *arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        begun(database)
-        yield process
-
-
-@pytest.mark.timeout(400)
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(tmp_path: Path, number: signal.Signals) -> None:
-    database = tmp_path / "lab.sqlite"
-    with campaigning(database) as process:
-        process.send_signal(number)
-        process.send_signal(number)
-        _, said = process.communicate(timeout=100)
-    if process.returncode == 130:
-        assert "campaign 1 was stopped; bench single-axis-sim is safe" in said
-    assert process.returncode in {130, 1}  # the second may come when the bench is safe and the command is at its end
-    assert ended(database) == ("aborted", "interrupted (Ctrl-C or a signal)")
-
-
-@pytest.mark.timeout(400)
-def test_impatience_after_the_end_was_written_changes_nothing_any_more(tmp_path: Path) -> None:
-    database = tmp_path / "lab.sqlite"
-    with campaigning(database) as process:
-        process.send_signal(signal.SIGINT)
-        while process.poll() is None and ended(database)[0] != "aborted":
-            SystemClock().sleep(0.01)  # another process has its own pace
-        while process.poll() is None:
-            process.send_signal(signal.SIGINT)
-            SystemClock().sleep(0.002)
-        _, said = process.communicate(timeout=100)
-    assert process.returncode == 130, said
-    assert said.count("\n") == 1
-    assert "campaign 1 was stopped; bench single-axis-sim is safe" in said
-
-
-@pytest.mark.timeout(400)
-def test_a_service_that_is_interrupted_twice_ends_its_campaign_first(tmp_path: Path) -> None:
-    database = tmp_path / "lab.sqlite"
-    arguments = ("serve", "--bench", "single-axis-sim", "--speed", "15", "--port", "0", "--json")
-    with subprocess.Popen(
-        command(database, *arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        subprocess.run(command(database, "campaign", "start", "short"), check=True, capture_output=True)
-        begun(database)
-        process.send_signal(signal.SIGINT)
-        process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=100)
-    assert "stopped; bench single-axis-sim is safe" in said
-    state, reason = ended(database)
-    assert (state, "the service stops" in reason) == ("aborted", True)

@@ -16,14 +16,16 @@ from instruments.errors import NoReply
 from labctl.cli.app import app
 from labctl.errors import Conflict
 from labctl.services.benches.host import power_failed
-from labctl.services.campaigns.execution import StartRequest, prepare, run, run_here
-from labctl.services.campaigns.resume import MOST_TRIES, prepare_resume, resume_here, too_often
-from labctl.services.commands.protocol import ResumeRequest
+from labctl.services.campaigns.execution import run, run_here
+from labctl.services.campaigns.preparation import prepare
+from labctl.services.campaigns.recovery import MAX_RESUMES, retries_exhausted
+from labctl.services.campaigns.resume import prepare_resume, resume_here
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.campaigns import ResumeRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control
-from studies import crash_recovery, faults, process_kill
+from studies import crash_recovery, faults
 from studies.crashable_process import all_readings, complete_data_sets
 
 
@@ -56,13 +58,6 @@ def test_the_faults_drawn_are_of_every_kind_in_every_instrument() -> None:
     assert {each.url.partition("/")[2] for _, each in drawn} == {
         url.partition("/")[2] for bench in faults.benches() for url in faults.addresses(bench).values()
     }
-
-
-@pytest.mark.timeout(300)
-def test_a_real_process_is_killed_over_pty_and_tcp_and_its_heir_finishes(tmp_path: Path) -> None:
-    with process_kill.simulators(tmp_path) as bench:
-        heir = process_kill.kill_once(tmp_path, bench, 8.0)
-    assert heir.well, heir
 
 
 def stopped(store: Store, after: str, **changes: Any) -> Any:
@@ -162,11 +157,11 @@ def test_a_campaign_that_never_gets_on_waits_for_a_person(tmp_path: Path) -> Non
     with open_store(location, write=True) as store:
         bench = load_bench("single-axis-sim")
         number = prepare(store, "short", bench, VirtualClock(), clip=False).id
-        for tries in range(MOST_TRIES):
+        for tries in range(MAX_RESUMES):
             point = store.resume_points.of_campaign(number)
-            assert (point.tries, too_often(point)) == (tries, None)
+            assert (point.tries, retries_exhausted(point)) == (tries, None)
             prepare_resume(store, number, bench, lambda s: VirtualClock(s.last_at), ResumeRequest()).bench.close()
-        assert "without finishing a step" in (too_often(store.resume_points.of_campaign(number)) or "")
+        assert "without finishing a step" in (retries_exhausted(store.resume_points.of_campaign(number)) or "")
 
 
 def test_a_host_that_was_off_means_that_the_units_were() -> None:

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from labctl.services.calibrations.fitting import fit_unit
-from labctl.services.commands.protocol import FitRequest
 from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import open_store
 from labctl.store.repositories.recordings import Recordings
-from tests.labctl.fitting.criticism.test_criticism import single_axis
+from tests.helpers.simulated_recordings import single_axis
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 #: `_heads` is the query behind every way of reading a recording's row.

@@ -12,13 +12,14 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull
-from labctl.services.app import LabService
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.commands.protocol import CampaignRequest
+from labctl.services.commands.registry import START_CAMPAIGN
+from labctl.services.commands.requests import CampaignStart
+from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import add_start, cancel_start, is_scheduled, list_starts, start_status
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.answers import CampaignResponse
+from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.errors import PlanRefused
@@ -42,7 +43,7 @@ class Lab:
     def service(self) -> Scheduler:
         return Scheduler(self.store, self.clock, self, BENCH.name)
 
-    def take_up_cut_short(self) -> None:
+    def resume_interrupted(self) -> None:
         self.went_on += 1
 
     def start(self, request: CampaignRequest) -> CampaignResponse:
@@ -304,7 +305,7 @@ def test_a_scheduled_campaign_runs_and_a_restart_begins_it_no_second_time(tmp_pa
     location = str(tmp_path / "lab.sqlite")
     first = Served(location)
     request = CampaignRequest(recipe="short", at="2026-01-05T10:00Z")
-    entry = first.lab_service.commands().schedule_campaign(request)
+    entry = first.lab_service.execute(START_CAMPAIGN, CampaignStart(request))
     first.scheduler.tick()
     assert first.store.campaigns.all() == []
     first.clock.sleep(7200)

@@ -28,7 +28,7 @@ export function ladderFigure(ladder) {
       annotations: ladder.noise_floor_dps ? [{ xref: "paper", x: 0.01, y: Math.log10(ladder.noise_floor_dps), text: "noise floor", showarrow: false, xanchor: "left", yanchor: "bottom", font: { color: colour("good"), size: 12 } }] : [],
     },
   });
-  return figure("Error ladder", "Each version's RMS error on its own data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.", draw, { height: "19rem" });
+  return figure("Error ladder", `The versions fitted to recording ${ladder.recording}: each one's RMS error on that data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.`, draw, { height: "19rem" });
 }
 
 export function errorLadder(state, signal) {
@@ -59,7 +59,9 @@ function versionTable(ladder, state) {
     { title: "Version", cell: (step) => (step.version === state.version ? h("strong", {}, `${step.version}`) : h("a", { href: `/explore?unit=${encodeURIComponent(state.serial)}&version=${step.version}` }, `${step.version}`)) },
     { title: "Model", cell: (step) => h("span", {}, modelName(step.model), h("span", { class: "muted small" }, step.parent ? ` from version ${step.parent}` : "")) },
     { title: "Effects", cell: (step) => step.effects.map(idText).join(", ") },
+    { title: "Recording", number: true, cell: (step) => `${step.recording ?? "–"}` },
     { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
     { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
-  ], ladder.steps, { label: "Versions", selected: (step) => step.version === state.version });
+    ...(ladder.others.length ? [{ title: `As it is on recording ${ladder.recording}, deg/s`, number: true, cell: (step) => number(step.applied_rms_dps ?? (step.recording === ladder.recording ? step.rms_dps : null)) }] : []),
+  ], [...ladder.steps, ...ladder.others], { label: "Versions", selected: (step) => step.version === state.version });
 }

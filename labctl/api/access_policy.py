@@ -1,0 +1,54 @@
+"""Who may call the API, and with how much: keys, host names, sizes, roles."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from fastapi import Depends, Request
+
+from labctl.services.admin.api_keys import require_role
+from labctl.services.schemas.admin import Role
+
+LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
+READING = frozenset({"GET", "HEAD", "OPTIONS"})
+#: Answered without a key: a load balancer asks it.
+OPEN = frozenset({"/health"})
+#: Queries that are sent by POST because of what they carry: nothing changes, so a viewer may.
+ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview")
+_ASKED = re.compile("|".join(re.sub(r"{\w+}", "[^/]+", path) for path in ASKING))
+UPLOAD = "/api/recordings"
+MIB = 1 << 20
+
+
+@dataclass(frozen=True)
+class AccessPolicy:
+    """Which callers are admitted, and the largest body of a request.
+
+    Without keys the only callers are this machine's, so a request must have been sent to this machine by name: a page
+    of another origin that a browser here happens to show is not a caller. `hosts` are the names that are answered to;
+    None: any, for an application that nothing listens for.
+    """
+
+    keys: bool = False
+    hosts: frozenset[str] | None = None
+    body_bytes: int = MIB
+    upload_bytes: int = 2048 * MIB
+
+    def largest_body(self, path: str) -> int:
+        """Return the largest body of a request to a path, in bytes."""
+        return self.upload_bytes if path == UPLOAD else self.body_bytes
+
+
+def role_needed(method: str, path: str) -> Role:
+    """Return the role that a request needs by its method; a route may need more."""
+    asked = method == "POST" and _ASKED.fullmatch(path) is not None
+    return Role.VIEWER if asked or method in READING else Role.OPERATOR
+
+
+def _approver(request: Request) -> None:
+    require_role(request.state.caller, Role.APPROVER)
+
+
+#: For `dependencies=[...]` of a route that needs more than its method says.
+NEEDS_APPROVER = Depends(_approver)

@@ -1,0 +1,33 @@
+"""Benches: this service's, the state of every bench, and clearing one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter
+
+from labctl.api.dependencies import ServiceDep, command_route
+from labctl.services.campaigns.bench_status import bench_statuses
+from labctl.services.commands.registry import CLEAR_BENCH
+from labctl.services.commands.requests import ToBench
+from labctl.services.schemas.benches import BenchStatus, ClearRequest
+
+router = APIRouter(prefix="/api", tags=["what there is"])
+
+
+@router.get("/benches", summary="This service's bench")
+def benches(service: ServiceDep) -> list[dict[str, Any]]:
+    """The bench that this service runs: its instruments, limits and what it is doing."""
+    return service.benches()
+
+
+@router.get("/benches/status", summary="What could not be confirmed safe")
+def bench_states(service: ServiceDep) -> list[BenchStatus]:
+    """Every bench of this database, with what its last safe state could not confirm."""
+    return bench_statuses(service.store)
+
+
+@command_route(router, CLEAR_BENCH, "Say that a bench was looked at")
+def clear(bench: str, request: ClearRequest, service: ServiceDep) -> BenchStatus:
+    """Take in that a person has looked at a bench whose safe state was not confirmed; campaigns may start again."""
+    return service.execute(CLEAR_BENCH, ToBench(bench, request))

@@ -1,0 +1,101 @@
+"""Campaigns, plans and entries of the schedule as text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+from labctl.cli.output import console, format_number, print_json, table
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.campaigns import CampaignResponse
+    from labctl.services.schemas.plans import PlanResponse
+    from labctl.services.schemas.schedule import ScheduledResponse
+
+
+def print_plan(answer: PlanResponse) -> None:
+    """Print a plan's figures for a person."""
+    console.print(f"[bold]{answer.recipe}[/] on {answer.bench}")
+    console.print(f"  {answer.datasets} data sets in {answer.steps} steps, about {hours(answer.expected_s)}")
+    for left_out in answer.clipped:
+        console.print(f"  left out: {left_out}", style="yellow", markup=False)
+    if answer.visibility is None:
+        return
+    rows = table("\nwhat this plan could find", "effect", "visible share", "from size", "unit", numbers=3)
+    for line in answer.visibility:
+        if line.visible:
+            rows.add_row(line.effect, format_number(line.share, 2), format_number(line.smallest_size, 2), line.unit)
+    console.print(rows)
+    hidden = table("\nand what not", "effect", "because of", "what would show it")
+    for line in answer.visibility:
+        if not line.visible:
+            why = f"no channel {', '.join(line.needs)}" if line.why == "channel" else "the schedule"
+            hidden.add_row(line.effect, why, line.experiment)
+    console.print(hidden)
+
+
+def hours(seconds: float) -> str:
+    """Write a duration as a person says it: 41 h 52 min."""
+    minutes = round(seconds / 60)
+    return f"{minutes // 60} h {minutes % 60:02d} min" if minutes >= 60 else f"{minutes} min"
+
+
+def print_end(answer: CampaignResponse, *, as_json: bool) -> None:
+    """Print how a campaign ended; exit 1 when that is not as it was meant."""
+    print_json(answer) if as_json else print_campaign(answer)
+    if answer.state in {"failed", "aborted", "interrupted"}:
+        raise typer.Exit(1)
+
+
+def print_started(answer: CampaignResponse | ScheduledResponse, *, as_json: bool) -> None:
+    """Print how a campaign ended, or the entry of the schedule that it became."""
+    from labctl.services.schemas.schedule import ScheduledResponse
+
+    if not isinstance(answer, ScheduledResponse):
+        print_end(answer, as_json=as_json)
+    elif as_json:
+        print_json(answer)
+    else:
+        print_start(answer)
+
+
+def print_campaign(answer: CampaignResponse) -> None:
+    """Print where a campaign is."""
+    console.print(f"campaign {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]", end="")
+    console.print(f" – {answer.reason}" if answer.reason else "", markup=False)
+    console.print(
+        f"  step {answer.step or '–'} of {answer.steps}  {answer.step_text}  {100 * answer.progress:.1f} %",
+        markup=False,
+    )
+    if answer.expected_end and answer.state in {"running", "paused", "waiting"}:
+        console.print(f"  expected end {answer.expected_end:%Y-%m-%d %H:%M} UTC")
+    if answer.chamber_c is not None:
+        console.print(
+            f"  chamber {format_number(answer.chamber_c)} deg C, gyro {format_number(answer.gyro_c)} deg C, "
+            f"table {format_number(answer.rate_dps)} deg/s"
+        )
+    if answer.prompt is not None:
+        console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow", markup=False)
+    if answer.wish is not None:
+        console.print(f"  {answer.wish} was asked for and follows", style="yellow", markup=False)
+    for device, state in answer.links.items():
+        console.print(f"  {device}: link {state}", style="red", markup=False)
+    for unit, why in answer.dropped.items():
+        console.print(f"  {unit} takes no further part: {why}", style="red", markup=False)
+    if answer.last_error:
+        console.print(f"  last fault: {answer.last_error}", style="red", markup=False)
+    for serial, recording in answer.recordings.items():
+        console.print(f"  recording {recording}: {serial}", markup=False)
+
+
+def print_start(answer: ScheduledResponse) -> None:
+    """Print one entry of the schedule."""
+    console.print(f"start {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]")
+    if answer.due_at is not None:
+        again = f", again by cron line {answer.cron!r}" if answer.cron else ""
+        console.print(f"  begins {answer.due_at:%Y-%m-%d %H:%M %z} ({answer.time_zone}){again}", markup=False)
+    for event in answer.history:
+        console.print(f"  due {event.due_at:%Y-%m-%d %H:%M %z}: {event.outcome}: {event.message}", markup=False)
+    if answer.note:
+        console.print(f"  {answer.note}", style="yellow", markup=False)

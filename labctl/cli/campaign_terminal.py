@@ -1,0 +1,32 @@
+"""The terminal of a campaign that runs in the foreground: progress, prompts, and signals that end it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+
+from labctl.cli.error_reporting import ending_is_an_interrupt
+from labctl.cli.output import stderr
+from labctl.cli.progress_bar import CampaignProgress
+from labctl.cli.terminal_operator import TerminalOperator
+from labctl.services.commands.foreground import CampaignTerminal, OpenTerminal
+
+
+def campaign_terminal(*, quiet: bool) -> OpenTerminal:
+    """Return what opens the terminal for the time of one campaign; `quiet`: without a progress bar."""
+
+    @contextmanager
+    def opened() -> Iterator[CampaignTerminal]:
+        with (
+            ending_is_an_interrupt(),
+            closing(TerminalOperator()) as operator,
+            CampaignProgress(quiet=quiet) as progress,
+        ):
+            yield CampaignTerminal(progress.update, operator.answer_prompts, _say)
+
+    return opened
+
+
+def _say(text: str) -> None:
+    """Print a remark beside the answer."""
+    stderr.print(f"labctl: {text}", markup=False)

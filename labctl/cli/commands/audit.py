@@ -1,0 +1,69 @@
+"""`labctl audit`: who did what, when and why."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+import typer
+
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import Database, Json
+from labctl.cli.output import console, print_json, stderr, table
+
+app = typer.Typer(no_args_is_help=True, help="The audit trail: who did what, when and why.")
+
+
+@app.command("list")
+def list_(
+    since: Annotated[
+        datetime | None, typer.Option("--since", help="From this instant on, UTC: 2026-03-01 or 2026-03-01T08:00:00.")
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """List who did what, when and why."""
+    from labctl.services.admin.audit import list_audit
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.schemas.admin import AuditResponse
+
+    answers: list[AuditResponse] = []
+    with one_clear_line(), open_readonly(database) as store:
+        while page := list_audit(store, since, answers[-1].id if answers else 0):
+            answers += page
+    if as_json:
+        print_json(answers)
+        return
+    rows = table("", "row", "when (UTC)", "who", "what", "to what", "why and how")
+    for answer in answers:
+        detail = ", ".join(f"{key} {value}" for key, value in answer.detail.items() if value is not None)
+        when = f"{answer.at:%Y-%m-%d %H:%M:%S}"
+        rows.add_row(str(answer.id), when, answer.who, answer.action, answer.subject, detail)
+    console.print(rows, markup=False)
+
+
+@app.command("verify")
+def verify(
+    anchor: Annotated[
+        str | None,
+        typer.Option("--anchor", metavar="LENGTH:HASH", help="What an earlier verify printed, kept elsewhere."),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Find the first row that was changed, moved, or follows a missing one."""
+    from labctl.services.admin.audit import verify_audit
+    from labctl.services.commands.open import open_readonly
+
+    with one_clear_line(), open_readonly(database) as store:
+        answer = verify_audit(store, anchor)
+    if as_json:
+        print_json(answer)
+    elif answer.ok:
+        console.print(
+            f"{answer.rows} rows, all as they were written; anchor {answer.anchor or 'none yet'}", markup=False
+        )
+    else:
+        stderr.print(f"labctl: audit trail: {answer.text}", markup=False)
+    if not answer.ok:
+        raise typer.Exit(1)

@@ -1,0 +1,86 @@
+"""`labctl bench`: does every instrument answer?"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import Database, Json
+from labctl.cli.output import console, print_json
+
+app = typer.Typer(no_args_is_help=True, help="The benches: tables, chambers and gyros.")
+
+
+@app.command("check")
+def check(
+    bench: Annotated[str, typer.Argument(metavar="FILE", help="Bench file, or the name of a shipped bench.")],
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  every command takes it
+) -> None:
+    """Talk to every instrument of a bench and say what answered. Nothing moves."""
+    from labctl.services.benches.check import check_bench
+
+    with one_clear_line():
+        checks = check_bench(bench)
+    if as_json:
+        print_json({"bench": bench, "ok": all(c.ok for c in checks), "devices": [c.model_dump() for c in checks]})
+    else:
+        for device in checks:
+            mark = "[green]answers[/]" if device.ok else "[red]failed[/] "
+            console.print(f"{mark}  {device.device:14} ", end="")
+            console.print(device.text, markup=False)
+    if not all(c.ok for c in checks):
+        raise typer.Exit(1)
+
+
+@app.command("status")
+def status(as_json: Json = False, database: Database = None) -> None:
+    """Say which benches were not confirmed safe when their last campaign ended, or had none: their process is gone."""
+    from labctl.services.campaigns.bench_status import bench_statuses
+    from labctl.services.commands.open import open_readonly
+
+    with one_clear_line(), open_readonly(database) as store:
+        benches = bench_statuses(store)
+    if as_json:
+        print_json(benches)
+    else:
+        for bench in benches:
+            said = [bench.unconfirmed, *(f"nobody has made it safe: {left}" for left in bench.left)]
+            for line in filter(None, said if any(said) else ["nothing is unconfirmed"]):
+                console.print(f"{bench.name:18} {line}", markup=False, soft_wrap=True)
+    if any(bench.unconfirmed or bench.left for bench in benches):
+        raise typer.Exit(1)
+
+
+@app.command("clear")
+def clear(
+    bench: Annotated[str, typer.Argument(metavar="NAME", help="Name of the bench, as `labctl bench status` says it.")],
+    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Who has looked at it.")],
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="What was found.")] = "looked at the bench",
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Say that you have looked at a bench that was not confirmed safe; campaigns may start on it again."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import CLEAR_BENCH
+    from labctl.services.commands.requests import ToBench
+    from labctl.services.schemas.benches import ClearRequest
+
+    with one_clear_line():
+        answer = execute(database, CLEAR_BENCH, ToBench(bench, ClearRequest(by=by, reason=reason)))
+    print_json(answer) if as_json else console.print(f"{answer.name}: nothing is unconfirmed", markup=False)
+
+
+@app.command("list")
+def list_(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001
+    """List the benches that ship with labctl."""
+    from labctl.services.benches.check import shipped
+
+    benches = shipped()
+    if as_json:
+        print_json(benches)
+        return
+    for bench in benches:
+        console.print(f"{bench['name']:18} {bench['text']}", markup=False)

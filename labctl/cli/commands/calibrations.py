@@ -1,0 +1,143 @@
+"""`labctl fit`, `certify`, `revoke`, `calibration` and `compensate`: from a recording to a corrected rate."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from labctl.cli.calibration_output import print_fit
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import Database, Json, RecordingId, Serial
+from labctl.cli.output import console, print_json
+
+if TYPE_CHECKING:
+    pass
+
+Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
+By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it.")]
+Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")]
+
+
+def fit(
+    serial: Serial,
+    recording: RecordingId = None,
+    model: Annotated[
+        str | None, typer.Option("--model", metavar="NAME", help="A preset: `labctl effects` lists them.")
+    ] = None,
+    effects: Annotated[
+        str | None, typer.Option("--effects", metavar="A,B,C", help="Effects; `name:2` sets a polynomial order.")
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Fit a model to a recording; it becomes the unit's next calibration version."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import FIT
+    from labctl.services.commands.requests import ToUnit
+    from labctl.services.schemas.calibrations import FitRequest
+
+    names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
+    with one_clear_line():
+        request = FitRequest(recording=recording, model=model, effects=names)
+        answer = execute(database, FIT, ToUnit(serial, request))
+    if as_json:
+        print_json(answer)
+    else:
+        print_fit(answer)
+
+
+def certify(
+    serial: Serial,
+    version: Version,
+    by: By,
+    reason: Reason,
+    due_days: Annotated[int | None, typer.Option("--due-days", metavar="N", help="Days until it is due again.")] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Make a version the unit's current one. An older version again is a rollback."""
+    _set_in_force("certify", serial, version, by, reason, due_days, as_json, database)
+
+
+def revoke(
+    serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
+) -> None:
+    """Take a version out of force."""
+    _set_in_force("revoke", serial, version, by, reason, None, as_json, database)
+
+
+def _set_in_force(
+    act: Literal["certify", "revoke"],
+    serial: str,
+    version: int,
+    by: str,
+    reason: str,
+    due_days: int | None,
+    as_json: bool,
+    database: str | None,
+) -> None:
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import CERTIFY, REVOKE
+    from labctl.services.commands.requests import ToVersion
+    from labctl.services.schemas.calibrations import CertifyRequest
+
+    command = CERTIFY if act == "certify" else REVOKE
+    with one_clear_line():
+        request = CertifyRequest(by=by, reason=reason, due_days=due_days)
+        answer = execute(database, command, ToVersion(serial, version, request))
+    if as_json:
+        print_json(answer)
+    else:
+        done = "is now the calibration in force" if act == "certify" else "is no longer in force"
+        console.print(f"{serial} version {version} {done} ({by}: {reason})", markup=False)
+
+
+def calibration(
+    serial: Serial,
+    version: Annotated[int | None, typer.Option("--version", metavar="N", help="Default: the certified one.")] = None,
+    format_: Annotated[str, typer.Option("--format", metavar="NAME", help="json, c ...")] = "json",
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write a file instead of printing.")] = None,
+    as_json: Json = False,  # noqa: ARG001  the calibration file is JSON already
+    database: Database = None,
+) -> None:
+    """Print a calibration as a file to load elsewhere."""
+    from labctl.services.calibrations.fitting import calibration_file
+    from labctl.services.commands.open import open_readonly
+
+    with one_clear_line(), open_readonly(database) as store:
+        content = calibration_file(store, serial, version, format_).content
+        if out is None:
+            sys.stdout.buffer.write(content)
+        else:
+            out.write_bytes(content)
+
+
+def compensate(
+    calibration_file: Annotated[Path, typer.Argument(metavar="CALIBRATION_FILE")],
+    source: Annotated[
+        Path, typer.Argument(metavar="IN", help="Samples: CSV or Parquet with gyro_x ..., temperature_c.")
+    ],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The same rows with rate_x_dps ... and `outside`.")],
+    outside: Annotated[
+        str, typer.Option("--outside", help="Beyond the calibrated range: clamp (and flag) or refuse.")
+    ] = "clamp",
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  needs none: a calibration file is enough
+) -> None:
+    """Correct a file of readings by a calibration file; needs no database."""
+    from labctl.services.calibrations.apply import compensate_file
+
+    with one_clear_line():
+        answer = compensate_file(calibration_file, source, target, outside)
+    if as_json:
+        print_json(answer)
+        return
+    console.print(f"{answer['rows']} readings -> {target}", markup=False)
+    if answer["outside"]:
+        console.print(
+            f"{answer['outside']} of them lie outside the calibrated range and are flagged in column `outside`",
+            style="yellow",
+        )

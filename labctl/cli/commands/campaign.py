@@ -1,0 +1,123 @@
+"""`labctl campaign`: plan, start, list, status."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labctl.cli.campaign_output import print_campaign, print_plan, print_started
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import BenchName, CampaignId, Database, Json
+from labctl.cli.output import console, print_json, table
+
+if TYPE_CHECKING:
+    pass
+
+app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units.")
+
+Recipe = Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")]
+Clip = Annotated[bool, typer.Option("--clip", help="Leave out points beyond the bench or a unit, and say which.")]
+
+
+@app.command("plan")
+def plan(
+    recipe: Recipe,
+    bench: BenchName = None,
+    clip: Clip = False,
+    visibility: Annotated[
+        bool, typer.Option("--visibility", help="Also say what the plan could and could not find, from which size on.")
+    ] = False,
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  every command takes it
+) -> None:
+    """Say what a campaign would do and how long it takes. Nothing moves."""
+    from labctl.services.planning.loading import describe_plan
+    from labctl.services.simulation.visibility import visibility as look
+
+    with one_clear_line():
+        answer = describe_plan(recipe, bench, clip=clip, look=look if visibility else None)
+    if as_json:
+        print_json(answer)
+    else:
+        print_plan(answer)
+
+
+@app.command("start")
+def start(
+    recipe: Recipe,
+    bench: BenchName = None,
+    clip: Clip = False,
+    speed: Annotated[
+        float | None,
+        typer.Option("--speed", metavar="X", help="A simulated bench, X times as fast; default: as fast as it can."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the simulated bench.")] = None,
+    at: Annotated[
+        str | None, typer.Option("--at", metavar="TIME", help="Begin then: 2026-03-28T22:00, or now: when it is free.")
+    ] = None,
+    cron: Annotated[
+        str | None, typer.Option("--cron", metavar="LINE", help="Begin again and again: '30 22 * * FRI'.")
+    ] = None,
+    time_zone: Annotated[
+        str | None, typer.Option("--time-zone", metavar="NAME", help="Of TIME and LINE; default: the local one.")
+    ] = None,
+    priority: Annotated[
+        int | None, typer.Option("--priority", metavar="N", help="The highest goes first; default: 0.")
+    ] = None,
+    late_limit_s: Annotated[
+        float | None,
+        typer.Option("--late-limit-s", metavar="S", help="Later it is not begun; 0 skips a missed start."),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Run a recipe. A service that holds the database runs it on its bench; else it runs here, until it is over.
+
+    With --at or --cron it is entered into the schedule, which only a service (`labctl serve`) carries out.
+    """
+    from labctl.cli.campaign_terminal import campaign_terminal
+    from labctl.services.commands.open import open_commands
+    from labctl.services.commands.registry import START_CAMPAIGN
+    from labctl.services.commands.requests import CampaignStart
+    from labctl.services.planning.loading import own_text
+    from labctl.services.schemas.campaigns import CampaignRequest
+
+    with one_clear_line():
+        wanted = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}
+        given = {name: value for name, value in wanted.items() if value is not None}
+        request = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **given})
+        asked = CampaignStart(request, bench=bench, speed=speed, seed=seed)
+        with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
+            answer = commands.execute(START_CAMPAIGN, asked)
+    print_started(answer, as_json=as_json)
+
+
+@app.command("list")
+def list_(as_json: Json = False, database: Database = None) -> None:
+    """List all campaigns, newest first."""
+    from labctl.services.campaigns.status import list_campaigns
+    from labctl.services.commands.open import open_readonly
+
+    with one_clear_line(), open_readonly(database) as store:
+        answers = list_campaigns(store)
+    if as_json:
+        print_json(answers)
+        return
+    rows = table("", "id", "recipe", "bench", "state", "started", "progress", numbers=1)
+    for answer in answers:
+        started = f"{answer.started_at:%Y-%m-%d %H:%M}" if answer.started_at else "–"
+        rows.add_row(
+            str(answer.id), answer.recipe, answer.bench, answer.state, started, f"{100 * answer.progress:.0f} %"
+        )
+    console.print(rows)
+
+
+@app.command("status")
+def status(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
+    """Say where a campaign is: live from a running service, else what the database tells."""
+    from labctl.services.commands.open import current_status
+
+    with one_clear_line():
+        answer = current_status(database, campaign)
+    print_json(answer) if as_json else print_campaign(answer)

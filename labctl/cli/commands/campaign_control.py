@@ -1,0 +1,143 @@
+"""`labctl campaign` watch, pause, resume, abort, confirm: a campaign that runs, or was interrupted."""
+
+from __future__ import annotations
+
+import getpass
+from typing import Annotated
+
+import typer
+
+from labctl.cli.campaign_output import print_campaign, print_end
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import BenchName, CampaignId, Database, Json
+from labctl.cli.output import console, print_json
+
+Id = Annotated[int, typer.Argument(metavar="ID", help="Campaign.")]
+By = Annotated[str | None, typer.Option("--by", metavar="NAME", help="Who says so; default: the user logged in.")]
+
+
+def person(by: str | None) -> str:
+    """Return who acts: as said, or whoever is logged in."""
+    try:
+        return by or getpass.getuser()
+    except (KeyError, OSError):
+        return "a person"
+
+
+def watch(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
+    """Follow a campaign until it ends: from a running service live, else what the database tells."""
+    from instruments.clock import SystemClock
+    from labctl.cli.progress_bar import CampaignProgress
+    from labctl.services.commands.open import current_status
+
+    clock, asked, fault = SystemClock(), "", ""
+    with one_clear_line(), CampaignProgress(quiet=as_json) as progress:
+        while True:
+            answer = current_status(database, campaign)
+            progress.update(answer)
+            if not as_json and answer.prompt is not None and answer.prompt.id != asked:
+                asked = answer.prompt.id
+                console.print(f"question {asked}: {answer.prompt.text}", style="yellow", markup=False)
+            if not as_json and answer.last_error and answer.last_error != fault:
+                fault = answer.last_error
+                console.print(f"fault: {fault}", style="red", markup=False)
+            if answer.abandoned or answer.state not in {"planned", "running", "paused", "waiting"}:
+                break
+            clock.sleep(1.0)
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+def pause(
+    campaign: Id,
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")] = "paused from the command line",
+    by: By = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Hold a running campaign after the present data set; the bench is still watched."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import PAUSE_CAMPAIGN
+    from labctl.services.commands.requests import ToCampaign
+    from labctl.services.schemas.campaigns import ReasonRequest
+
+    with one_clear_line():
+        request = ReasonRequest(reason=reason, by=person(by))
+        answer = execute(database, PAUSE_CAMPAIGN, ToCampaign(campaign, request))
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+def resume(
+    campaign: Annotated[
+        int | None, typer.Argument(metavar="ID", help="Campaign; default: the newest that was interrupted.")
+    ] = None,
+    bench: BenchName = None,
+    power: Annotated[
+        str | None,
+        typer.Option("--power", metavar="lost|kept", help="Were the units off meanwhile? Default: if the host."),
+    ] = None,
+    speed: Annotated[float | None, typer.Option("--speed", metavar="X", help="Of a simulated bench.")] = None,
+    by: By = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Let a paused campaign go on, or take up one that was interrupted, failed or aborted; safe state first."""
+    from labctl.cli.campaign_terminal import campaign_terminal
+    from labctl.services.commands.open import campaign_to_resume, open_commands
+    from labctl.services.commands.registry import RESUME_CAMPAIGN
+    from labctl.services.commands.requests import CampaignResume
+    from labctl.services.schemas.campaigns import ResumeRequest
+
+    with one_clear_line():
+        request = ResumeRequest.model_validate({"by": person(by), "power": power})
+        asked = CampaignResume(campaign_to_resume(database, campaign), request, bench, speed)
+        with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
+            answer = commands.execute(RESUME_CAMPAIGN, asked)
+    print_end(answer, as_json=as_json)
+
+
+def abort(
+    campaign: Id,
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")] = "aborted from the command line",
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """End a running campaign now, in the safe state. What was measured is kept."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import ABORT_CAMPAIGN
+    from labctl.services.commands.requests import ToCampaign
+    from labctl.services.schemas.campaigns import ReasonRequest
+
+    with one_clear_line():
+        answer = execute(database, ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason=reason)))
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+def confirm(
+    prompt: Annotated[str, typer.Argument(metavar="QUESTION", help="Id of the question, as status or watch shows it.")],
+    campaign: Annotated[
+        int | None, typer.Option("--campaign", metavar="ID", help="Campaign; default: the newest.")
+    ] = None,
+    decline: Annotated[
+        str | None, typer.Option("--decline", metavar="WHY", help="It cannot be done; the campaign ends.")
+    ] = None,
+    by: By = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Answer a campaign's question: it is done, or cannot be. An answer to an older question is refused."""
+    from labctl.services.commands.open import current_status, execute
+    from labctl.services.commands.registry import CONFIRM_PROMPT
+    from labctl.services.commands.requests import ToCampaign
+    from labctl.services.schemas.campaigns import ConfirmRequest
+
+    with one_clear_line():
+        wanted = campaign if campaign is not None else current_status(database, None).id
+        request = ConfirmRequest(prompt=prompt, by=person(by), confirmed=decline is None, reason=decline or "")
+        answer = execute(database, CONFIRM_PROMPT, ToCampaign(wanted, request))
+    print_json(answer) if as_json else print_campaign(answer)
+
+
+def add_to(app: typer.Typer) -> None:
+    """Put these commands beside the others of `labctl campaign`."""
+    for command in (watch, pause, resume, abort, confirm):
+        app.command(command.__name__)(command)

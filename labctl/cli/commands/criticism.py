@@ -1,0 +1,148 @@
+"""`labctl verify`, `criticise`, `improve`, `ladder`: hold the model against the measurements, add what is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labctl.cli.criticism_output import (
+    print_criticism,
+    print_improvement,
+    print_ladder,
+    print_verification,
+)
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import Database, Json, RecordingId, Serial
+from labctl.cli.output import print_json
+
+if TYPE_CHECKING:
+    from labctl.fitting.effects import Formula
+
+VersionOption = Annotated[int | None, typer.Option("--version", metavar="N", help="Version; default: the newest.")]
+FormulaOption = Annotated[
+    list[str] | None,
+    typer.Option("--formula", metavar="'NAME: EXPR'", help="An effect of your own, or a TOML file of them."),
+]
+
+
+OtherUnit = Annotated[bool, typer.Option("--other-unit", help="The recording may be of another unit.")]
+
+
+def verify(
+    serial: Serial,
+    version: VersionOption = None,
+    recording: RecordingId = None,
+    other_unit: OtherUnit = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Apply a version as it is to a recording, nothing refitted: its errors, and whether they are as expected."""
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.criticism.verification import verify_unit
+
+    with one_clear_line(), open_readonly(database) as store:
+        answer = verify_unit(store, serial, version, recording, other_unit=other_unit)
+    if as_json:
+        print_json(answer)
+    else:
+        print_verification(answer)
+    if not answer.ok:
+        raise typer.Exit(1)
+
+
+def criticise(
+    serial: Serial,
+    version: VersionOption = None,
+    recording: RecordingId = None,
+    other_unit: OtherUnit = False,
+    formula: FormulaOption = None,
+    next_recipe: Annotated[
+        Path | None, typer.Option("--next", metavar="FILE", help="Write the best next experiment as a recipe.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE", help="Write a page with the pictures: one HTML file.")
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Hold a version against a recording: what is left, where, and which effect may be missing."""
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.criticism.criticise import criticise_unit, write_next
+
+    with one_clear_line(), open_readonly(database) as store:
+        answer = criticise_unit(store, serial, version, recording, written(formula), other_unit=other_unit)
+        if next_recipe is not None:
+            write_next(answer, next_recipe)
+        if report is not None:
+            from labctl.services.criticism.report import write_report
+
+            write_report(store, answer, report)
+    if as_json:
+        print_json(answer)
+    else:
+        print_criticism(answer)
+    if answer.verdict == "insufficient_data":
+        raise typer.Exit(1)
+
+
+def written(sources: list[str] | None) -> list[Formula]:
+    """Return the formulas of a command line. Raises BadInput."""
+    if not sources:
+        return []
+    from labctl.services.effects import with_files
+
+    return with_files(sources)
+
+
+def improve(
+    serial: Serial,
+    add: Annotated[list[str] | None, typer.Option("--add", metavar="EFFECT", help="Effect to add.")] = None,
+    remove: Annotated[list[str] | None, typer.Option("--remove", metavar="EFFECT", help="Effect to take out.")] = None,
+    formula: FormulaOption = None,
+    version: VersionOption = None,
+    recording: RecordingId = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Change a version's effects and fit again: a new version, with the error before and after."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import IMPROVE
+    from labctl.services.commands.requests import ToNewestOrVersion
+    from labctl.services.effects import as_lines
+    from labctl.services.schemas.calibrations import ImproveRequest
+
+    def names(given: list[str] | None) -> list[str]:
+        return [name.strip() for text in given or [] for name in text.split(",") if name.strip()]
+
+    with one_clear_line():
+        request = ImproveRequest(
+            add=names(add), remove=names(remove), formula=as_lines(formula or []), recording=recording
+        )
+        answer = execute(database, IMPROVE, ToNewestOrVersion(serial, version, request))
+    if as_json:
+        print_json(answer)
+    else:
+        print_improvement(answer)
+
+
+def ladder(
+    serial: Serial,
+    recording: Annotated[
+        int | None,
+        typer.Option("--recording", metavar="ID", help="Versions of this recording; default: of the newest version's."),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Show the error of the versions on one recording, each after its parent, down to the noise floor."""
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.criticism.ladder import ladder as ladder_of
+
+    with one_clear_line(), open_readonly(database) as store:
+        answer = ladder_of(store, serial, recording)
+    if as_json:
+        print_json(answer)
+    else:
+        print_ladder(answer)

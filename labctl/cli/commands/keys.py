@@ -1,0 +1,71 @@
+"""`labctl key`: who may read, act and approve over HTTP."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import Database, Json
+from labctl.cli.output import console, print_json, stderr, table
+
+app = typer.Typer(no_args_is_help=True, help="API keys: who may read, act and approve over HTTP.")
+
+KeyName = Annotated[str, typer.Argument(metavar="NAME", help="Whose key it is; the audit trail shows this name.")]
+Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")]
+
+
+@app.command("create")
+def create(
+    name: KeyName,
+    role: Annotated[str, typer.Option("--role", metavar="ROLE", help="viewer, operator or approver.")],
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Make a key and print it, this once: only its digest is kept."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import CREATE_KEY
+    from labctl.services.schemas.admin import KeyRequest, Role
+
+    with one_clear_line():
+        answer = execute(database, CREATE_KEY, KeyRequest.model_validate({"name": name, "role": role}))
+    if as_json:
+        print_json(answer)
+        return
+    console.print(answer.key, markup=False, soft_wrap=True)
+    may = {Role.VIEWER: "read", Role.OPERATOR: "read and act", Role.APPROVER: "read, act and approve"}[answer.role]
+    stderr.print(f"{answer.name} may {may}. The key is not shown again: keep it now.", markup=False)
+
+
+@app.command("list")
+def list_(as_json: Json = False, database: Database = None) -> None:
+    """List every key that was made, by name; the keys themselves are kept nowhere."""
+    from labctl.services.admin.api_keys import list_keys
+    from labctl.services.commands.open import open_readonly
+
+    with one_clear_line(), open_readonly(database) as store:
+        answers = list_keys(store)
+    if as_json:
+        print_json(answers)
+        return
+    rows = table("", "name", "role", "made", "revoked")
+    for answer in answers:
+        revoked = f"{answer.revoked_at:%Y-%m-%d %H:%M}" if answer.revoked_at else "–"
+        rows.add_row(answer.name, answer.role.value, f"{answer.created_at:%Y-%m-%d %H:%M}", revoked)
+    console.print(rows)
+
+
+@app.command("revoke")
+def revoke(
+    name: KeyName, reason: Reason = "revoked from the command line", as_json: Json = False, database: Database = None
+) -> None:
+    """Take a key's power away, at once."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import REVOKE_KEY
+    from labctl.services.commands.requests import ToKey
+    from labctl.services.schemas.campaigns import ReasonRequest
+
+    with one_clear_line():
+        answer = execute(database, REVOKE_KEY, ToKey(name, ReasonRequest(reason=reason)))
+    print_json(answer) if as_json else console.print(f"{answer.name} is revoked", markup=False)

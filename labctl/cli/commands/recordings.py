@@ -1,0 +1,99 @@
+"""`labctl import`, `labctl export recording` and `labctl simulate`: data in, data out, data made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import Database, Json
+from labctl.cli.output import console, print_json
+
+export_app = typer.Typer(no_args_is_help=True, help="Write what the database holds to files.")
+
+
+def import_(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with recording.toml and its data file.")],
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Take in a recording made on any bench, in the interchange format."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import IMPORT_RECORDING
+    from labctl.services.commands.requests import RecordingFolder
+
+    with one_clear_line():
+        answer = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
+    if as_json:
+        print_json(answer)
+        return
+    console.print(
+        f"recording {answer.recording} of {answer.serial}: {answer.datasets} data sets, {answer.readings} readings"
+    )
+    console.print(f"next: labctl fit {answer.serial} --model {answer.suggested_model}", style="dim", markup=False)
+
+
+@export_app.command("recording")
+def export_recording(
+    recording: Annotated[int, typer.Argument(metavar="ID", help="Recording.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write; it may not exist yet.")],
+    csv: Annotated[bool, typer.Option("--csv", help="CSV instead of Parquet.")] = False,
+    points: Annotated[bool, typer.Option("--points", help="One row per data set instead of every reading.")] = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Write a recording in the interchange format: every reading, as it was measured."""
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.recordings.transfer import export_recording as export
+
+    with one_clear_line(), open_readonly(database) as store:
+        written = export(store, recording, out, "csv" if csv else "parquet", points=points)
+    if as_json:
+        print_json({"recording": recording, "folder": str(out), "files": written})
+    else:
+        console.print(f"recording {recording} -> {out}: {', '.join(written)}")
+
+
+def simulate(
+    recipe: Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped one.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write; it may not exist yet.")],
+    bench: Annotated[
+        str | None, typer.Option("--bench", metavar="FILE", help="Bench; default: the recipe's own.")
+    ] = None,
+    gyro: Annotated[
+        str | None, typer.Option("--gyro", metavar="NAME", help="Which gyro of the bench; default: first.")
+    ] = None,
+    hide: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--hide", metavar="EFFECT[=SIZE]", help="Hide an effect; SIZE in its unit, or z10: ten noise units."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Same seed, same recording.")] = 1,
+    sample_rate_hz: Annotated[
+        float | None, typer.Option("--sample-rate", metavar="HZ", help="Readings per second; default 10.")
+    ] = None,
+    csv: Annotated[bool, typer.Option("--csv", help="CSV instead of Parquet.")] = False,
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  every command takes it
+) -> None:
+    """Make a recording on the simulated bench, with effects hidden in the gyro, in the interchange format."""
+    from labctl.services.simulation.recordings import SimulateRequest, simulate_recording
+
+    with one_clear_line():
+        answer = simulate_recording(
+            SimulateRequest(
+                recipe=recipe, bench=bench, gyro=gyro, hide=hide or [], seed=seed, sample_rate_hz=sample_rate_hz
+            ),
+            out,
+            "csv" if csv else "parquet",
+        )
+    if as_json:
+        print_json(answer)
+        return
+    hidden = ", ".join(f"{name} = {size:.4g}" for name, size in answer.hidden.items()) or "nothing"
+    console.print(f"{answer.serial}: {answer.datasets} data sets, {answer.readings} readings -> {out}")
+    console.print(f"hidden in it: {hidden}", style="dim")
+    console.print(f"next: labctl import {out}", style="dim")

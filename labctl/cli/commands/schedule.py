@@ -1,0 +1,71 @@
+"""`labctl campaign schedule`: list, show, cancel. `labctl campaign start --at | --cron` enters a start."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labctl.cli.campaign_output import print_start
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import Database, Json
+from labctl.cli.output import console, print_json, stderr, table
+
+if TYPE_CHECKING:
+    pass
+
+app = typer.Typer(no_args_is_help=True, help="The schedule: campaigns that begin later, in a running service.")
+
+StartId = Annotated[int, typer.Argument(metavar="ID", help="Entry of the schedule.")]
+
+
+@app.command("list")
+def list_(
+    ended: Annotated[bool, typer.Option("--all", help="Also entries that are over.")] = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """List what begins when, next first."""
+    from labctl.services.commands.open import open_readonly, service_url
+    from labctl.services.schedule.queue import list_starts
+
+    with one_clear_line(), open_readonly(database) as store:
+        answers = list_starts(store, ended=ended)
+        served = service_url(database) is not None
+    if as_json:
+        print_json(answers)
+        return
+    rows = table("", "id", "recipe", "bench", "state", "next", "cron", "last start", "priority", numbers=1)
+    for answer in answers:
+        due = f"{answer.due_at:%Y-%m-%d %H:%M %z}" if answer.due_at else "–"
+        last = f"{answer.history[-1].outcome}: {answer.history[-1].message}" if answer.history else "–"
+        rows.add_row(
+            str(answer.id), answer.recipe, answer.bench, answer.state, due, answer.cron or "–", last,
+            str(answer.priority),
+        )  # fmt: skip
+    console.print(rows)
+    if answers and not served:
+        stderr.print("no service holds this database, so nothing begins; `labctl serve` does", style="yellow")
+
+
+@app.command("show")
+def show(start: StartId, as_json: Json = False, database: Database = None) -> None:
+    """Say when an entry begins next and what became of each start that fell due."""
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.schedule.queue import start_status
+
+    with one_clear_line(), open_readonly(database) as store:
+        answer = start_status(store, start)
+    print_json(answer) if as_json else print_start(answer)
+
+
+@app.command("cancel")
+def cancel(start: StartId, as_json: Json = False, database: Database = None) -> None:
+    """Take an entry out of the schedule. A campaign that it has begun runs on."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import CANCEL_START
+    from labctl.services.commands.requests import ToStart
+
+    with one_clear_line():
+        answer = execute(database, CANCEL_START, ToStart(start))
+    print_json(answer) if as_json else print_start(answer)

@@ -1,0 +1,115 @@
+"""`labctl serve`, `labctl simulator` and `labctl demo`: what runs for longer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from labctl.cli.error_reporting import ending_is_an_interrupt, one_clear_line
+from labctl.cli.options import BenchName, Database, Json
+from labctl.cli.output import console, print_json, stderr
+
+
+def serve(
+    bench: BenchName = None,
+    simulate: Annotated[bool, typer.Option("--simulate", help="A simulated bench; default triaxial-sim.")] = False,
+    speed: Annotated[
+        float,
+        typer.Option(
+            "--speed",
+            metavar="X",
+            help="Simulated bench, X times as fast; 0: as it can. Too fast for this machine, it loses readings.",
+        ),
+    ] = 1.0,
+    host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option("--port", metavar="N", help="Port; 0 takes a free one.")] = 8420,
+    require_keys: Annotated[
+        bool, typer.Option("--require-keys", help="Ask for a key on loopback too; elsewhere one is always asked for.")
+    ] = False,
+    max_upload_mib: Annotated[
+        int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
+    ] = 2048,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Serve calibrations over HTTP and run campaigns on the bench. Stops with Ctrl-C, bench left safe."""
+    from labctl.api.server import SIMULATED_BENCH, ServeRequest, serve_forever
+
+    named = bench or (SIMULATED_BENCH if simulate else None)
+
+    def ready(url: str) -> None:
+        unconfirmed, cut_short = ("", "") if named is None else _found(named, database)
+        if as_json:
+            print_json({"url": url, "unconfirmed": unconfirmed, "cut_short": cut_short}, one_line=True)
+            return
+        console.print(f"labctl listens on {url}  (API text: {url}/api-docs)", markup=False)
+        for text in filter(None, (unconfirmed, cut_short)):
+            console.print(text, style="yellow", markup=False, soft_wrap=True)
+
+    # the HTTP server, once stopped, raises the signal again: with its own meaning that would end us before the bench
+    with one_clear_line(), ending_is_an_interrupt():
+        request = ServeRequest(
+            bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
+            require_keys=require_keys, max_upload_mib=max_upload_mib,
+        )  # fmt: skip
+        left = serve_forever(request, ready)
+    stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
+
+
+def _found(source: str, database: str | None) -> tuple[str, str]:
+    """Say what is wrong with a bench when its service starts, and which campaign was left there; empty for nothing."""
+    from labctl.services.campaigns.execution import describe_safe_state
+    from labctl.services.campaigns.recovery import describe_recovery
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.planning.loading import load_bench
+
+    name = load_bench(source).name
+    with open_readonly(database) as store:
+        unconfirmed = store.benches.unconfirmed(name)
+        return describe_safe_state(name, unconfirmed) if unconfirmed else "", describe_recovery(store, name)
+
+
+def simulator(
+    bench: Annotated[str, typer.Argument(metavar="BENCH", help="Bench file, or the name of a shipped one.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Write a bench file that points at the simulator here.")
+    ] = None,
+    speed: Annotated[float, typer.Option("--speed", metavar="X", help="X times as fast as the wall.")] = 1.0,
+    log: Annotated[
+        Path | None,
+        typer.Option("--log", metavar="FILE", help="Write what every instrument hears here, as JSON lines."),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  every command takes it
+) -> None:
+    """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until Ctrl-C."""
+    from labctl.services.benches.check import serve_simulator
+
+    def ready(addresses: dict[str, str]) -> None:
+        if as_json:
+            print_json({"addresses": addresses, "bench_file": str(out) if out else None}, one_line=True)
+            return
+        for device, address in addresses.items():
+            console.print(f"{device:14} {address}", markup=False)
+        if out:
+            console.print(f"bench file: {out}", markup=False)
+
+    with one_clear_line():
+        serve_simulator(bench, out, speed, ready, log)
+
+
+def demo(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the demo's files go.")] = Path("demo-output"),
+    quick: Annotated[bool, typer.Option("--quick", help="The same story on a smaller tri-axial campaign.")] = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Run the whole job on simulated benches in virtual time, and on a real gyro's recording; prints the story."""
+    from labctl.cli.demo import run_demo
+
+    with one_clear_line():
+        figures = run_demo(out, database, quick=quick, quiet=as_json)
+    if as_json:
+        print_json(figures)

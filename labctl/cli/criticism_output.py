@@ -1,0 +1,183 @@
+"""Criticisms, improvements and error ladders as text."""
+
+from __future__ import annotations
+
+from math import log10
+from typing import TYPE_CHECKING, Any
+
+from labctl.cli.output import console, format_number, table
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.calibrations import FitResponse, LadderResponse
+    from labctl.services.schemas.criticism import CriticismResponse, VerificationResponse
+
+
+#: From dark to bright: residual over floor in the small map.
+SHADES = " ·░▒▓█"
+
+
+def print_verification(answer: VerificationResponse) -> None:
+    """Print what a version leaves of a recording as it is, axis by axis."""
+    from labctl.services.criticism.verification_text import verification_sentence
+
+    console.print(verification_sentence(answer), markup=False, soft_wrap=not console.is_terminal)
+    rows = table("", "axis", "RMS deg/s", "largest", "mean", numbers=3)
+    for axis, found in answer.axes.items():
+        rows.add_row(axis, format_number(found.rms_dps), format_number(found.max_dps), format_number(found.bias_dps))
+    console.print(rows)
+    console.print("as expected" if answer.ok else "NOT as expected: fit a new version, or criticise this one")
+
+
+def print_criticism(answer: CriticismResponse) -> None:
+    """Print a criticism: the version as it is, the verdict on its model refitted, the errors, a small map, a table."""
+    from labctl.services.criticism.verification_text import verification_sentence
+
+    whole = not console.is_terminal  # a program that reads lines gets each sentence on one
+    if answer.applied is not None and not answer.applied.seen:
+        console.print(
+            verification_sentence(answer.applied),
+            style=None if answer.applied.ok else "red",
+            markup=False,
+            soft_wrap=whole,
+        )
+        console.print(f"Refitted to recording {answer.recording}:", markup=False)
+    for line in answer.text:
+        console.print(line, style="bold" if line is answer.text[0] else None, markup=False, soft_wrap=whole)
+    error = answer.error
+    console.print(
+        f"{answer.serial} version {answer.version}, recording {answer.recording}: "
+        f"left {format_number(error['rms_dps'])} deg/s, "
+        f"held-out {format_number(error['heldout_rms_dps'])}, noise floor {format_number(error['noise_floor_dps'])}",
+        style="dim",
+    )
+    if answer.noise.get("static"):
+        _print_static(answer.noise["static"])
+    for picture in getattr(answer, "maps", []):
+        _print_map(picture)
+    if answer.suspects:
+        rows = table("suspects", "effect", "origin", "log BF", "after", "held-out", "alike", numbers=4)
+        for suspect in answer.suspects:
+            others = [e for e in suspect["alias_group"] if e != suspect["effect"]]
+            rows.add_row(
+                suspect["effect"], suspect["origin"], format_number(suspect["log_bayes_factor"], 3),
+                format_number(suspect["rms_after_dps"]), format_number(suspect["heldout_rms_after_dps"]),
+                ", ".join(others[:3]),
+            )  # fmt: skip
+        console.print(rows)
+    for experiment in answer.experiments:
+        console.print(
+            f"to tell {', '.join(experiment['separates'])} apart: {experiment['do']} "
+            f"({experiment['hours']:.0f} h, {100 * experiment['power']:.0f} % sure to)",
+            markup=False,
+        )
+    for why in _not_testable(answer):
+        console.print(why, style="dim", markup=False, soft_wrap=whole)
+    if answer.named:
+        fitted = {each["effect"] for each in answer.suspects if each["rms_after_dps"] is not None}
+        first = next((name for name in answer.named if name in fitted), answer.named[0])
+        console.print(f"next: labctl improve {answer.serial} --add {first}", style="dim", markup=False)
+
+
+def _not_testable(answer: CriticismResponse) -> list[str]:
+    """Return what a recording says nothing of: what its schedule hides, and what is for want of a channel."""
+    hidden = [line["effect"] for line in answer.not_testable if line["why"] != "channel"]
+    lacking: dict[str, list[str]] = {}
+    for line in answer.not_testable:
+        if line["why"] == "channel":
+            lacking.setdefault(", ".join(line["needs"]), []).append(line["effect"])
+    said = [f"this schedule cannot say anything about: {', '.join(hidden)}"] if hidden else []
+    return said + [f"not recorded: {channel}, which would show {', '.join(each)}" for channel, each in lacking.items()]
+
+
+def _print_static(static: dict[str, Any]) -> None:
+    """Print what the longest stretch at rest shows."""
+    for axis, noise in static["axes"].items():
+        shown = [(letter, noise[letter]) for letter in ("N", "B", "K") if noise[letter]["value"] is not None]
+        said = ", ".join(
+            f"{letter} {format_number(f['value'], 3)} +- {format_number(f['u'], 2)} {f['unit']}" for letter, f in shown
+        )
+        instead = "; B stands for the data sheet" if noise["replaces_datasheet"] else ""
+        text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {said or 'no slope shows'}{instead}"
+        console.print(text, style="dim", markup=False)
+
+
+def _print_map(picture: dict[str, Any], columns: int = 21) -> None:
+    """Draw residual over floor, rates across and temperatures down."""
+    rates = sorted({round(rate, 2) for rate in picture["table_rate_dps"]})
+    warm = sorted({round(value) for value in picture["temperature_c"]}, reverse=True)
+    if len(rates) < 2 or len(warm) < 2 or len(warm) > 40:
+        return
+    cells: dict[tuple[int, int], list[float]] = {}
+    step = max(-(-len(rates) // columns), 1)
+    for rate, value, score in zip(
+        picture["table_rate_dps"], picture["temperature_c"], picture["over_floor"], strict=True
+    ):
+        cells.setdefault((rates.index(round(rate, 2)) // step, warm.index(round(value))), []).append(abs(score))
+    console.print(
+        f"residual over floor, axis {picture['axis']}, {picture['position']} up  (' ' < 1, █ >= 5)", style="dim"
+    )
+    for row, value in enumerate(warm):
+        line = ""
+        for column in range(-(-len(rates) // step)):
+            scores = cells.get((column, row))
+            line += "  " if scores is None else 2 * SHADES[min(int(max(scores)), len(SHADES) - 1)]
+        console.print(f"{value:5d} deg C |{line}|", markup=False, highlight=False)
+    console.print(f"            {rates[0]:g} to {rates[-1]:g} deg/s", style="dim", markup=False)
+
+
+def print_improvement(answer: FitResponse) -> None:
+    """Print what a change brought."""
+    extra: dict[str, Any] = answer.model_extra or {}
+    before = extra["before"]
+    console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {extra['parent']}: {answer.model.name}")
+    rows = table("", "deg/s", "before", "after", numbers=2)
+    rows.add_row("RMS", format_number(before["rms_dps"]), format_number(answer.error.rms_dps))
+    rows.add_row("held-out", format_number(before["heldout_rms_dps"]), format_number(answer.error.heldout_rms_dps))
+    rows.add_row("noise floor", format_number(before["noise_floor_dps"]), format_number(answer.error.noise_floor_dps))
+    console.print(rows)
+    for effect_id, span in extra["plausible"].items():
+        if not span["inside"]:
+            console.print(
+                f"  {effect_id}: larger than is usual ({span['from']:g} to {span['to']:g}); look again at its rivals",
+                style="yellow",
+            )
+    for left in extra["left_out"]:
+        console.print(f"  {left['effect']} stays on the bench ({left['origin']}); a calibration file leaves it out")
+    console.print(f"next: labctl criticise {answer.serial}", style="dim")
+
+
+def print_ladder(answer: LadderResponse) -> None:
+    """Draw the fall."""
+    for line in ladder_lines(answer):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:
+    """Return the fall on a logarithmic scale, a line per version, the floor as a line down."""
+    known = [e for s in answer.steps for e in (s.rms_dps, s.heldout_rms_dps) if e]
+    if not known:
+        return [f"{answer.serial}: no version has an error figure"]
+    lowest = 0.7 * min([*known, answer.noise_floor_dps or known[0]])
+    span = max(log10(max(known) / lowest), 1e-9)
+
+    def place(value: float) -> int:
+        return max(round(log10(value / lowest) / span * width), 1)
+
+    scale = "error, deg/s, logarithmic (bar: fitted data; o: held-out; |: noise floor)"
+    lines = [f"{answer.serial}, versions of recording {answer.recording}: {scale}"]
+    for step in answer.steps:
+        bar = list(("█" * place(step.rms_dps) if step.rms_dps else "").ljust(width + 2))
+        if step.heldout_rms_dps:
+            bar[place(step.heldout_rms_dps)] = "o"
+        if answer.noise_floor_dps:
+            bar[place(answer.noise_floor_dps)] = "|"
+        figures = f"{format_number(step.rms_dps)}  held-out {format_number(step.heldout_rms_dps)}"
+        lines.append(f"{step.version:3d} {''.join(bar)} {figures}  {step.model}")
+    if answer.noise_floor_dps:
+        lines.append(f"    noise floor {format_number(answer.noise_floor_dps)} deg/s")
+    for other in answer.others:
+        error = (
+            "cannot be applied" if other.applied_rms_dps is None else f"{format_number(other.applied_rms_dps)} deg/s"
+        )
+        lines.append(f"    version {other.version} of recording {other.recording}, applied here as it is: {error}")
+    return lines

@@ -1,0 +1,40 @@
+"""Campaigns that no process runs: aborting them, and refusing what only a running one can do."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from labctl.errors import Conflict
+from labctl.services.campaigns.status import ENDED, campaign_status, outlives_its_process
+from labctl.services.schemas.campaigns import CampaignResponse
+from labctl.store import Store
+
+#: States in which the bench may move or be hot; an interrupted campaign had its safe state.
+UNDER_WAY = frozenset({"running", "paused", "waiting"})
+
+
+def record_action(store: Store, at: datetime, action: str, campaign: int, reason: str) -> None:
+    """Write into the audit trail what a person did to a campaign."""
+    store.audit.record(at, f"campaign {action}", f"campaign {campaign}", {"reason": reason})
+
+
+def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> CampaignResponse:
+    """Close a campaign that no process runs any more. Raises NotFound, and Conflict for one that has ended."""
+    answer = campaign_status(store, campaign)
+    if answer.state in ENDED:
+        raise Conflict(f"campaign {campaign} is over already: {answer.state}")
+    record_action(store, at, "abort", campaign, reason)
+    row = store.campaigns.get(campaign)
+    said = f"left unfinished; {reason}"
+    if row.state in UNDER_WAY and outlives_its_process(row):
+        text = f"the process that ran campaign {campaign} ended before it could make the bench safe"
+        store.benches.mark(row.bench_name, text, at)
+        said += f". Nobody has made bench {row.bench_name} safe: look at it, then `labctl bench clear`"
+    store.campaigns.close_unfinished(campaign, said, at, "aborted")
+    return campaign_status(store, campaign)
+
+
+def not_running(store: Store, campaign: int, action: str) -> Conflict:
+    """Return the refusal of an action that only a running campaign can take. Raises NotFound."""
+    state = store.campaigns.get(campaign).state
+    return Conflict(f"campaign {campaign} is {state} and no process runs it; there is nobody to {action}")

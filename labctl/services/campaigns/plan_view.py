@@ -1,0 +1,73 @@
+"""The plan of a campaign as it was written down, and what became of each step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import tomli_w
+from pydantic import ValidationError
+
+from labctl.services.planning.loading import (
+    recipe_document,
+)
+from labctl.services.planning.timeline import timeline_columns
+from labctl.services.schemas.plans import (
+    CampaignPlanResponse,
+    RunColumns,
+    StepState,
+)
+from labctl.store import StepRow, Store
+from procedures.recipe.recipe import Recipe
+
+
+def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
+    """Return a campaign's steps as they were written down, with what became of each. Raises NotFound."""
+    row = store.campaigns.get(campaign)
+    steps = store.campaigns.steps(campaign)
+    columns = timeline_columns([step.body for step in steps])
+    timeline = RunColumns(
+        **columns,
+        state=[_state(step.state) for step in steps],
+        started_s=[step.started_s for step in steps],
+        ended_s=[step.ended_s for step in steps],
+        forecast_s=_forecast(steps),
+    )
+    return CampaignPlanResponse(
+        campaign=campaign, recipe=row.recipe_name, text=_text(row.recipe), bench=row.bench_name, state=row.state,
+        schedule_hash=row.schedule_hash, steps=len(steps),
+        datasets=sum(number is not None for number in columns["dataset"]), expected_s=row.expected_s,
+        timeline=timeline,
+    )  # fmt: skip
+
+
+def _text(recipe: Mapping[str, Any]) -> str:
+    """Return a recipe as text; nothing where it was written by a labctl whose recipes had other keys."""
+    try:
+        return tomli_w.dumps(recipe_document(Recipe.model_validate(dict(recipe))))
+    except ValidationError:
+        return ""
+
+
+def _state(word: str) -> StepState:
+    match word:
+        case "planned":
+            return "to come"
+        case "running" | "done" | "failed" | "skipped":
+            return word
+        case _:
+            return "interrupted"
+
+
+def _forecast(steps: Sequence[StepRow]) -> list[float]:
+    """Return when each step began or will begin, campaign time in s."""
+    found: list[float] = []
+    free_s = 0.0
+    for step in steps:
+        begun = step.started_s if step.started_s is not None and step.state != "planned" else free_s
+        found.append(begun)
+        if step.state == "skipped":
+            continue
+        over = step.ended_s is not None and step.state in {"done", "failed"}
+        free_s = step.ended_s if over and step.ended_s is not None else begun + step.expected_s
+    return found

@@ -1,0 +1,136 @@
+"""Preparing a campaign: open the bench, plan, and write the campaign down before anything moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from instruments.bench import Bench, open_bench
+from instruments.bench_config import BenchFile, SimulationSettings
+from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
+from instruments.drivers.unit_handlers import ManualUnitHandler
+from instruments.errors import InstrumentError
+from instruments.interfaces.gyro import Gyro
+from labctl.errors import BadInput, Conflict
+from labctl.recording import OutputUnit, RecordingInfo
+from labctl.services.benches.host import boot_id
+from labctl.services.planning.loading import load_recipe
+from labctl.store import NewCampaign, NewUnit, Store
+from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator
+from procedures.execution.resume import Restart
+from procedures.execution.safe_state import stop_table
+from procedures.monitoring.campaign_time import CampaignTime
+from procedures.planning.limits import BenchLimits
+from procedures.planning.plan import Plan, make_plan
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A campaign that is written down and may begin."""
+
+    id: int
+    plan: Plan
+    bench: Bench
+    clock: Clock
+    operator: Operator
+    start_at: int = 0
+    restart: Restart | None = None  #: what is known of the interruption that it is taken up after
+    time: CampaignTime | None = None  #: of a resumed campaign; absent: time 0 is when it begins
+
+
+def operator_of(bench: Bench) -> Operator:
+    """Return who turns and switches the units of a bench."""
+    return (
+        HumanOperator()
+        if isinstance(bench.unit_handler, ManualUnitHandler)
+        else UnitHandlerOperator(bench.unit_handler)
+    )
+
+
+def refuse_unconfirmed(store: Store, bench: str) -> None:
+    """Raise Conflict while nobody has looked at a bench whose safe state was not confirmed."""
+    if text := store.benches.unconfirmed(bench):
+        raise Conflict(
+            f"bench {bench} was not confirmed safe: {text}. Look at it, then `labctl bench clear {bench} --by NAME`"
+        )
+
+
+def seeded(bench: BenchFile, seed: int | None) -> BenchFile:
+    """Return the bench with another seed of its simulation."""
+    if seed is None:
+        return bench
+    simulation = (bench.simulation or SimulationSettings()).model_copy(update={"seed": seed})
+    return bench.model_copy(update={"simulation": simulation})
+
+
+def clock_for(bench: BenchFile, speed: float | None) -> Clock:
+    """Return the wall's clock for real instruments; for simulated ones a scaled or a virtual clock.
+
+    Simulators in another process set the pace themselves. Raises BadInput for a speed on a bench that has its own.
+    """
+    if not bench.is_simulated:
+        if speed is not None:
+            raise BadInput(f"--speed {speed:g}: bench {bench.name} keeps its own time; leave the option out")
+        simulation = bench.simulation
+        return ScaledClock(simulation.speed) if simulation is not None and simulation.control else SystemClock()
+    return VirtualClock() if speed is None else ScaledClock(speed)
+
+
+def prepare(
+    store: Store, recipe_source: str, bench_file: BenchFile, clock: Clock, *, clip: bool, opened: Bench | None = None
+) -> Prepared:
+    """Open the bench, plan, and write the whole campaign down; the table is at rest when this returns.
+
+    `opened` is the bench where it is open already.
+
+    Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe.
+    """
+    recipe = load_recipe(recipe_source)
+    refuse_unconfirmed(store, bench_file.name)
+    bench = opened or open_bench(bench_file, clock)
+    try:
+        bench.table.identify()
+        bench.chamber.identify()
+        if bench.table.is_moving():  # whoever drove it before was killed: a move goes on without him
+            _rest(bench, clock)
+        plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
+        units = tuple(_unit(gyro, bench_file, clock) for gyro in bench.gyros.values())
+        new = NewCampaign(
+            recipe_name=recipe.name,
+            recipe=plan.recipe.model_dump(mode="json"),
+            bench_name=bench_file.name,
+            bench=bench_file.model_dump(mode="json"),
+            schedule_hash=plan.schedule_hash,
+            expected_s=plan.expected_s,
+            steps=[step.model_dump(mode="json") for step in plan.steps],
+            units=units,
+            boot_id=boot_id(),
+        )
+        return Prepared(store.campaigns.create(new, clock.utc()), plan, bench, clock, operator_of(bench))
+    except BaseException:
+        bench.close()
+        raise
+
+
+def _rest(bench: Bench, clock: Clock) -> None:
+    if complaint := stop_table(bench.table, clock):
+        raise InstrumentError(bench.table.name, complaint)
+
+
+def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
+    identity = gyro.identify()
+    latitude = bench.latitude_deg
+    info = RecordingInfo(
+        serial=identity.serial,
+        model=identity.model,
+        axes=gyro.axes,
+        kind="samples",
+        started_at=clock.utc(),
+        latitude_deg=latitude,
+        sample_rate_hz=gyro.sample_rate_hz,
+        max_rate_dps=gyro.limits.max_rate_dps,
+        technology=identity.technology or None,
+        datasheet=dict(identity.datasheet),
+        output={axis: OutputUnit.model_validate(dict(unit)) for axis, unit in identity.output.items()},
+    )
+    channels = tuple({"name": c.name, "unit": c.unit, "scale": c.scale, "offset": c.offset} for c in gyro.channels)
+    return NewUnit(gyro.name, info.model_dump(mode="json"), channels)

@@ -1,0 +1,130 @@
+"""Recovery of campaigns that a process left unfinished on a bench: resumed by the service, or closed with a reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+
+from instruments.bench import open_bench
+from instruments.bench_config import BenchFile
+from instruments.clock import Clock
+from instruments.errors import InstrumentError
+from labctl.errors import BenchBusy, LabctlError
+from labctl.services.campaigns.status import ENDED, from_rows, how_far
+from labctl.store import ResumePoint, Store
+from procedures.execution.safe_state import make_safe
+
+#: A campaign that was taken up so often without finishing a step needs a person.
+MAX_RESUMES = 5
+
+
+def retries_exhausted(standing: ResumePoint) -> str | None:
+    """Return why a campaign is not taken up by itself any more, or None."""
+    if standing.tries < MAX_RESUMES:
+        return None
+    return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
+
+
+def describe_recovery(store: Store, bench: str) -> str:
+    """Say which campaign a service finds left on its bench when it starts, and what becomes of it; empty for none."""
+    row = next((row for row in store.campaigns.unfinished() if row.bench_name == bench), None)
+    if row is None:
+        return ""
+    text = how_far(from_rows(store, row))
+    if store.benches.unconfirmed(bench):
+        return f"{text} and is not taken up: bench {bench} was not confirmed safe"
+    if why_not := retries_exhausted(store.resume_points.of_campaign(row.id)):
+        return f"{text} and is not taken up: {why_not}"
+    return f"{text} and is taken up now, safe state first"
+
+
+def secure_bench(store: Store, bench_file: BenchFile, clock: Clock) -> None:
+    """Make a bench safe whose campaign is not taken up; what cannot be confirmed stays on its status."""
+    if bench_file.is_simulated:  # it ended with its process
+        return
+    complaints: tuple[str, ...] = ()
+    try:
+        with closing(open_bench(bench_file, clock)) as bench:
+            complaints = make_safe(bench, clock)
+    except (InstrumentError, OSError) as error:
+        complaints = (*complaints, str(error))
+    if complaints:
+        store.benches.mark(bench_file.name, "; ".join(complaints), clock.utc())
+
+
+@dataclass(frozen=True)
+class _UnwrittenEnd:
+    """A campaign that ended while the database could not be written: its rows do not show the end yet."""
+
+    campaign: int
+    why: str
+
+
+class CampaignRecovery:
+    """The unfinished campaigns of one bench."""
+
+    def __init__(self, store: Store, bench: BenchFile, make_clock: Callable[[], Clock]) -> None:
+        self._store, self._bench, self._make_clock = store, bench, make_clock
+        self._unfinished = False
+        self._unwritten: _UnwrittenEnd | None = None
+
+    @property
+    def pending(self) -> bool:
+        """Whether a campaign waits to be resumed, or its end to be written."""
+        return self._unfinished or self._unwritten is not None
+
+    @property
+    def has_unfinished(self) -> bool:
+        """Whether a campaign waits to be resumed."""
+        return self._unfinished
+
+    def expect_resume(self) -> None:
+        """Note that a campaign was interrupted and is to be resumed."""
+        self._unfinished = True
+
+    def expect_end(self, campaign: int, why: str) -> None:
+        """Note that the end of a campaign could not be written."""
+        self._unwritten = _UnwrittenEnd(campaign, why)
+
+    def record_end(self) -> None:
+        """Write the end of a campaign that could not be written when it came. Raises StoreError."""
+        if (unwritten := self._unwritten) is None:
+            return
+        at = self._make_clock().utc()
+        text = (
+            f"campaign {unwritten.campaign} ended while nothing could be written; whether the bench is safe is not "
+            "known"
+        )
+        self._store.benches.mark(self._bench.name, text, at)
+        if self._store.campaigns.get(unwritten.campaign).state not in ENDED:
+            self._store.campaigns.close_unfinished(unwritten.campaign, unwritten.why, at)
+        self._unwritten = None
+
+    def resume_newest(self, resume: Callable[[int], object], secure: Callable[[], None]) -> None:
+        """Resume the newest unfinished campaign; every other one, and one that cannot be resumed, is closed.
+
+        `resume` starts a campaign by its number; `secure` makes the bench safe where that fails, because the last
+        process may have left it as it was.
+        """
+        resumed = None
+        for row in self._store.campaigns.unfinished():  # newest first
+            if row.bench_name != self._bench.name:
+                continue
+            if resumed is not None:
+                text = f"not taken up: campaign {resumed} goes on here; then `labctl campaign resume {row.id}`"
+                self._store.campaigns.close_unfinished(row.id, text, self._make_clock().utc())
+                continue
+            why_not = retries_exhausted(self._store.resume_points.of_campaign(row.id))
+            try:
+                if why_not is None:
+                    resume(row.id)
+                    resumed = row.id
+                    continue
+            except BenchBusy:  # another process was quicker, or the lease was lost just now
+                return
+            except (LabctlError, InstrumentError) as error:
+                why_not = f"not taken up: {error}"
+            secure()
+            self._store.campaigns.close_unfinished(row.id, why_not, self._make_clock().utc())
+        self._unfinished = False

@@ -1,0 +1,82 @@
+"""Control over campaigns in a process without a service: a campaign runs in its foreground until it is over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+
+from labctl.errors import BadInput
+from labctl.services.campaigns.abandoned import abort_abandoned, not_running
+from labctl.services.campaigns.execution import Attend, Observe, run_here
+from labctl.services.campaigns.resume import resume_here
+from labctl.services.commands.context import CommandContext
+from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.planning.loading import bench_for, load_bench, load_recipe
+from labctl.services.schedule import queue
+from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest, StartRequest
+from labctl.services.schemas.schedule import ScheduledResponse
+
+
+@dataclass(frozen=True)
+class CampaignTerminal:
+    """What a campaign in the foreground shows and asks: its progress, its prompts, and remarks beside them."""
+
+    observe: Observe | None = None
+    attend: Attend | None = None
+    say: Callable[[str], None] | None = None
+
+
+#: Opens the terminal for the time of one campaign.
+OpenTerminal = Callable[[], AbstractContextManager[CampaignTerminal]]
+
+
+@contextmanager
+def no_terminal() -> Iterator[CampaignTerminal]:
+    """Run a campaign without a terminal."""
+    yield CampaignTerminal()
+
+
+class ForegroundControl:
+    """Campaigns run here and now, in stores that they open themselves; no other process runs any."""
+
+    def __init__(self, database: str, open_terminal: OpenTerminal = no_terminal) -> None:
+        self._database = database
+        self._open_terminal = open_terminal
+
+    def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
+        """Run a campaign in this process until it is over."""
+        request = StartRequest(
+            recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, speed=asked.speed, seed=asked.seed
+        )
+        with self._open_terminal() as terminal:
+            return run_here(self._database, request, terminal.observe, terminal.attend, terminal.say)
+
+    def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+        """Enter a campaign into the schedule of a bench; a service that holds this bench and database starts it."""
+        for option, value in (("--speed", asked.speed), ("--seed", asked.seed)):
+            if value is not None:
+                raise BadInput(f"{option} {value}: the service that runs it then sets its own; leave the option out")
+        bench = load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
+        answer = queue.add_start(context.store, asked.body, bench, context.now())
+        note = "; ".join(filter(None, (queue.NOBODY.format(bench=bench.name), answer.note)))
+        return answer.model_copy(update={"note": note})
+
+    def resume(self, _: CommandContext, asked: CampaignResume) -> CampaignResponse:
+        """Resume a campaign in this process and run it until it is over."""
+        with self._open_terminal() as terminal:
+            return resume_here(
+                self._database, asked.campaign, asked.bench, asked.speed, asked.body, terminal.observe, terminal.attend
+            )
+
+    def pause(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+        """Raise Conflict: a campaign that this process could pause would hold the database."""
+        raise not_running(context.store, asked.campaign, f"pause it ({asked.body.reason})")
+
+    def abort(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+        """Close a campaign that no process runs any more; one that runs would hold the database."""
+        return abort_abandoned(context.store, asked.campaign, asked.body.text, context.now())
+
+    def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
+        """Raise Conflict: no campaign asks anything here."""
+        raise not_running(context.store, asked.campaign, f"answer question {asked.body.prompt}")

@@ -1,0 +1,189 @@
+"""Every command that changes the database."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from labctl.services.admin import api_keys
+from labctl.services.calibrations import certification, fitting, revision
+from labctl.services.campaigns.bench_status import bench_status
+from labctl.services.commands.command import Command, Newest, NoContent
+from labctl.services.commands.context import CommandContext
+from labctl.services.commands.encoding import recording_files
+from labctl.services.commands.requests import (
+    CampaignResume,
+    CampaignStart,
+    RecordingFolder,
+    ToBench,
+    ToCampaign,
+    ToKey,
+    ToNewestOrVersion,
+    ToStart,
+    ToUnit,
+    ToVersion,
+)
+from labctl.services.recordings import examples, transfer
+from labctl.services.schedule import queue
+from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
+from labctl.services.schemas.benches import BenchStatus, ClearRequest
+from labctl.services.schemas.calibrations import (
+    CertificationResponse,
+    CertifyRequest,
+    FitRequest,
+    FitResponse,
+    ImproveRequest,
+)
+from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.services.schemas.recordings import (
+    ExampleRequest,
+    ImportResponse,
+    SimulatedRecordingResponse,
+    SimulatedRequest,
+)
+from labctl.services.schemas.schedule import ScheduledResponse
+
+
+def _import_recording(context: CommandContext, asked: RecordingFolder) -> ImportResponse:
+    return transfer.import_folder(context.store, asked.folder, context.now())
+
+
+def _import_example(context: CommandContext, asked: ExampleRequest) -> ImportResponse:
+    return transfer.import_folder(context.store, examples.example(asked.name), context.now())
+
+
+def _simulate_recording(context: CommandContext, asked: SimulatedRequest) -> SimulatedRecordingResponse:
+    return examples.add_simulated(context.store, asked, context.now())
+
+
+def _fit(context: CommandContext, asked: ToUnit[FitRequest]) -> FitResponse:
+    return fitting.fit_unit(context.store, asked.serial, asked.body, context.now())
+
+
+def _improve(context: CommandContext, asked: ToNewestOrVersion[ImproveRequest]) -> FitResponse:
+    change = asked.body.model_copy(update={"version": asked.version})
+    return revision.improve_unit(context.store, asked.serial, change, context.now())
+
+
+def _certify(context: CommandContext, asked: ToVersion[CertifyRequest]) -> CertificationResponse:
+    return _set_in_force(context, asked, "certify")
+
+
+def _revoke(context: CommandContext, asked: ToVersion[CertifyRequest]) -> CertificationResponse:
+    return _set_in_force(context, asked, "revoke")
+
+
+def _set_in_force(
+    context: CommandContext, asked: ToVersion[CertifyRequest], act: Literal["certify", "revoke"]
+) -> CertificationResponse:
+    return certification.certify(context.store, asked.serial, asked.version, act, asked.body, context.now())
+
+
+def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:
+    """Start a campaign now, or enter it into the schedule: the only place where that is decided."""
+    if queue.is_scheduled(asked.body):
+        return context.control.schedule(context, asked)
+    return context.control.start(context, asked)
+
+
+def _resume_campaign(context: CommandContext, asked: CampaignResume) -> CampaignResponse:
+    return context.control.resume(context, asked)
+
+
+def _pause_campaign(context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+    return context.control.pause(context, asked)
+
+
+def _abort_campaign(context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+    return context.control.abort(context, asked)
+
+
+def _confirm_prompt(context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
+    return context.control.confirm(context, asked)
+
+
+def _cancel_start(context: CommandContext, asked: ToStart) -> ScheduledResponse:
+    return queue.cancel_start(context.store, asked.start, context.now())
+
+
+def _clear_bench(context: CommandContext, asked: ToBench[ClearRequest]) -> BenchStatus:
+    by, reason = asked.body.by, asked.body.reason
+    return bench_status(context.store.benches.clear(asked.bench, by, reason, context.now()))
+
+
+def _create_key(context: CommandContext, asked: KeyRequest) -> NewKeyResponse:
+    return api_keys.create_key(context.store, asked, context.now())
+
+
+def _revoke_key(context: CommandContext, asked: ToKey[ReasonRequest]) -> KeyResponse:
+    return api_keys.revoke_key(context.store, asked.name, asked.body.reason, context.now())
+
+
+def _note_backup(context: CommandContext, asked: BackupNote) -> NoContent:
+    detail = {"bytes": asked.bytes, "sha256": asked.sha256}
+    context.store.audit.record(context.now(), "backup", asked.file, detail)
+    return NoContent()
+
+
+_UNIT = "/api/units/{serial}/calibrations"
+_CAMPAIGN = "/api/campaigns/{campaign}"
+
+IMPORT_RECORDING = Command(
+    method="POST",
+    path="/api/recordings",
+    handler=_import_recording,
+    responses={201: ImportResponse},
+    encode=recording_files,
+)
+IMPORT_EXAMPLE = Command(
+    method="POST", path="/api/recordings/example", handler=_import_example, responses={201: ImportResponse}
+)
+SIMULATE_RECORDING = Command(
+    method="POST",
+    path="/api/recordings/simulated",
+    handler=_simulate_recording,
+    responses={201: SimulatedRecordingResponse},
+)
+FIT = Command(method="POST", path=_UNIT, handler=_fit, responses={201: FitResponse})
+IMPROVE = Command(
+    method="POST",
+    path=_UNIT + "/{version}/improve",
+    handler=_improve,
+    responses={201: FitResponse},
+    newest=Newest("version", _UNIT, "version", otherwise=1),
+)
+CERTIFY = Command(
+    method="POST", path=_UNIT + "/{version}/certify", handler=_certify, responses={200: CertificationResponse}
+)
+REVOKE = Command(
+    method="POST", path=_UNIT + "/{version}/revoke", handler=_revoke, responses={200: CertificationResponse}
+)
+START_CAMPAIGN: Command[CampaignStart, CampaignResponse | ScheduledResponse] = Command(
+    method="POST",
+    path="/api/campaigns",
+    handler=_start_campaign,
+    responses={201: CampaignResponse, 202: ScheduledResponse},
+)
+RESUME_CAMPAIGN = Command(
+    method="POST", path=_CAMPAIGN + "/resume", handler=_resume_campaign, responses={200: CampaignResponse}
+)
+PAUSE_CAMPAIGN = Command(
+    method="POST", path=_CAMPAIGN + "/pause", handler=_pause_campaign, responses={200: CampaignResponse}
+)
+ABORT_CAMPAIGN = Command(
+    method="POST", path=_CAMPAIGN + "/abort", handler=_abort_campaign, responses={200: CampaignResponse}
+)
+CONFIRM_PROMPT = Command(
+    method="POST", path=_CAMPAIGN + "/confirm", handler=_confirm_prompt, responses={200: CampaignResponse}
+)
+CANCEL_START = Command(
+    method="DELETE", path="/api/schedule/{start}", handler=_cancel_start, responses={200: ScheduledResponse}
+)
+CLEAR_BENCH = Command(
+    method="POST", path="/api/benches/{bench}/clear", handler=_clear_bench, responses={200: BenchStatus}
+)
+CREATE_KEY = Command(method="POST", path="/api/keys", handler=_create_key, responses={201: NewKeyResponse})
+REVOKE_KEY = Command(method="POST", path="/api/keys/{name}/revoke", handler=_revoke_key, responses={200: KeyResponse})
+NOTE_BACKUP = Command(method="POST", path="/api/backups", handler=_note_backup, responses={204: NoContent})
+
+#: All of them, in the order above.
+COMMANDS: tuple[Command[Any, Any], ...] = tuple(each for each in list(vars().values()) if isinstance(each, Command))

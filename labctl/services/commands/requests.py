@@ -1,0 +1,110 @@
+"""Requests with an address: which unit, version, campaign, bench, key or start a command is for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import ClassVar, Generic, TypeVar
+
+from labctl.services.schemas.base import Request
+from labctl.services.schemas.campaigns import CampaignRequest, ResumeRequest
+
+BodyT_co = TypeVar("BodyT_co", bound=Request, covariant=True)
+
+
+@dataclass(frozen=True)
+class Addressed:
+    """A request whose fields fill in the path of its command; the field `body`, if there is one, is sent as JSON."""
+
+    #: Fields that only a process which runs the campaign itself can follow; over HTTP a value there is refused.
+    local_only: ClassVar[tuple[str, ...]] = ()
+
+    def address(self) -> dict[str, object]:
+        """Return all fields but the body, by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "body"}
+
+
+@dataclass(frozen=True)
+class ToUnit(Addressed, Generic[BodyT_co]):
+    """A request for a unit."""
+
+    serial: str
+    body: BodyT_co
+
+
+@dataclass(frozen=True)
+class ToVersion(Addressed, Generic[BodyT_co]):
+    """A request for a calibration version of a unit."""
+
+    serial: str
+    version: int
+    body: BodyT_co
+
+
+@dataclass(frozen=True)
+class ToNewestOrVersion(Addressed, Generic[BodyT_co]):
+    """A request for a calibration version of a unit; None: the newest."""
+
+    serial: str
+    version: int | None
+    body: BodyT_co
+
+
+@dataclass(frozen=True)
+class ToCampaign(Addressed, Generic[BodyT_co]):
+    """A request for a campaign."""
+
+    campaign: int
+    body: BodyT_co
+
+
+@dataclass(frozen=True)
+class ToBench(Addressed, Generic[BodyT_co]):
+    """A request for a bench."""
+
+    bench: str
+    body: BodyT_co
+
+
+@dataclass(frozen=True)
+class ToKey(Addressed, Generic[BodyT_co]):
+    """A request for an API key."""
+
+    name: str
+    body: BodyT_co
+
+
+@dataclass(frozen=True)
+class ToStart(Addressed):
+    """A request for an entry of the schedule."""
+
+    start: int
+
+
+@dataclass(frozen=True)
+class CampaignStart(Addressed):
+    """A campaign to start, now or later, with options of the process that would run it in its foreground."""
+
+    local_only: ClassVar[tuple[str, ...]] = ("bench", "speed", "seed")
+
+    body: CampaignRequest
+    bench: str | None = None
+    speed: float | None = None
+    seed: int | None = None
+
+
+@dataclass(frozen=True)
+class CampaignResume(Addressed):
+    """A campaign to resume; in the foreground without a number the newest unfinished one."""
+
+    campaign: int | None
+    body: ResumeRequest
+    bench: str | None = None
+    speed: float | None = None
+
+
+@dataclass(frozen=True)
+class RecordingFolder:
+    """A folder that holds a recording in the interchange format."""
+
+    folder: Path

@@ -1,0 +1,79 @@
+"""Control over campaigns in a service: its bench runner's, where the service has a bench."""
+
+from __future__ import annotations
+
+from labctl.errors import Conflict
+from labctl.services.campaigns.abandoned import abort_abandoned, not_running, record_action
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.commands.context import CommandContext
+from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.schedule import queue
+from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.services.schemas.schedule import ScheduledResponse
+
+NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`"
+
+
+class ServiceControl:
+    """Campaigns run in a thread of the bench runner; those that do not run there are only rows."""
+
+    def __init__(self, runner: BenchRunner | None) -> None:
+        self._runner = runner
+
+    def _bench_runner(self) -> BenchRunner:
+        """Return the runner of this service's bench. Raises Conflict when it has none."""
+        if self._runner is None:
+            raise Conflict(NO_BENCH)
+        return self._runner
+
+    def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
+        """Start a campaign on this service's bench. Raises Conflict without one, BenchBusy while another runs."""
+        return self._bench_runner().start(asked.body)
+
+    def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+        """Enter a campaign into the schedule of this service's bench."""
+        return queue.add_start(context.store, asked.body, self._bench_runner().bench, context.now())
+
+    def resume(self, context: CommandContext, asked: CampaignResume) -> CampaignResponse:
+        """Continue a paused campaign, or resume an interrupted one on this service's bench."""
+        runner, body = self._bench_runner(), asked.body
+        if asked.campaign is None:
+            raise Conflict("a service resumes a campaign by its number; name it")
+        paused = runner.runs(asked.campaign)  # a resume after an interruption is recorded together with its rows
+        answer = runner.resume(asked.campaign, body)
+        if paused:
+            self._record(context, "resume", asked.campaign, f"{body.reason or 'goes on'} ({body.by})")
+        return answer
+
+    def pause(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+        """Ask a running campaign to hold after the present data set."""
+        if self._runner is None:
+            raise not_running(context.store, asked.campaign, f"pause it ({asked.body.reason})")
+        answer = self._runner.pause(asked.campaign, asked.body)
+        self._record(context, "pause", asked.campaign, asked.body.text)
+        return answer
+
+    def abort(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+        """End a campaign now, in the safe state; one that does not run here is only closed."""
+        reason = asked.body.text
+        if self._runner is None or not self._runner.runs(asked.campaign):
+            return abort_abandoned(context.store, asked.campaign, reason, context.now())
+        try:
+            self._record(context, "abort", asked.campaign, reason)
+        finally:  # a full disk is no reason to go on
+            answer = self._runner.abort(asked.campaign, reason)
+        return answer
+
+    def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
+        """Answer the question that a campaign waits for."""
+        body = asked.body
+        if self._runner is None:
+            raise not_running(context.store, asked.campaign, f"answer question {body.prompt}")
+        answer = self._runner.confirm(asked.campaign, body)
+        said = f"{body.prompt}: {'done' if body.confirmed else 'cannot be done'}; {body.by}; {body.reason}"
+        self._record(context, "confirm", asked.campaign, said)
+        return answer
+
+    @staticmethod
+    def _record(context: CommandContext, action: str, campaign: int, reason: str) -> None:
+        record_action(context.store, context.now(), action, campaign, reason)

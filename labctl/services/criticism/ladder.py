@@ -1,0 +1,84 @@
+"""Error ladder: the versions of a unit on one recording, each after its parent, down to the noise floor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from labctl.errors import BadInput, LabctlError
+from labctl.services.criticism.versions import version_of
+from labctl.services.schemas.calibrations import LadderResponse, LadderRow
+from labctl.store import CalibrationRecord, RecordingRow, Store
+
+ERRORS = ("raw_rms_dps", "rms_dps", "heldout_rms_dps", "noise_floor_dps")
+
+
+def ladder(store: Store, serial: str, recording: int | None = None) -> LadderResponse:
+    """Return the versions fitted to a recording (default: that of the newest version), each after its parent.
+
+    Versions of other recordings stand apart, with their error when they are applied to this recording as they are.
+    Raises NotFound, BadInput where the unit has no version of this recording.
+    """
+    rows = sorted(store.calibrations.of_unit(store.units.get(serial).serial), key=lambda row: row.version)
+    chosen = version_of(store, serial, None).recording if recording is None else recording
+    here = [row for row in rows if row.recording == chosen]
+    if not here:
+        fitted = sorted({row.recording for row in rows if row.recording is not None})
+        raise BadInput(
+            f"no version of {serial} was fitted to recording {recording} (versions are of recordings "
+            f"{', '.join(map(str, fitted)) or 'none'}); `labctl fit {serial} --recording {recording}` makes one"
+        )
+    steps = [_step(row) for row in _by_parentage(here)]
+    floors = [step.noise_floor_dps for step in steps if step.noise_floor_dps is not None]
+    return LadderResponse(
+        serial=serial,
+        recording=chosen,
+        steps=steps,
+        others=_applied_here(store, [row for row in rows if row.recording != chosen], chosen),
+        noise_floor_dps=min(floors) if floors else None,
+    )
+
+
+def _by_parentage(rows: Sequence[CalibrationRecord]) -> Iterator[CalibrationRecord]:
+    """Yield versions depth first: each after its parent, a parent's newer children after its older ones."""
+    numbers = {row.version for row in rows}
+    children: dict[int | None, list[CalibrationRecord]] = {}
+    for row in rows:
+        children.setdefault(row.parent if row.parent in numbers else None, []).append(row)
+
+    def below(parent: int | None) -> Iterator[CalibrationRecord]:
+        for row in children.get(parent, []):
+            yield row
+            yield from below(row.version)
+
+    return below(None)
+
+
+def _step(row: CalibrationRecord, applied_rms_dps: float | None = None) -> LadderRow:
+    return LadderRow(
+        version=row.version,
+        parent=row.parent,
+        recording=row.recording,
+        model=row.model,
+        effects=list(row.answer["model"]["effects"]),
+        applied_rms_dps=applied_rms_dps,
+        **{key: row.answer["error"][key] for key in ERRORS},
+    )
+
+
+def _applied_here(store: Store, others: Sequence[CalibrationRecord], recording: int | None) -> list[LadderRow]:
+    """Return versions of other recordings, each with its error on this one; None where it cannot be applied."""
+    if not others or recording is None:
+        return [_step(row) for row in others]
+    from labctl.services.criticism.measurements import Measurements  # noqa: PLC0415  loads the fit's libraries
+    from labctl.services.criticism.verification import verify  # noqa: PLC0415  as above
+
+    head: RecordingRow = store.recordings.get(recording)
+    measured = Measurements(store, head)
+
+    def applied(row: CalibrationRecord) -> float | None:
+        try:
+            return verify(store, row, measured).rms_dps
+        except LabctlError:
+            return None
+
+    return [_step(row, applied(row)) for row in others]

@@ -1,0 +1,109 @@
+"""Verification: a calibration version applied as it is to a recording; nothing is fitted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.calibration import Calibration, read_calibration
+from labctl.compensator import Compensator
+from labctl.errors import BadInput
+from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.recording import Recording
+from labctl.services.criticism.measurements import Measurements
+from labctl.services.criticism.versions import version_of
+from labctl.services.recordings.loading import newest_row
+from labctl.services.schemas.criticism import AxisVerification, VerificationResponse
+from labctl.store import CalibrationRecord, Store
+
+#: Largest ratio of the error found to the error expected of a version that holds: coverage factor of 95 %.
+LARGEST_RATIO = 2.0
+
+
+def verify_unit(
+    store: Store, serial: str, version: int | None, recording: int | None, *, other_unit: bool = False
+) -> VerificationResponse:
+    """Apply a version (default: the newest) to a recording (default: the unit's newest).
+
+    `other_unit` allows a recording of another unit. Raises NotFound, BadInput, NotEnoughData.
+    """
+    row = version_of(store, serial, version)
+    measured = newest_row(store, serial, recording, other_unit=other_unit)
+    return verify(store, row, Measurements(store, measured))
+
+
+def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> VerificationResponse:
+    """Apply a version to the means of a recording, as its consumer applies it to readings.
+
+    Raises BadInput where the recording lacks an axis or a channel of the model, NotEnoughData.
+    """
+    document, _ = store.calibrations.document(row.serial, row.version)
+    calibration = read_calibration(document)
+    errors, outside = applied_errors(calibration, measured.points)
+    pooled = np.concatenate(list(errors.values()))
+    rms, expected = _rms(pooled), _expected_dps(row)
+    return VerificationResponse(
+        serial=row.serial,
+        version=row.version,
+        recording=measured.row.id,
+        recorded_unit=measured.row.serial,
+        seen=row.recording == measured.row.id,
+        datasets=len(outside),
+        rms_dps=rms,
+        max_dps=float(np.max(np.abs(pooled))),
+        bias_dps=float(np.mean(pooled)),
+        axes={axis: _of_axis(values) for axis, values in errors.items()},
+        outside_validity=int(np.count_nonzero(outside)),
+        expected_dps=expected,
+        ok=expected is not None and rms <= LARGEST_RATIO * expected,
+    )
+
+
+def applied_errors(
+    calibration: Calibration, points: Recording
+) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.bool_]]:
+    """Return axis -> corrected minus true rate of each data set, (m,) deg/s, and which lie outside the validity, (m,).
+
+    Raises BadInput where the recording lacks an axis or a channel of the model, NotEnoughData.
+    """
+    data = fit_data_of(points)
+    missing = [axis for axis in calibration.axes if axis not in data.outputs]
+    if missing:
+        raise BadInput(
+            f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}; the "
+            f"recording has no column gyro_{missing[0]}"
+        )
+    compensator = Compensator(calibration)
+    raw = np.column_stack([data.outputs[axis] for axis in calibration.axes])
+    warm = np.column_stack([data.channels.temperature_c(axis) for axis in calibration.axes])
+    found = compensator.compensate(raw, warm, _channels(compensator, data))
+    errors = {axis: found.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
+    return errors, found.outside
+
+
+def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[np.float64]]:
+    absent = [name for name in compensator.needs if name not in data.channels]
+    if absent:
+        raise BadInput(f"the model needs channel {absent[0]!r}, which the recording does not have")
+    return {name: np.asarray(data.channels[name], dtype=np.float64) for name in compensator.needs}
+
+
+def _expected_dps(row: CalibrationRecord) -> float | None:
+    """Return the error that a version promises for a data set: held-out, else of its own data; None where unknown."""
+    error: Mapping[str, Any] = row.answer["error"]
+    known = [float(error[key]) for key in ("heldout_rms_dps", "rms_dps") if error.get(key) is not None]
+    return max(known, default=None)
+
+
+def _of_axis(values: NDArray[np.float64]) -> AxisVerification:
+    return AxisVerification(
+        rms_dps=_rms(values), max_dps=float(np.max(np.abs(values))), bias_dps=float(np.mean(values))
+    )
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return math.sqrt(float(np.mean(values**2)))

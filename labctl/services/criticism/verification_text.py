@@ -1,0 +1,21 @@
+"""A verification in words; apart from the computation, whose libraries take longer to load."""
+
+from __future__ import annotations
+
+from labctl.services.schemas.criticism import VerificationResponse
+
+
+def verification_sentence(found: VerificationResponse) -> str:
+    """Return what a version leaves of a recording in words."""
+    of = "" if found.recorded_unit == found.serial else f" of unit {found.recorded_unit}"
+    text = (
+        f"Version {found.version} applied as it is to recording {found.recording}{of}: error {found.rms_dps:.3g} deg/s "
+        f"RMS, {found.max_dps:.3g} deg/s at most"
+    )
+    if found.expected_dps is None:
+        text += "; this version states no error to hold it against"
+    else:
+        text += f"; expected of this version: {found.expected_dps:.3g} deg/s RMS"
+    if found.outside_validity:
+        text += f"; {found.outside_validity} of {found.datasets} data sets lie outside its validity"
+    return f"{text}."

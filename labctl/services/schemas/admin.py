@@ -1,0 +1,117 @@
+"""API keys and roles, the audit trail, checks and backups."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from typing import Annotated, Any
+
+from pydantic import Field, StringConstraints
+
+from labctl.services.schemas.base import Request, ResponseModel
+
+
+class Role(StrEnum):
+    """What a key may do; each may also do what those before it may."""
+
+    VIEWER = "viewer"  #: read
+    OPERATOR = "operator"  #: import, fit, improve, run campaigns
+    APPROVER = "approver"  #: certify, revoke, make and revoke keys
+
+    def may(self, needed: Role) -> bool:
+        """Return whether this role reaches as far as another."""
+        order = list(Role)
+        return order.index(self) >= order.index(needed)
+
+
+@dataclass(frozen=True)
+class Caller:
+    """Who asks, and what they may do."""
+
+    name: str
+    role: Role
+    via: str
+
+
+class KeyRequest(Request):
+    """A key to make."""
+
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._@-]{0,99}$")] = Field(
+        description="Whose it is: the name that the audit trail will show. Used once."
+    )
+    role: Role
+
+
+class KeyResponse(ResponseModel):
+    """A key as it may be seen later: without the key."""
+
+    name: str
+    role: Role
+    created_at: datetime
+    revoked_at: datetime | None
+
+
+class NewKeyResponse(KeyResponse):
+    """A key that was just made. This is the only time that it is shown."""
+
+    key: str
+
+
+class AuditResponse(ResponseModel):
+    """One act: who did what, when, and why."""
+
+    id: int
+    at: datetime
+    who: str
+    action: str
+    subject: str
+    detail: dict[str, Any]
+    hash: str
+
+
+class AuditVerificationResponse(ResponseModel):
+    """Whether the trail is whole; the anchor is worth noting down where nobody here can write."""
+
+    ok: bool
+    rows: int
+    anchor: str | None
+    row: int | None = None
+    text: str = ""
+
+
+class BackupNote(Request):
+    """A backup that was made, for the audit trail; nothing is opened by this name."""
+
+    file: str = Field(min_length=1, max_length=255)
+    bytes: int = Field(ge=0)
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
+
+
+class FindingResponse(ResponseModel):
+    """Something that is not as it was written."""
+
+    part: str
+    text: str
+
+
+class CheckResponse(ResponseModel):
+    """What was looked at, and what was found."""
+
+    ok: bool
+    database: str
+    blocks: int
+    calibrations: int
+    audit_rows: int
+    findings: list[FindingResponse]
+
+
+class BackupResponse(ResponseModel):
+    """A backup that is on the disk."""
+
+    file: str
+    bytes: int
+    sha256: str
+    noted: bool
+    remark: str = ""
+    findings: list[FindingResponse]

@@ -1,0 +1,144 @@
+"""Campaigns: start, control, status and events."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.plans import RecipeSource
+
+
+class CampaignRequest(Request):
+    """Which recipe to run on the service's bench."""
+
+    recipe: RecipeSource
+    clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
+    hide: list[str] = Field(
+        default_factory=list,
+        max_length=20,
+        description="Of a simulated bench, now: effects hidden in its units, EFFECT or EFFECT=SIZE in its unit.",
+    )
+    at: str | None = Field(
+        default=None,
+        max_length=64,
+        description="When to begin, ISO 8601; without offset in `time_zone`. `now`: as soon as the bench is free.",
+    )
+    cron: str | None = Field(default=None, max_length=200, description="Begin again and again: five fields of cron.")
+    time_zone: str | None = Field(
+        default=None, max_length=100, description="Of `at` and `cron`, such as Europe/Berlin; default: the local one."
+    )
+    priority: int = Field(default=0, ge=-100, le=100, description="Of starts that are due, the highest goes first.")
+    late_limit_s: float | None = Field(
+        default=None,
+        ge=0,
+        le=1e9,
+        description="How much later than due it may begin; 0: a missed start is skipped; absent: any time, once.",
+    )
+
+
+class StartRequest(Request):
+    """Which recipe to run on which bench, here and now."""
+
+    recipe: str
+    bench: str | None = None
+    clip: bool = False
+    speed: float | None = Field(
+        default=None, gt=0, allow_inf_nan=False, description="Of a simulated bench; absent: as fast as it can."
+    )
+    seed: int | None = Field(default=None, ge=0, description="Of a simulated bench.")
+
+
+class ReasonRequest(Request):
+    """Why something is done to a campaign, or to a key, and by whom."""
+
+    reason: str = Field(min_length=1)
+    by: str = Field(default="", max_length=200)
+
+    @property
+    def text(self) -> str:
+        """Reason and person in one."""
+        return f"{self.reason} ({self.by})" if self.by else self.reason
+
+
+class ConfirmRequest(Request):
+    """An answer to the question with this id; an answer to an older question is refused."""
+
+    prompt: str = Field(min_length=1)
+    by: str = Field(min_length=1, max_length=200)
+    confirmed: bool = Field(default=True, description="False: it cannot be done, and the campaign ends.")
+    reason: str = ""
+
+
+class ResumeRequest(Request):
+    """How a campaign that is paused or was interrupted goes on."""
+
+    by: str = Field(default="a person", min_length=1, max_length=200)
+    reason: str = ""
+    power: Literal["lost", "kept"] | None = Field(
+        default=None, description="Whether the units were off meanwhile; absent: yes when the host was."
+    )
+
+
+class PromptResponse(ResponseModel):
+    """A question to a person; an answer names its id."""
+
+    id: str
+    kind: str
+    text: str
+    position: str | None = None
+
+
+class OutputResponse(ResponseModel):
+    """What one channel of a unit put out in the last moment, in the channel's unit."""
+
+    gyro: str = Field(description="The unit's name on the bench.")
+    channel: str
+    unit: str
+    mean: float
+    std: float = Field(description="Of single readings.")
+    n: int
+    t_s: float = Field(description="Time of the last reading since the campaign began.")
+
+
+class CampaignResponse(ResponseModel):
+    """Where a campaign is."""
+
+    id: int
+    recipe: str
+    bench: str
+    state: str
+    reason: str = ""
+    step: int | None = Field(default=None, description="Number of the step, from 1.")
+    steps: int
+    step_text: str = ""
+    progress: float = Field(ge=0, le=1)
+    expected_end: datetime | None = None
+    t_s: float | None = Field(default=None, description="Campaign time: seconds since it began, on its own clock.")
+    chamber_c: float | None = None
+    setpoint_c: float | None = None
+    gyro_c: float | None = None
+    rate_dps: float | None = None
+    outputs: list[OutputResponse] = Field(default_factory=list, description="Of a campaign that runs here, now.")
+    last_error: str | None = None
+    wish: Literal["pause", "abort"] | None = Field(default=None, description="Asked for, and not yet taken up.")
+    prompt: PromptResponse | None = Field(default=None, description="The question that waits for a person.")
+    links: dict[str, str] = Field(default_factory=dict, description="Instruments that are degraded or lost.")
+    dropped: dict[str, str] = Field(default_factory=dict, description="Units that take no further part: name -> why.")
+    abandoned: bool = Field(default=False, description="No process runs it any more, and it has no end.")
+    started_at: datetime | None = None
+    ended_at: datetime | None = None
+    recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
+
+
+class EventResponse(ResponseModel):
+    """Something that happened in a campaign."""
+
+    id: int
+    at: datetime
+    t_s: float
+    kind: str
+    level: str
+    message: str

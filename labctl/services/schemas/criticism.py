@@ -1,0 +1,108 @@
+"""A criticism, its residuals and its plots."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from labctl.services.schemas.base import ResponseModel
+
+
+class AxisVerification(ResponseModel):
+    """Corrected minus true rate of one axis over the data sets, deg/s."""
+
+    rms_dps: float
+    max_dps: float
+    bias_dps: float
+
+
+class VerificationResponse(ResponseModel):
+    """A calibration version applied as it is to a recording, nothing fitted. Errors: corrected minus true rate."""
+
+    serial: str
+    version: int
+    recording: int
+    recorded_unit: str = Field(description="Serial number of the unit that was recorded.")
+    seen: bool = Field(description="Whether the version was fitted to this recording.")
+    datasets: int
+    rms_dps: float = Field(description="Over data sets and axes.")
+    max_dps: float
+    bias_dps: float = Field(description="Mean over data sets and axes.")
+    axes: dict[str, AxisVerification]
+    outside_validity: int = Field(description="Data sets outside the version's rates or temperatures.")
+    expected_dps: float | None = Field(
+        description="Error that the version states: held-out, or of its own data where that is larger; null: unknown."
+    )
+    ok: bool = Field(description="Whether the error is at most twice the expected one.")
+
+
+class CriticismResponse(ResponseModel):
+    """A model held against a recording: the verdict in one of five forms, and what it stands on."""
+
+    serial: str
+    version: int
+    recording: int
+    verdict: Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
+    text: list[str] = Field(description="The verdict in words, the answer first.")
+    error: dict[str, Any]
+    noise: dict[str, Any]
+    lack_of_fit: dict[str, float | None]
+    where: list[dict[str, Any]] = Field(description="Ranges of channels in which the residual is far from 0.")
+    suspects: list[dict[str, Any]]
+    named: list[str] = Field(description="The effects that the verdict stands on.")
+    depends_on: list[str] = Field(description="Channels that the residual hangs on, strongest first.")
+    not_testable: list[dict[str, Any]]
+    experiments: list[dict[str, Any]]
+    applied: VerificationResponse | None = Field(
+        default=None, description="The version as it is on this recording; everything else is of a refit to it."
+    )
+    views: dict[str, Any] = Field(
+        default_factory=dict, description="Where and how the model fails, as numbers for pictures, by view."
+    )
+
+
+class ResidualColumns(ResponseModel):
+    """One row per data set and axis, as lists of equal length. A data set far longer than the others is in pieces."""
+
+    dataset: list[int] = Field(default_factory=list)
+    axis: list[str] = Field(default_factory=list)
+    position: list[str] = Field(default_factory=list)
+    run: list[int] = Field(default_factory=list)
+    table_rate_dps: list[float] = Field(default_factory=list)
+    own_rate_dps: list[float] = Field(
+        default_factory=list, description="True rate along the axis itself, the Earth's included where it is known."
+    )
+    temperature_c: list[float] = Field(default_factory=list)
+    t_s: list[float | None] = Field(default_factory=list)
+    n: list[int | None] = Field(default_factory=list, description="Readings behind the data set; null: not known.")
+    measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
+    modelled_error_dps: list[float] = Field(default_factory=list)
+    residual_dps: list[float] = Field(default_factory=list, description="Measured minus modelled error.")
+    floor_dps: list[float | None] = Field(default_factory=list, description="What noise alone leaves of this mean.")
+    over_floor: list[float | None] = Field(default_factory=list, description="Residual over floor, as in the map.")
+
+
+class ResidualsResponse(ResponseModel):
+    """What a version leaves of a recording."""
+
+    serial: str
+    version: int
+    recording: int
+    columns: ResidualColumns
+
+
+class PictureResponse(ResponseModel):
+    """One picture."""
+
+    id: str
+    title: str
+    how_to_read: str
+    effects: list[str] = Field(description="Effects that would draw something there.")
+    figure: dict[str, Any] = Field(description="Plotly: data and layout.")
+
+
+class PicturesResponse(ResponseModel):
+    """All of them, as they are kept: drawing takes a second."""
+
+    pictures: list[PictureResponse]

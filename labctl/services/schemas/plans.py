@@ -1,0 +1,117 @@
+"""Recipes, plans and the steps of a campaign."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from labctl.services.schemas.base import Request, ResponseModel
+from procedures.contracts.errors import RecipeError
+from procedures.recipe.recipe import shipped_recipes
+
+
+def never_a_path(recipe: str) -> str:
+    """Refuse what would be looked for as a file: a request names a shipped recipe or brings its own text."""
+    if "\n" in recipe or recipe in shipped_recipes():
+        return recipe
+    raise RecipeError(f"no recipe {recipe!r}: send its text, or one of {', '.join(shipped_recipes())}")
+
+
+RecipeSource = Annotated[
+    str, AfterValidator(never_a_path), Field(description="Name of a shipped recipe, or the recipe itself as TOML text.")
+]
+
+
+class PlanRequest(Request):
+    """Which recipe to plan on the service's bench."""
+
+    recipe: RecipeSource
+    clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
+    visibility: bool = Field(default=False, description="Also say what the plan could find; it takes some seconds.")
+
+
+class Visibility(ResponseModel):
+    """Whether a schedule could show an effect, and from which size on."""
+
+    effect: str
+    visible: bool
+    share: float = Field(description="How much of the effect the model beside it does not absorb, 0 to 1.")
+    smallest_size: float | None = Field(default=None, description="Just detectable, in the effect's unit.")
+    unit: str = ""
+    why: Literal["channel", "schedule"] | None = None
+    needs: list[str] = Field(default_factory=list)
+    experiment: str = ""
+
+
+class PlanResponse(ResponseModel):
+    """What a campaign would do, before anything moves."""
+
+    recipe: str
+    bench: str
+    steps: int
+    datasets: int
+    expected_s: float
+    clipped: list[str] = Field(description="Points left out because the bench or the unit cannot do them.")
+    schedule_hash: str
+    visibility: list[Visibility] | None = Field(default=None, description="What the plan could and could not find.")
+
+
+StepState = Literal["to come", "running", "done", "failed", "interrupted", "skipped"]
+
+
+class RecipeResponse(ResponseModel):
+    """A recipe that comes with labctl, and what it would take."""
+
+    name: str
+    description: str
+    text: str = Field(description="The recipe itself, TOML.")
+    bench: str
+    steps: int | None = None
+    datasets: int | None = None
+    expected_s: float | None = None
+    refused: str | None = Field(default=None, description="Why this bench cannot do it; then there are no figures.")
+    remark: str = Field(default="", description="What speaks against it although the bench can do it.")
+
+
+class TimelineColumns(ResponseModel):
+    """The steps of a plan in order, as lists of equal length."""
+
+    number: list[int] = Field(description="From 1.")
+    kind: list[str]
+    start_s: list[float] = Field(description="From the beginning, if every step takes as long as expected.")
+    expected_s: list[float]
+    temperature_c: list[float | None] = Field(description="Set point in force; null: none was set yet.")
+    rate_dps: list[float | None] = Field(description="Of data sets; null: the table is at rest.")
+    position: list[str | None] = Field(description="In which the units are; null: as they were found.")
+    dataset: list[int | None]
+
+
+class PlannedResponse(PlanResponse):
+    """What a campaign would do, with its steps."""
+
+    timeline: TimelineColumns
+
+
+class RunColumns(TimelineColumns):
+    """The steps of a campaign, with what became of each."""
+
+    state: list[StepState]
+    started_s: list[float | None] = Field(description="Campaign time.")
+    ended_s: list[float | None]
+    forecast_s: list[float] = Field(description="When it began, or will if all that is left takes as expected.")
+
+
+class CampaignPlanResponse(ResponseModel):
+    """The plan of a campaign, and how far it is."""
+
+    campaign: int
+    recipe: str
+    text: str = Field(description="The recipe as it was run, TOML; empty: by an older labctl.")
+    bench: str
+    state: str
+    schedule_hash: str
+    steps: int
+    datasets: int
+    expected_s: float
+    timeline: RunColumns

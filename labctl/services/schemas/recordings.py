@@ -1,0 +1,133 @@
+"""Units and recordings: imports, data sets, traces and Allan deviations."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+from pydantic import Field
+
+from instruments.bench_config import SERIAL
+from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.plans import RecipeSource
+
+
+class SimulatedRequest(Request):
+    """A recording to be made in simulation, with effects hidden in its unit."""
+
+    recipe: RecipeSource
+    hide: list[str] = Field(
+        default_factory=list,
+        max_length=20,
+        description="EFFECT, or EFFECT=SIZE in the catalogue's coefficient unit, or EFFECT=z10: ten noise units.",
+    )
+    seed: int = Field(default=1, ge=0, lt=1 << 63, description="Same seed, same recording.")
+    serial: str | None = Field(default=None, pattern=SERIAL, description="Of the unit; default: the simulated bench's.")
+    clip: bool = Field(default=False, description="Leave out points that the bench or the unit cannot do.")
+
+
+class ExampleRequest(Request):
+    """Which of the recordings that come with labctl to take in."""
+
+    name: str = Field(
+        max_length=100, description="osu-fog: a real fibre-optic gyro; weiss-gyrostar: a published table."
+    )
+
+
+class ImportResponse(ResponseModel):
+    """A recording that is now in the database."""
+
+    serial: str
+    recording: int
+    datasets: int
+    readings: int
+    suggested_model: str = Field(default="bias_scale", description="A published model for such a recording.")
+
+
+class SimulatedRecordingResponse(ImportResponse):
+    """A simulated recording that is now in the database."""
+
+    recipe: str
+    bench: str
+    seed: int
+    hidden: dict[str, float] = Field(description="Effect -> size that is hidden in the unit.")
+
+
+class UnitResponse(ResponseModel):
+    """Who a unit is and what is known of it."""
+
+    serial: str
+    model: str
+    technology: str | None
+    recordings: list[int]
+    calibrations: list[int]
+    certified_version: int | None
+
+
+class RecordingResponse(ResponseModel):
+    """One line of the list of recordings."""
+
+    id: int
+    serial: str
+    kind: str = Field(description="samples, points or coefficients.")
+    campaign: int | None = Field(description="The campaign that made it; null: it was imported.")
+    datasets: int
+    readings: int
+    created_at: datetime
+    notes: str = ""
+
+
+class ChannelColumns(ResponseModel):
+    """A channel's figures by data set, in the channel's unit; null: none."""
+
+    mean: list[float | None]
+    std: list[float | None]
+
+
+class DataSetsResponse(ResponseModel):
+    """The data sets of a recording, as lists of equal length."""
+
+    recording: int
+    number: list[int]
+    state: list[str]
+    reason: list[str] = Field(description="Why it is not complete; empty where it is.")
+    position: list[str]
+    run: list[int]
+    mounting: list[int]
+    table_rate_dps: list[float]
+    t_from_s: list[float | None]
+    t_until_s: list[float | None]
+    n: list[int]
+    lost: list[int]
+    damaged: list[int]
+    chamber_setpoint_c: list[float | None]
+    channels: dict[str, ChannelColumns]
+
+
+class TraceResponse(ResponseModel):
+    """One channel over a window of time, in bins that hold readings, as lists of equal length."""
+
+    recording: int
+    channel: str
+    unit: str
+    from_s: float | None
+    until_s: float | None
+    raw: bool = Field(description="Binned from the readings themselves; else from envelopes of each data set.")
+    t_s: list[float] = Field(description="Mean time of the bin's readings.")
+    min: list[float]
+    max: list[float]
+    mean: list[float]
+    n: list[int]
+    channels: list[str] = Field(description="What can be asked for.")
+
+
+class AllanResponse(ResponseModel):
+    """An overlapping Allan deviation, axis by axis, and the figures of IEEE Std 952 that it shows."""
+
+    recording: int
+    datasets: list[int] = Field(description="First and last data set of the stretch.")
+    temperature_c: float | None
+    duration_s: float | None
+    axes: dict[str, dict[str, Any]] = Field(
+        description="tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K."
+    )

@@ -1,0 +1,38 @@
+"""The schedule of campaign starts."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from labctl.services.schemas.base import ResponseModel
+
+
+class StartEventResponse(ResponseModel):
+    """What became of one start that fell due."""
+
+    at: datetime
+    due_at: datetime
+    outcome: Literal["claimed", "started", "refused", "missed"]
+    message: str
+    campaign: int | None = None
+
+
+class ScheduledResponse(ResponseModel):
+    """A campaign that is to begin later."""
+
+    id: int
+    bench: str
+    recipe: str
+    state: str = Field(description="waiting, ended or cancelled.")
+    due_at: datetime | None = Field(description="When it begins next, in its time zone; null when it is over.")
+    time_zone: str
+    cron: str | None
+    priority: int
+    clip: bool
+    late_limit_s: float | None
+    created_at: datetime
+    note: str = ""
+    history: list[StartEventResponse] = Field(default_factory=list)

@@ -1,0 +1,257 @@
+"""The engine's journal in the database.
+
+Every call outlives this process when it returns. A power cut may take the readings and the environment of the data set
+that is open, which is redone anyway; closing a data set, and every change of step or state, is on the disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+import sqlalchemy as sa
+from numpy.typing import NDArray
+
+from instruments.interfaces.gyro import Readings
+from labctl.store import sample_codec
+from labctl.store.connection.database import Database
+from labctl.store.dataset_means import means_rows
+from labctl.store.repositories import benches
+from labctl.store.repositories.audit import append
+from labctl.store.repositories.sample_blocks import blocks_of, scaled, write_block
+from labctl.store.schema import tables
+from procedures.contracts.journal import (
+    NOT_SAFE,
+    CampaignState,
+    DataSetHeader,
+    DataSetState,
+    EnvironmentSample,
+    Event,
+)
+from procedures.contracts.steps import StepResult
+from procedures.execution.signals import defer_signals
+
+#: Made once: a statement that is built anew for every second of a campaign costs more than writing it.
+_ADD_ENVIRONMENT = sa.insert(tables.environment)
+
+ENDED = frozenset({CampaignState.DONE, CampaignState.ABORTED, CampaignState.FAILED})
+
+
+class StoreJournal:
+    """Writes one campaign down. Sample blocks hold whole numbers, as the device sent them."""
+
+    def __init__(self, database: Database, campaign: int) -> None:
+        self._database = database
+        self._campaign = campaign
+        r = tables.recordings.c
+        with database.reading() as connection:
+            rows = connection.execute(sa.select(r.gyro, r.id, r.channels).where(r.campaign_id == campaign)).all()
+            self._power_on_s: float | None = connection.scalar(
+                sa.select(tables.campaigns.c.powered_on_s).where(tables.campaigns.c.id == campaign)
+            )
+        self._recordings = {gyro: recording for gyro, recording, _ in rows}
+        self._channels = {gyro: channels for gyro, _, channels in rows}
+        #: What the open data sets' blocks hold, so that closing one need not read it back.
+        self._open: dict[tuple[int, str], list[dict[str, NDArray[Any]]]] = {}
+
+    @contextmanager
+    def _writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
+        with defer_signals(), self._database.writing(synced=synced) as connection:
+            yield connection
+
+    def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:
+        """Record a change of state and why, as the campaign's state and as an event."""
+        values: dict[str, Any] = {"state": state.value, "reason": reason}
+        if state is CampaignState.RUNNING:
+            values["started_at"] = sa.func.coalesce(
+                tables.campaigns.c.started_at, sa.bindparam("at", at, tables.Instant)
+            )
+        if state in ENDED:
+            values["ended_at"] = at
+        level = "error" if state is CampaignState.FAILED else "info"
+        message = f"campaign {state.value}" + (f": {reason}" if reason else "")
+        with self._writing() as connection:
+            connection.execute(
+                sa.update(tables.campaigns).where(tables.campaigns.c.id == self._campaign).values(**values)
+            )
+            self._add_event(connection, Event("state", message, level), t_s, at)
+            change = {"state": state.value, "reason": reason}
+            append(connection, at, "campaign state", f"campaign {self._campaign}", change)
+
+    def step_started(self, index: int, t_s: float, at: datetime) -> None:
+        """Record that a step begins."""
+        self._mark(index, state="running", started_s=t_s, started_at=at)
+
+    def step_ended(self, index: int, result: StepResult, t_s: float, at: datetime) -> None:
+        """Record how a step ended."""
+        self._mark(index, state=result.outcome, ended_s=t_s, ended_at=at, result=result.model_dump(mode="json"))
+
+    def _mark(self, index: int, **values: Any) -> None:
+        s = tables.steps
+        with self._writing() as connection:
+            connection.execute(
+                sa.update(s).where(s.c.campaign_id == self._campaign, s.c.number == index).values(**values)
+            )
+
+    def session_began(self, run: int, t_s: float) -> None:  # noqa: ARG002  the number is the plan's and what was added
+        """Record that the units were switched on."""
+        self._power_on_s = t_s
+        c = tables.campaigns
+        with self._writing() as connection:
+            connection.execute(sa.update(c).where(c.c.id == self._campaign).values(powered_on_s=t_s))
+
+    def unit_dropped(self, gyro: str, reason: str) -> None:
+        """Record that a unit takes no further part."""
+        r = tables.recordings
+        with self._writing() as connection:
+            connection.execute(sa.update(r).where(r.c.id == self._recordings[gyro]).values(dropped=reason))
+
+    def dataset_opened(self, header: DataSetHeader) -> int:
+        """Record a data set of every unit before its first reading; returns its number."""
+        s, d = header.step, tables.data_sets
+        with self._writing() as connection:
+            last = connection.scalar(
+                sa.select(sa.func.max(d.c.number)).where(d.c.recording_id.in_(self._recordings.values()))
+            )
+            number = int(last or 0) + 1
+            connection.execute(
+                sa.insert(d),
+                [
+                    {
+                        "recording_id": recording,
+                        "number": number,
+                        "state": DataSetState.OPEN.value,
+                        "reason": "",
+                        "position": s.position,
+                        "run": header.run,
+                        "mounting": s.mounting,
+                        "table_rate_dps": header.rate_dps,
+                        "asked_dps": header.asked_dps,
+                        "table_angle_deg": header.angle_from_deg,
+                        "chamber_setpoint_c": header.setpoint_c,
+                        "gate_from_s": header.gate_from_s,
+                        "gate_until_s": header.gate_until_s,
+                        "power_on_s": self._power_on_s,
+                        "n": 0,
+                        "planned": s.dataset,
+                    }
+                    for recording in (self._recordings[gyro] for gyro in header.gyros)
+                ],
+            )
+        return number
+
+    def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
+        """Record one block of one unit; times are campaign time."""
+        if not len(readings) and not readings.lost and not readings.damaged:
+            return
+        recording = self._recordings[gyro]
+        parts = self._open.setdefault((dataset, gyro), [])
+        d = tables.data_sets
+        with self._writing(synced=False) as connection:
+            if len(readings):
+                columns = _columns(readings, chamber_c)
+                write_block(connection, recording, dataset, len(parts), sample_codec.pack(columns))
+                parts.append(columns)
+            if readings.lost or readings.damaged:
+                connection.execute(
+                    sa.update(d)
+                    .where(d.c.recording_id == recording, d.c.number == dataset)
+                    .values(lost=d.c.lost + readings.lost, damaged=d.c.damaged + readings.damaged)
+                )
+
+    def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
+        """Record that no more readings follow: figures are derived and blocks packed into one, in one transaction."""
+        with self._writing() as connection:
+            d = tables.data_sets.c
+            mine = d.recording_id.in_(self._recordings.values())
+            this_one = (mine, d.number == dataset, d.state == DataSetState.OPEN.value)
+            there = set(connection.scalars(sa.select(d.recording_id).where(*this_one)))
+            for gyro, recording in self._recordings.items():
+                if recording in there:
+                    raw = self._raw_of(connection, gyro, recording, dataset)
+                    self._close_one(connection, gyro, recording, dataset, state, reason, raw)
+
+    def _raw_of(
+        self, connection: sa.Connection, gyro: str, recording: int, dataset: int
+    ) -> dict[str, NDArray[Any]] | None:
+        """Return a data set's readings as the device sent them; None when there are none."""
+        parts = self._open.pop((dataset, gyro), None) or blocks_of(connection, recording, dataset)
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else None
+
+    def _close_one(
+        self,
+        connection: sa.Connection,
+        gyro: str,
+        recording: int,
+        dataset: int,
+        state: DataSetState,
+        reason: str,
+        raw: dict[str, NDArray[Any]] | None,
+    ) -> None:
+        d, b = tables.data_sets, tables.sample_blocks
+        this = (d.c.recording_id == recording, d.c.number == dataset)
+        n = 0
+        if raw is not None:
+            valid = raw["valid"] != 0
+            n = int(valid.sum())
+            head = connection.execute(sa.select(d).where(*this)).mappings().one()
+            means = means_rows(recording, dataset, scaled(raw, self._channels[gyro], dict(head)), valid)
+            connection.execute(sa.insert(tables.data_set_means), means)
+            connection.execute(sa.delete(b).where(b.c.recording_id == recording, b.c.number == dataset))
+            write_block(connection, recording, dataset, 0, sample_codec.pack(raw, sample_codec.FINAL))
+        connection.execute(sa.update(d).where(*this).values(state=state.value, reason=reason, n=n))
+
+    def environment(self, sample: EnvironmentSample) -> None:
+        """Record the environment, once for each unit whose thermometer was read."""
+        rows = [
+            {
+                "recording_id": recording,
+                "t_s": sample.t_s,
+                "run": sample.run,
+                "temperature_c": sample.gyro_c[gyro],
+                "chamber_c": sample.chamber_c,
+                "chamber_setpoint_c": sample.chamber_setpoint_c,
+            }
+            for gyro, recording in self._recordings.items()
+            if gyro in sample.gyro_c
+        ]
+        if rows:
+            with self._writing(synced=False) as connection:
+                connection.execute(_ADD_ENVIRONMENT, rows)
+
+    def event(self, event: Event, t_s: float, at: datetime) -> None:
+        """Record something worth telling a person; what is not safe stays on the bench's status from then on."""
+        with self._writing() as connection:
+            self._add_event(connection, event, t_s, at)
+            if event.kind == "safe_state" and event.level == "error":
+                c = tables.campaigns.c
+                bench = connection.scalar(sa.select(c.bench_name).where(c.id == self._campaign)) or ""
+                benches.mark(connection, bench, event.message.removeprefix(NOT_SAFE), at)
+
+    def _add_event(self, connection: sa.Connection, event: Event, t_s: float, at: datetime) -> None:
+        connection.execute(
+            sa.insert(tables.events).values(
+                campaign_id=self._campaign,
+                at=at,
+                t_s=t_s,
+                kind=event.kind,
+                level=event.level,
+                message=event.message,
+                device=event.device,
+                value=event.value,
+                limit_value=event.limit,
+                unit=event.unit,
+            )
+        )
+
+
+def _columns(readings: Readings, chamber_c: float) -> dict[str, NDArray[Any]]:
+    return {
+        "t_ns": np.rint(readings.t_s * 1e9).astype(np.int64),
+        **readings.raw,
+        "valid": readings.valid.astype(np.int64),
+        "chamber_mc": np.full(len(readings), round(chamber_c * 1e3), dtype=np.int64),
+    }

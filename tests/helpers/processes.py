@@ -1,0 +1,95 @@
+"""`labctl` in real processes: commands, and a service with commands beside it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+
+from labctl.store import open_store
+from tests.helpers.signal_defaults import default_signals
+
+#: For what a process does on a busy machine.
+WAIT_S = 100.0
+REQUEST_S = 30.0
+
+
+def labctl(database: Path, *arguments: str) -> list[str]:
+    """Return the words of a command on a database."""
+    return [sys.executable, "-m", "labctl", *arguments, "--database", str(database)]
+
+
+def begin(command: list[str]) -> subprocess.Popen[str]:
+    """Start a process that obeys signals."""
+    with default_signals():
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def first_line(process: subprocess.Popen[str]) -> str:
+    """Wait until a process says that it is ready; returns the line."""
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
+def kill(process: subprocess.Popen[str]) -> None:
+    """End a process, if it still runs, and close its pipes."""
+    process.kill()
+    process.communicate()
+
+
+def end_of(database: Path, campaign: int = 1) -> tuple[str, str]:
+    """Return state and reason of a campaign, as they were written."""
+    with open_store(str(database), write=False) as store:
+        row = store.campaigns.get(campaign)
+        return row.state, row.reason
+
+
+class ServiceProcess:
+    """`labctl serve` in a process of its own, and other commands beside it on the same database."""
+
+    def __init__(self, database: Path, *options: str) -> None:
+        self.database = database
+        command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json", *options]
+        self.process = begin(labctl(database, *command))
+        self.url = json.loads(first_line(self.process))["url"]
+        self.http = httpx.Client(base_url=self.url, timeout=REQUEST_S)
+
+    def run(self, *arguments: str, status: int = 0, key: str = "") -> subprocess.CompletedProcess[str]:
+        """Run a command to its end, which must be with this exit status."""
+        environment = {**os.environ, "LABCTL_KEY": key}
+        command = labctl(self.database, *arguments)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        assert done.returncode == status, done.stderr
+        return done
+
+    @contextmanager
+    def following(self, campaign: int) -> Iterator[Iterator[str]]:
+        """Yield the lines of a campaign's event stream, which ends with the campaign."""
+        with self.http.stream("GET", f"/api/campaigns/{campaign}/events", timeout=WAIT_S) as stream:
+            yield stream.iter_lines()
+
+    def wait_for_data_set(self, campaign: int) -> None:
+        """Wait until the first data set of a campaign is being taken."""
+        with self.following(campaign) as lines:
+            assert any('"step_text":"data set' in line for line in lines)
+
+    def close(self) -> None:
+        """End the service at once, as a power cut would."""
+        self.http.close()
+        kill(self.process)
+
+
+@contextmanager
+def running(database: Path, *options: str) -> Iterator[ServiceProcess]:
+    """Serve a database while the block runs."""
+    made = ServiceProcess(database, *options)
+    try:
+        yield made
+    finally:
+        made.close()
