@@ -14,6 +14,7 @@ import numpy as np
 
 from instruments.simulation import hidden_defaults
 from labctl.fitting.criticism.effect_size import CLOSE
+from labctl.fitting.effects import CATALOGUE
 from labctl.services.simulation.effect_sizes import Sizing
 from studies.campaigns import PROTOCOLS, protocol
 
@@ -44,8 +45,10 @@ def _kept() -> dict[str, Sizes]:
 
 
 def sizes(name: str) -> Sizes:
-    """Return effect -> z -> size of every effect that a protocol can show."""
-    return _kept()[name]
+    """Return effect -> z -> size of every effect that a protocol can show and its unit's technology can have."""
+    technology = protocol(name).gyro.technology or ""
+    absent = {effect for effect, kind in CATALOGUE.items() if kind.ranges.get(technology) == (0.0, 0.0)}
+    return {effect: levels for effect, levels in _kept()[name].items() if effect not in absent}
 
 
 def sizing_of(name: str) -> Sizing:

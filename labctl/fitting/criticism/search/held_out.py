@@ -22,6 +22,8 @@ RATE_GROUPS = 8
 #: A fold narrower than this, K, is a temperature level: the table's node there, within the edge, is left out with it.
 NARROW_K, EDGE_K = 3.0, 0.5
 LEAST_EIGENVALUE = 1e-12
+#: A coefficient whose signal is less than this, in noise units, has the prior of one that is as large.
+LEAST_SIGNAL = 1e-3
 
 
 def held_out_rises(comparison: Comparison, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]) -> bool:
@@ -79,7 +81,8 @@ class _Axis:
         whole = np.concatenate([base, added], axis=2)
         precision = np.concatenate([design.precision, np.zeros(added.shape[2])])
         fitted = _solved(whole[data.present], y[data.present], precision)[base.shape[2] :]
-        return _Axis(axis, scale, y, added, 1.0 / np.maximum(fitted**2, 1e-300))
+        least = LEAST_SIGNAL / np.maximum(np.linalg.norm(added[data.present], axis=0), LEAST_SIGNAL)
+        return _Axis(axis, scale, y, added, 1.0 / np.maximum(np.abs(fitted), least) ** 2)
 
     def errors(self, comparison: Comparison, mask: NDArray[np.bool_]) -> tuple[float, float]:
         """Return the chi2 of the data sets of a mask, predicted from the others without the terms and with them."""

@@ -1,4 +1,4 @@
-"""What a verdict may not say: a second name for a remainder, one not physical, one that predicts worse or too surely."""
+"""What a verdict may not say: a second name for a remainder, an unphysical one, one that predicts worse."""
 
 from __future__ import annotations
 
