@@ -28,15 +28,15 @@ class ServiceControl:
 
     def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
         """Start a campaign on this service's bench. Raises Conflict without one, BenchBusy while another runs."""
-        return self._bench_runner.start(asked.body)
+        return self._bench_runner().start(asked.body)
 
     def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
         """Enter a campaign into the schedule of this service's bench."""
-        return queue.add_start(context.store, asked.body, self._bench_runner.bench, context.now())
+        return queue.add_start(context.store, asked.body, self._bench_runner().bench, context.now())
 
     def resume(self, context: CommandContext, asked: CampaignResume) -> CampaignResponse:
         """Continue a paused campaign, or resume an interrupted one on this service's bench."""
-        runner, body = self._bench_runner, asked.body
+        runner, body = self._bench_runner(), asked.body
         if asked.campaign is None:
             raise Conflict("a service resumes a campaign by its number; name it")
         paused = runner.runs(asked.campaign)  # a resume after an interruption is recorded together with its rows
