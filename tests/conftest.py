@@ -17,6 +17,8 @@ from tests.helpers.signal_defaults import default_signals
 #: The same examples every time and on every machine; a busy machine is slow, not wrong.
 settings.register_profile("labctl", derandomize=True, deadline=None, database=None)
 settings.load_profile("labctl")
+#: How long a coroutine of a test may take, seconds.
+LOOP_S = 60.0
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
@@ -46,11 +48,14 @@ def nothing_left(signals: None) -> Iterator[None]:
 
 @pytest.fixture
 def in_a_loop() -> Callable[[Coroutine[Any, Any, Any]], Any]:
-    """Run a coroutine to its end in a thread of its own: a browser of other tests keeps a loop in this one."""
+    """Run a coroutine to its end in a thread of its own: a browser of other tests keeps a loop in this one.
+
+    It has an end of its own too: the time-out of a test interrupts the main thread, which then waits for this one.
+    """
 
     def run(work: Coroutine[Any, Any, Any]) -> Any:
         with ThreadPoolExecutor(1) as thread:
-            return thread.submit(asyncio.run, work).result()
+            return thread.submit(asyncio.run, asyncio.wait_for(work, LOOP_S)).result()
 
     return run
 

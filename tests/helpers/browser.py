@@ -29,6 +29,8 @@ WIDE, NARROW = {"width": 1280, "height": 860}, {"width": 390, "height": 844}
 #: How long a page may take before a test gives up: a busy machine is slow, not wrong.
 PATIENCE_MS = 45_000
 REQUEST_S = 120.0
+#: For requests that run when the service stops, whole seconds.
+GRACE_S = 20
 
 
 class Server(uvicorn.Server):
@@ -74,14 +76,15 @@ class Service:
         self.port = listener.getsockname()[1]
         self.url = f"http://127.0.0.1:{self.port}"
         app = create_app(self.lab_service, AccessPolicy(keys=self.keys))
-        self._server = Server(uvicorn.Config(app, log_level="error", lifespan="on", timeout_graceful_shutdown=1))
+        self._server = Server(uvicorn.Config(app, log_level="error", lifespan="on", timeout_graceful_shutdown=GRACE_S))
         self._thread = threading.Thread(target=self._server.serve_until_stopped, args=(listener,), name="test service")
         self._thread.start()
         assert self._server.ready.wait(REQUEST_S)
         assert self._server.started
 
     def stop(self) -> None:
-        """Answer no more; the bench is left safe."""
+        """Answer no more; the bench is left safe. As a signal does: what follows a campaign is ended first."""
+        self.lab_service.end_soon()
         self._server.should_exit = True
         self._thread.join(REQUEST_S)
         assert not self._thread.is_alive()

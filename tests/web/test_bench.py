@@ -12,6 +12,7 @@ from instruments.clock import SystemClock
 from labctl.services.campaigns import preparation
 from procedures.contracts.operator import HumanOperator
 from tests.helpers.browser import Faults, Service
+from tests.helpers.paths import RECIPES
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -29,8 +30,12 @@ def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service
     serving.stop()
 
 
-def start(service: Service) -> None:
-    service.post("/api/campaigns", {"recipe": "short"})
+#: Longer than a browser on a busy machine takes to press a button.
+LONG = (RECIPES / "short.toml").read_text(encoding="utf-8").replace("[soak]", "repeats = 100\n[soak]")
+
+
+def start(service: Service, recipe: str = "short") -> None:
+    service.post("/api/campaigns", {"recipe": recipe})
     service.until("/api/campaigns/1", lambda answer: answer["prompt"] is not None)
 
 
@@ -44,7 +49,7 @@ def answered(page: Page, name: str) -> None:
 def test_mounted_paused_and_stopped_by_hand(service: Service, visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 
-    start(service)
+    start(service, LONG)
     page = visit("/bench")
     expect(page.get_by_role("img", name="The unit with its z axis pointing up")).to_be_visible()
     answered(page, "Done")

@@ -81,7 +81,7 @@ def test_the_store_is_read_as_often_for_many_as_for_one(
         reads.append(campaign)
         return [row for row in rows if row.id > after]
 
-    campaigns = SimpleNamespace(get=lambda campaign: SimpleNamespace(state=state[0]), events=events)
+    campaigns = SimpleNamespace(state=lambda campaign: state[0], events=events)
     store: Any = SimpleNamespace(campaigns=campaigns)
 
     def listen(bell: Any) -> Any:
@@ -95,7 +95,7 @@ def test_the_store_is_read_as_often_for_many_as_for_one(
             return [told.id async for told in followers.follow(1, 0, lambda: False) if hasattr(told, "id")]
 
         looking = [asyncio.create_task(one()) for _ in range(onlookers)]
-        while not reads:
+        while not reads and not any(onlooker.done() for onlooker in looking):
             await asyncio.sleep(0)
         rows.append(SimpleNamespace(id=2))
         state[0] = "done"
