@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,6 @@ import numpy as np
 
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import Criticism, criticise
-from labctl.fitting.criticism.residuals import residuals_of
 from labctl.fitting.criticism.verdict import overlap
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.estimation.fit import fit_preset
@@ -95,7 +93,7 @@ def one(task: Task) -> Task:
     if task["kind"] == "effect" and task["z"] == HELD_OUT_AT_Z and found.verdict.form == "missing":
         answer["held_out"] = clock("improve", lambda: held_out(recording, model, found))
     if task["kind"] == "drifting" and found.comparison is not None:
-        answer["drift"] = replace(found, residuals=residuals_of(found.comparison)).drift_over_datasheet
+        answer["drift"] = found.drift_over_datasheet
     if WITH_PEERS and found.comparison is not None:
         designs = found.comparison.designs
         answer["peers"] = clock("peers", lambda: baselines.ask(found.data, designs))

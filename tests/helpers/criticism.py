@@ -27,4 +27,4 @@ def views(recording: Recording, model: str | None = "ojeda2000", effects: tuple[
     fitted, _ = preset_for(model, list(effects)).build(context)
     forward, _ = changed(fitted).build(context)
     comparison = compare_models(reduce_recording(recording), forward, {"bias_drift": CATALOGUE["bias_drift"]})
-    return views_of(comparison, residuals_of(comparison), recording, CATALOGUE)
+    return views_of(comparison, residuals_of(comparison, context.noise_floor), recording, CATALOGUE)

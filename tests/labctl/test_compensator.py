@@ -197,7 +197,7 @@ def in_c(calibration: Calibration, raw: np.ndarray, warm: np.ndarray, folder: Pa
     compiler = shutil.which("cc")
     assert compiler is not None
     command = [compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", f"-DLABCTL_REAL={real}", "-O1", "main.c"]
-    subprocess.run([*command, "-o", "main"], cwd=folder, check=True, capture_output=True)
+    subprocess.run([*command, "-o", "main", "-lm"], cwd=folder, check=True, capture_output=True)
     lines = "\n".join(f"{t:.17g} " + " ".join(f"{v:.17g}" for v in row) for t, row in zip(warm, raw, strict=True))
     out = subprocess.run([folder / "main"], input=lines, text=True, check=True, capture_output=True).stdout
     return np.array([[float(word) for word in line.split()] for line in out.splitlines()])

@@ -8,7 +8,6 @@ from labctl.fitting.criticism.criticism import (
     Criticism,
     best_shapes,
     criticise,
-    residuals_beside_missing,
 )
 from labctl.fitting.criticism.diagnostics import residual_maps
 from labctl.fitting.criticism.effect_size import SizeReference, size_for_z, size_in_noise_units, size_reference
@@ -49,7 +48,6 @@ __all__ = [
     "has_one_rising_leg",
     "leading_signal",
     "residual_maps",
-    "residuals_beside_missing",
     "schedule_of",
     "separation_chi2",
     "separation_power",

@@ -123,7 +123,8 @@ def thermometer_options(data: ReducedRecording, model: ErrorModel, axis: str) ->
     if "t_s" not in data.nodes or name not in data.nodes:
         return []
     base, _, precision = base_rows(data, model, axis)
-    size = np.maximum(np.linalg.norm(base[0], axis=0), 1e-300)
+    size = np.linalg.norm(base[0], axis=0)
+    size = np.where(size > 0, size, np.inf)  # a column that the schedule does not excite has no part in it
     values, *_ = np.linalg.lstsq(base[0] / size, data.error_dps(axis)[0], rcond=1e-9)
     ends = []
     for shift_k in (SHIFT_K, -SHIFT_K):

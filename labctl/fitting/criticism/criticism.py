@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from labctl.fitting.criticism.suspects import Suspect, suspects_of
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.noise_floor import NoiseFloor
 from labctl.fitting.data.static_record import LONG_S, static_record
 from labctl.fitting.data.temperature_channel import with_temperature
 from labctl.fitting.effects import CATALOGUE, Effect, Term
@@ -40,22 +42,42 @@ class Criticism:
 
     verdict: Verdict
     data: ReducedRecording
+    fit_data: FitData  #: the means of the same recording, as a fit sees them
     base: FitResult | None  #: the model fitted in its forward form; None without `full`
     direct_rms_dps: float | None  #: of the law of the output as it is applied; None for a law of the true rate
     comparison: Comparison | None  #: None where there is too little for a verdict
-    residuals: Mapping[str, Residuals] = field(default_factory=dict)
+    fuller: Comparison | None = None  #: beside all that was found missing
     suspects: tuple[Suspect, ...] = ()
     not_testable: tuple[Mapping[str, Any], ...] = ()
     explained: float | None = None
     views: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def floor(self) -> NoiseFloor:
+        """The noise of the recording, whatever the model: the same as that of a fit to it."""
+        return self.fit_data.noise_floor
+
+    @cached_property
+    def beside_missing(self) -> Comparison | None:
+        """The comparison with the noise that remains beside all that was found missing."""
+        if self.comparison is None or self.fuller is None or self.fuller is self.comparison:
+            return self.comparison
+        return with_noise_of(self.comparison, self.fuller)
+
+    @cached_property
+    def residuals(self) -> Mapping[str, Residuals]:
+        """What the model leaves, by axis; nothing where there was too little for a verdict."""
+        if self.beside_missing is None:
+            return {}
+        return residuals_of(self.beside_missing, self.floor, self.base.residual_dps if self.base is not None else None)
+
+    @property
     def drift_over_datasheet(self) -> float | None:
         """The largest drift found, over half the data sheet's bias stability; None without a data sheet."""
         stability = self.data.info.datasheet.get("bias_stability_dps")
-        if not stability or not self.residuals:
+        if not stability or self.comparison is None:
             return None
-        return float(np.max([r.drift_dps for r in self.residuals.values()]) / (stability / 2))
+        return max(noise.drift.drift_dps for noise in self.floor.axes.values()) / (stability / 2)
 
 
 @single_threaded
@@ -78,21 +100,22 @@ def criticise(
     base = fit_preset(fit_data, changed(model)) if full else None
     forward, _ = changed(model).build(fit_data)
     if (short := _too_little(data, forward)) is not None:
-        return Criticism(Verdict("insufficient_data", reason=short), data, base, None, None)
+        return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)
     comparison = compare_models(data, forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
-    if base is None:
-        return Criticism(verdict, data, None, None, comparison)
-    seen = comparison if final is comparison else with_noise_of(comparison, final)
-    residuals = residuals_of(seen)
-    suspects = tuple(suspects_of(comparison, seen, fit_data, forward, refined_term))
+    found = Criticism(verdict, data, fit_data, base, None, comparison, final)
+    if not full or found.beside_missing is None:
+        return found
+    suspects = tuple(suspects_of(comparison, found.beside_missing, fit_data, forward, refined_term))
     suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
-    return Criticism(
-        verdict, data, base, _direct_rms_dps(fit_data, model), comparison, residuals,
-        suspects, tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),
-        _explained(initial),
-        views_of(seen, residuals, recording, catalogue),
-    )  # fmt: skip
+    return replace(
+        found,
+        direct_rms_dps=_direct_rms_dps(fit_data, model),
+        suspects=suspects,
+        not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),
+        explained=_explained(initial),
+        views=views_of(found.beside_missing, found.residuals, recording, catalogue),
+    )
 
 
 @single_threaded
@@ -108,22 +131,6 @@ def best_shapes(
     forward, _ = changed(model).build(fit_data_of(points))
     comparison = compare_models(data, forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
-
-
-@single_threaded
-def residuals_beside_missing(found: Criticism, catalogue: Mapping[str, Effect] = CATALOGUE) -> dict[str, Residuals]:
-    """Return the residuals of a criticism with the noise that remains beside all that it found missing.
-
-    Empty where there was too little for a verdict.
-    """
-    comparison = found.comparison
-    if comparison is None:
-        return {}
-    if found.verdict.terms:
-        missing = tuple(replace(term, steady=True) for term in found.verdict.terms.values())
-        fuller = comparison.model.with_terms((*comparison.model.terms, *missing))
-        comparison = with_noise_of(comparison, compare_models(found.data, fuller, catalogue))
-    return residuals_of(comparison)
 
 
 def _direct_rms_dps(data: FitData, model: ErrorModel) -> float | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from labctl.fitting.criticism.evidence.elimination import stack
 from labctl.fitting.criticism.evidence.noise_grid import factors
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.data.noise_floor import NoiseFloor
 from labctl.fitting.data.temperature_levels import ONE_LEVEL_SPAN_C
 from labctl.fitting.numeric.arrays import Array
 
@@ -29,20 +30,12 @@ BACK_SHARE = 0.25
 
 @dataclass(frozen=True)
 class Residuals:
-    """One axis: coordinates (R, m) in deg/s, the floor of the means (m,), and the noise that goes with it."""
+    """One axis: what is left of each data set's mean, the noise floor, and chi2 over the noise."""
 
-    rows: NDArray[np.float64]  #: (R, m)
-    floor_dps: Array  #: (m,) standard deviation of a mean, white and drift together
-    white_dps: float
-    drift_dps: float
-    drift_tau_s: float | None
+    means: Array  #: (m,) deg/s
+    floor_dps: Array  #: (m,) noise of each mean, white and drift together
     chi2: float  #: of all residual coordinates over their noise
     freedom: int  #: degrees of freedom of chi2
-
-    @property
-    def means(self) -> Array:
-        """The residual of each data set's mean, (m,) deg/s."""
-        return self.rows[0]
 
     @property
     def score(self) -> Array:
@@ -50,12 +43,25 @@ class Residuals:
         return self.means / self.floor_dps
 
 
-def residuals_of(comparison: Comparison) -> dict[str, Residuals]:
-    """Return the residuals of each axis beside the base, at the likeliest noise."""
-    return {axis: _axis(comparison, axis) for axis in comparison.axes}
+def residuals_of(
+    comparison: Comparison, floor: NoiseFloor, fitted: Mapping[str, Array] | None = None
+) -> dict[str, Residuals]:
+    """Return the residuals of each axis beside the base, with the noise floor of the recording.
+
+    `fitted` are those of a fit of the same model, axis -> (m,): where they are given they are shown, so that the RMS of
+    what is shown is the error that the fit states.
+    """
+    m = len(comparison.data)
+    floors = {axis: noise.floor_dps for axis, noise in floor.axes.items()}
+    if any(len(values) != m for values in floors.values()):  # long data sets in other pieces
+        floors = {axis: np.full(m, np.sqrt(np.mean(values**2))) for axis, values in floors.items()}
+    found = {axis: _axis(comparison, axis, floors[axis]) for axis in comparison.axes}
+    if fitted is None or any(len(values) != m for values in fitted.values()):
+        return found
+    return {axis: replace(left, means=fitted[axis]) for axis, left in found.items()}
 
 
-def _axis(comparison: Comparison, axis: str) -> Residuals:
+def _axis(comparison: Comparison, axis: str, floor_dps: Array) -> Residuals:
     data, design, found = comparison.data, comparison.designs[axis], comparison.axes[axis]
     y = data.error_dps(axis)
     noise, white = found.best.noise, comparison.white_var[axis]
@@ -70,13 +76,9 @@ def _axis(comparison: Comparison, axis: str) -> Residuals:
     whole = np.vstack([means, other, prior])
     size = np.maximum(np.linalg.norm(whole[:, :-1], axis=0), 1e-300)
     solution, *_ = np.linalg.lstsq(whole[:, :-1] / size, whole[:, -1], rcond=1e-10)
-    drift = float(np.sqrt(sum(w * n.size_dps**2 for w, n in zip(found.weights, found.noises, strict=True))))
     return Residuals(
-        y - design.base @ (solution / size),
-        np.sqrt(white + noise.size_dps**2),
-        float(np.sqrt(np.mean(white))),
-        drift,
-        noise.tau_s or None,
+        (y - design.base @ (solution / size))[0],
+        floor_dps,
         float(np.sum((whole[:, -1] - whole[:, :-1] @ (solution / size)) ** 2)),
         found.rows - found.base_columns,
     )

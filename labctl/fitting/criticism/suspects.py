@@ -21,6 +21,7 @@ from labctl.fitting.criticism.verdict import (
 )
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Term
+from labctl.fitting.effects.derived import with_derived
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
@@ -104,9 +105,9 @@ def _fitted_coefficients(after: FitResult, candidate: Candidate) -> dict[str, di
     for axis in (axis for axis in candidate.option if axis in after.fitted.axes):
         fit = after.fitted.axes[axis]
         rows = [k for k, owner in enumerate(fit.effects) if owner == candidate.id]
-        found[axis] = {
-            # one coefficient for all temperatures: the columns of a table are alike
+        # one coefficient for all temperatures: the columns of a table are alike
+        found[axis] = with_derived({
             fit.names[k]: {"value": float(fit.values[k, 0]), "u": none_for_nan(fit.u)[k][0], "unit": fit.units[k]}
             for k in rows
-        }
+        })  # fmt: skip
     return {axis: values for axis, values in found.items() if values}

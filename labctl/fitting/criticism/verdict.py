@@ -42,7 +42,7 @@ SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
 LEAST_SHARE = 0.3
 #: Columns that are the same up to rounding have the same evidence within this.
 SAME = 0.02
-#: At most this many effects in a group of an ambiguous answer, beside exact aliases of the first.
+#: At most this many effects in a group of an ambiguous answer, beside exact aliases of the first and of the last.
 MOST = 4
 #: A channel of which another explains more than this share cannot be told from it.
 CONFOUNDED = 0.9
@@ -116,11 +116,14 @@ def _is_unexplained(comparison: Comparison, effect: Candidate, smooth: Candidate
 def alias_group(comparison: Comparison, leader: Candidate) -> tuple[str, ...]:
     """Return the leader and the effects that the data cannot distinguish from it, best first.
 
-    At most `MOST`, and beyond them those whose columns are the same as the leader's.
+    At most `MOST`, and beyond them those whose columns are the same as the leader's or as the last one's.
     """
     near = _alike(comparison, leader, physical=True)
     exact = [r for r in near if abs(r.log_bf - leader.log_bf) < SAME]
-    others = [r for r in near if r not in exact][: MOST - 1]
+    others = [r for r in near if r not in exact]
+    if len(others) >= MOST:
+        last = others[MOST - 2].log_bf
+        others = [r for r in others if r.log_bf > last - SAME]
     return (leader.id, *(r.id for r in exact), *(r.id for r in others))
 
 

@@ -14,6 +14,7 @@ from labctl.fitting.data.channels import Channels, channels_of
 from labctl.fitting.data.covered import Covered, covered_by_means, covered_by_readings
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.mean_noise import white_var_of
+from labctl.fitting.data.noise_floor import NoiseFloor, noise_floor_of
 from labctl.fitting.data.temperature_channel import with_temperature
 from labctl.fitting.data.temperature_levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
@@ -43,6 +44,11 @@ class FitData:
     def levels(self) -> NDArray[np.int64] | None:
         """The temperature level of each data set, (m,); None where there are no discrete levels."""
         return temperature_levels(self.temperature_c)
+
+    @cached_property
+    def noise_floor(self) -> NoiseFloor:
+        """The noise of these data sets, whatever the model."""
+        return noise_floor_of(self)
 
     def true_rate_dps(self, axis: str) -> Array:
         """Return the true rate along an axis, (m,) deg/s."""

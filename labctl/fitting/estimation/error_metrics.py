@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.levels import SAME_TEMPERATURE_C
 from labctl.fitting.numeric.arrays import Array
 
 
@@ -58,26 +57,3 @@ def by_turning_axis(data: FitData, errors: Mapping[str, Array]) -> dict[str, dic
         str(axis): {output: Spread.of(values[turning == axis]) for output, values in errors.items()}
         for axis in np.unique(turning)
     }
-
-
-#: Data sets closer than this in rate (of the fastest) and temperature repeat each other.
-REPEAT_RATE = 1e-3
-REPEAT_TEMPERATURE_C = SAME_TEMPERATURE_C
-REPEATS_NEEDED = 8
-
-
-def floor_from_repeats(data: FitData, residual: Mapping[str, Array]) -> float | None:
-    """Return the noise of one data set from pairs that repeat a rate and a temperature; None when they are too few."""
-    rate = np.asarray(data.channels["table_rate_dps"], dtype=np.float64)
-    near_rate = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
-    order = np.lexsort((data.temperature_c, np.round(rate / near_rate)))
-    first, second = order[:-1], order[1:]
-    close = (np.abs(rate[first] - rate[second]) <= near_rate) & (
-        np.abs(data.temperature_c[first] - data.temperature_c[second]) <= REPEAT_TEMPERATURE_C
-    )
-    position = np.asarray(data.channels["position"])
-    close &= position[first] == position[second]
-    if close.sum() < REPEATS_NEEDED:
-        return None
-    differences = np.concatenate([(values[first] - values[second])[close] for values in residual.values()])
-    return float(np.sqrt(np.mean(differences**2) / 2))

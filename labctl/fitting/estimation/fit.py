@@ -10,11 +10,12 @@ import numpy as np
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.noise_floor import AxisNoise
 from labctl.fitting.data.temperature_channel import is_chambers
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.coefficient_tables import from_coefficients
-from labctl.fitting.estimation.error_metrics import ErrorFigures, floor_from_repeats, rms
+from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held_out import held_out_errors
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
@@ -55,14 +56,16 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     fitted = FittedModel(_with_shapes(model, found.fits), found.fits)
     residual = residuals(fitted, data, found.turning)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
-    floor, source = _noise_floor(data, found.solutions, residual)
-    error = ErrorFigures(rms(raw), rms(residual), rms(held_out_errors(data, preset, found.solutions)), floor, source)
+    floor = data.noise_floor
+    error = ErrorFigures(
+        rms(raw), rms(residual), rms(held_out_errors(data, preset, found.solutions)), floor.rms_dps, floor.source
+    )
     return FitResult(
         fitted,
         error,
         data.covered.temperature_c,
         valid_rates_dps(fitted, data),
-        {axis: _noise_json(solution) for axis, solution in found.solutions.items()},
+        {axis: _noise_json(floor.axes[axis], solution) for axis, solution in found.solutions.items()},
         _environment(data, found.turning),
         residual,
     )
@@ -80,21 +83,10 @@ def _with_shapes(model: ErrorModel, fits: Mapping[str, AxisFit]) -> ErrorModel:
     return model.with_terms(tuple(map(shaped, model.terms)))
 
 
-def _noise_floor(
-    data: FitData, solutions: Mapping[str, Solution], residual: Mapping[str, Array]
-) -> tuple[float | None, str]:
-    """Return the noise of a data-set mean, deg/s, white and drift together, and where the figure comes from."""
-    if all(solution.white_dps is not None for solution in solutions.values()):
-        squares = [s.white_dps**2 + s.drift.drift_dps**2 for s in solutions.values() if s.white_dps is not None]
-        return float(np.sqrt(np.mean(squares))), "within and between data sets"
-    repeats = floor_from_repeats(data, residual)
-    return (repeats, "repeats") if repeats is not None else (None, "none")
-
-
-def _noise_json(solution: Solution) -> dict[str, Any]:
-    drift = solution.drift
+def _noise_json(noise: AxisNoise, solution: Solution) -> dict[str, Any]:
+    drift = noise.drift
     return {
-        "white_dps": solution.white_dps,
+        "white_dps": noise.white_dps,
         "drift_dps": drift.drift_dps,
         "drift_tau_s": drift.tau_s if drift.drift_dps > 0 else None,
         "per_rate": drift.per_rate,

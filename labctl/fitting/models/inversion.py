@@ -65,8 +65,13 @@ def _by_newton(outputs: Mapping[str, Array], error_dps: ErrorOfRates) -> dict[st
         change = _largest_change(nearer, rates)
         rates = nearer
         if change < ROUND_STEP_DPS:
-            return rates
+            return rates if _are_near(rates, outputs) else None
     return None
+
+
+def _are_near(rates: Mapping[str, Array], outputs: Mapping[str, Array]) -> bool:
+    """Return whether every rate is one that a gyro with such an output can have had."""
+    return not any(np.any(np.abs(rates[axis] - output) > _reach(output)[-1]) for axis, output in outputs.items())
 
 
 def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: str) -> dict[str, Array]:

@@ -13,7 +13,7 @@ import numpy as np
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
 from labctl.fitting import FitResult
-from labctl.fitting.criticism import best_shapes, criticise, residuals_beside_missing
+from labctl.fitting.criticism import best_shapes, criticise
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formula
 from labctl.fitting.estimation.fit import fit_preset
@@ -114,9 +114,8 @@ def _residuals(store: Store, change: _Change) -> ResidualColumns:
     """Return what a criticism of the changed model would leave, without all else that it says."""
     model = change.after.fitted.model
     readings = load_reduced_readings(store, change.recording, change.points)
-    found = criticise(readings, model, CATALOGUE, points=change.points, full=False)
-    left = residuals_beside_missing(found)
-    return residual_columns(found.data, left, change.points, change.after)
+    found = replace(criticise(readings, model, CATALOGUE, points=change.points, full=False), base=change.after)
+    return residual_columns(found.data, found.residuals, change.points, change.after)
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:

@@ -28,13 +28,13 @@ def ladder(store: Store, serial: str, recording: int | None = None) -> LadderRes
             f"{', '.join(map(str, fitted)) or 'none'}); `labctl fit {serial} --recording {recording}` makes one"
         )
     steps = [_step(row) for row in _by_parentage(here)]
-    floors = [step.noise_floor_dps for step in steps if step.noise_floor_dps is not None]
+    newest = max(steps, key=lambda step: step.version)
     return LadderResponse(
         serial=serial,
         recording=chosen,
         steps=steps,
         others=_applied_here(store, [row for row in rows if row.recording != chosen], chosen),
-        noise_floor_dps=min(floors) if floors else None,
+        noise_floor_dps=newest.noise_floor_dps,
     )
 
 

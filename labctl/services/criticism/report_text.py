@@ -32,6 +32,8 @@ def with_warnings(answer: CriticismResponse, warnings: list[DataWarning]) -> Cri
     return answer.model_copy(update={"warnings": warnings, "text": [*said, *answer.text]})
 
 
+#: Up to this many noise floors an error counts as noise: a model follows no drift, and repeats share some of it.
+AT_FLOOR = 1.25
 #: Channels that run on while temperatures rise.
 HISTORY = frozenset({"t_s", "power_s"})
 
@@ -50,8 +52,8 @@ def answer_of(
         error={
             "rms_dps": base.error.rms_dps if base else None,
             "heldout_rms_dps": base.error.heldout_rms_dps if base else None,
-            "noise_floor_dps": _floor(found),
-            "noise_floor_source": base.error.noise_floor_source if base else "none",
+            "noise_floor_dps": found.floor.rms_dps,
+            "noise_floor_source": found.floor.source,
             "explained": found.explained,
             "direct_form_rms_dps": found.direct_rms_dps,
         },
@@ -75,26 +77,16 @@ def answer_of(
     )
 
 
-def _floor(found: Criticism) -> float | None:
-    """Return the root of the mean variance of a data-set mean, deg/s, beside all that was found missing.
-
-    The fit's own figure counts what it misses as drift.
-    """
-    if found.residuals:
-        return float(np.sqrt(np.mean([np.mean(left.floor_dps**2) for left in found.residuals.values()])))
-    return found.base.error.noise_floor_dps if found.base else None
-
-
 def _noise(found: Criticism) -> dict[str, Any]:
-    parts = list(found.residuals.values())
     static = found.data.static.to_json() if found.data.static is not None else None
-    if not parts:
+    largest = max(found.floor.axes.values(), key=lambda noise: noise.drift.drift_dps)
+    known = [noise.white_dps for noise in found.floor.axes.values() if noise.white_dps is not None]
+    if not known:
         return {"white_dps": None, "drift_dps": None, "drift_tau_s": None, "vs_datasheet": None, "static": static}
-    largest = max(parts, key=lambda r: r.drift_dps)
     return {
-        "white_dps": float(np.sqrt(np.mean([r.white_dps**2 for r in parts]))),
-        "drift_dps": largest.drift_dps,
-        "drift_tau_s": largest.drift_tau_s,
+        "white_dps": float(np.sqrt(np.mean(np.square(known)))),
+        "drift_dps": largest.drift.drift_dps,
+        "drift_tau_s": largest.drift.tau_s if largest.drift.drift_dps > 0 else None,
         "vs_datasheet": found.drift_over_datasheet,
         "static": static,
     }
@@ -206,12 +198,22 @@ def _list(names: Sequence[str]) -> str:
     return ", ".join(names)
 
 
+def _adequate(found: Criticism) -> str:
+    floor, left = found.floor.rms_dps, found.base.error.rms_dps if found.base else None
+    if floor is None or left is None or left <= AT_FLOOR * floor:
+        return "Adequate: nothing is missing, what is left is noise."
+    return (
+        f"Adequate: nothing is missing that this recording can show; what is left is {left / floor:.1f} times the "
+        "noise floor, and does not follow anything that was recorded."
+    )
+
+
 def _first(found: Criticism) -> str:
     verdict = found.verdict
     words = [" or ".join(map(_word, group)) + _on_axes(group, found) for group in verdict.groups]
     match verdict.form:
         case "adequate":
-            return "Adequate: nothing is missing, what is left is noise."
+            return _adequate(found)
         case "missing":
             return f"Missing: {' and '.join(words)}."
         case "ambiguous":

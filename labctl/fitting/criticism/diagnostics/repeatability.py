@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
 from labctl.fitting.criticism.diagnostics.channels import groups_of
-from labctl.fitting.estimation.error_metrics import REPEAT_RATE, REPEAT_TEMPERATURE_C
+from labctl.fitting.data.noise_floor import REPEAT_RATE, REPEAT_TEMPERATURE_C
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 

@@ -125,7 +125,12 @@ def test_a_term_that_predicts_left_out_temperatures_worse_rises() -> None:
 def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
     found = held(made("ojeda2000", 1))
     told = Criticism(
-        Verdict("ambiguous", (("scale_factor_odd", "sine_response"),)), found.data, None, None, found.comparison
+        Verdict("ambiguous", (("scale_factor_odd", "sine_response"),)),
+        found.data,
+        found.fit_data,
+        None,
+        None,
+        found.comparison,
     )
     said = sentences(told, [{"do": "the rates in random order"}, {"do": "another"}])
     assert [line for line in said if line.startswith("To tell")] == ["To tell: the rates in random order."]

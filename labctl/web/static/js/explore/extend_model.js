@@ -36,7 +36,7 @@ export function extendModel(state, path, effects) {
   }
 
   function shown(found) {
-    const floor = Math.min(found.error.noise_floor_dps ?? Infinity, found.before.noise_floor_dps ?? Infinity);
+    const floor = found.error.noise_floor_dps;
     return [
       table([
         { title: "deg/s", cell: ([, title]) => title },
@@ -85,7 +85,7 @@ function residualFigure(state, found, floor) {
     const line = (y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: colour("border-strong"), dash: "dash", width: 1 } });
     return {
       data: [dots(rows.residual, "before", { size: 5, color: colour("border-strong"), symbol: "circle-open" }), dots(after, "after", { size: 6, color: axisColour(state.axis) })],
-      layout: { title: shownText(state.criticism) ? { text: shownText(state.criticism), font: { size: 11 } } : undefined, xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: "residual, deg/s" } }, shapes: Number.isFinite(floor) ? [line(2 * floor), line(-2 * floor)] : [] },
+      layout: { title: shownText(state.criticism) ? { text: shownText(state.criticism), font: { size: 11 } } : undefined, xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: "residual, deg/s" } }, shapes: floor ? [line(2 * floor), line(-2 * floor)] : [] },
     };
   };
   return figure("Residual before and after", "Dashed: two noise floors.", draw, { height: "18rem" });

@@ -1,0 +1,121 @@
+"""Noise floor of a recording: what no model can leave less of, whatever the model that is held against it.
+
+White noise is what the readings within a data set show. The drift between data sets is estimated beside a rich surface
+of rate, temperature and surroundings, by restricted maximum likelihood, so that neither the error of a model nor the
+number of its coefficients enters. Where the readings are unknown the scatter of repeats, or about the surface, stands
+for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.data.levels import SAME_TEMPERATURE_C
+from labctl.fitting.data.rich_surface import LEAST_FREE, rich_surface
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.drift_noise import Drift
+from labctl.fitting.numeric.least_squares import solve
+
+if TYPE_CHECKING:
+    from labctl.fitting.data.fit_data import FitData
+
+#: Data sets closer than this in rate (of the fastest) and temperature repeat each other.
+REPEAT_RATE = 1e-3
+REPEAT_TEMPERATURE_C = SAME_TEMPERATURE_C
+REPEATS_NEEDED = 8
+#: A drift stays within the bias stability that a data sheet states, as two standard deviations.
+DATASHEET_SHARE = 0.5
+
+
+@dataclass(frozen=True)
+class AxisNoise:
+    """Noise of one axis' data-set means."""
+
+    floor_dps: Array  #: (m,) standard deviation of each mean, white and drift together; NaN where it is not known
+    white_dps: float | None  #: root mean square of the white part; None where the readings are not known
+    drift: Drift
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Noise of the data-set means of a recording, by axis, and where the figures are from."""
+
+    axes: Mapping[str, AxisNoise]
+    source: str  #: "within and between data sets", "within data sets and by the data sheet", "repeats", ... or "none"
+
+    @property
+    def rms_dps(self) -> float | None:
+        """The noise of a data-set mean, root mean square over axes and data sets, deg/s; None where it is unknown."""
+        every = np.concatenate([noise.floor_dps for noise in self.axes.values()] or [np.zeros(0)])
+        return float(np.sqrt(np.mean(every**2))) if len(every) and np.all(np.isfinite(every)) else None
+
+
+def noise_floor_of(data: FitData) -> NoiseFloor:
+    """Return the noise of a recording's data sets; it depends on nothing but the recording."""
+    surfaces = {axis: rich_surface(data.channels, axis) for axis in data.outputs}
+    errors = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
+    if data.white_var is not None:
+        return _with_known_white(data, data.white_var, surfaces, errors)
+    left = {axis: values - surfaces[axis] @ (surfaces[axis].T @ values) for axis, values in errors.items()}
+    repeats = repeats_dps(data, left)
+    if repeats is not None:
+        return _of_scatter(data, dict.fromkeys(errors, repeats), "repeats")
+    scatter = {axis: _scatter_dps(left[axis], surfaces[axis]) for axis in left}
+    known = {axis: value for axis, value in scatter.items() if value is not None}
+    if len(known) < len(scatter):
+        return _of_scatter(data, dict.fromkeys(errors, np.nan), "none")
+    return _of_scatter(data, known, "scatter about a smooth surface")
+
+
+def _with_known_white(
+    data: FitData, white_var: Mapping[str, Array], surfaces: Mapping[str, NDArray[np.float64]],
+    errors: Mapping[str, Array],
+) -> NoiseFloor:  # fmt: skip
+    enough = all(len(data) - surface.shape[1] >= LEAST_FREE for surface in surfaces.values())
+    stability = data.info.datasheet.get("bias_stability_dps")
+    axes = {}
+    for axis, surface in surfaces.items():
+        if enough:
+            drift = solve(surface, errors[axis], data.scatter(axis)).drift
+        else:
+            drift = Drift(DATASHEET_SHARE * float(stability or 0.0), 1.0)
+        table = drift.per_rate * data.channels.table_rate_dps()
+        floor = np.sqrt(white_var[axis] + drift.drift_dps**2 + table**2)
+        axes[axis] = AxisNoise(np.asarray(floor), float(np.sqrt(white_var[axis].mean())), drift)
+    if enough:
+        return NoiseFloor(axes, "within and between data sets")
+    return NoiseFloor(axes, "within data sets, and by the data sheet" if stability else "within data sets")
+
+
+def _of_scatter(data: FitData, scatter_dps: Mapping[str, float], source: str) -> NoiseFloor:
+    return NoiseFloor(
+        {axis: AxisNoise(np.full(len(data), value), None, Drift(0.0, 1.0)) for axis, value in scatter_dps.items()},
+        source,
+    )
+
+
+def _scatter_dps(left: Array, surface: NDArray[np.float64]) -> float | None:
+    freedom = len(left) - surface.shape[1]
+    return float(np.sqrt(left @ left / freedom)) if freedom >= LEAST_FREE else None
+
+
+def repeats_dps(data: FitData, residual: Mapping[str, Array]) -> float | None:
+    """Return the noise of one data set from pairs that repeat a rate and a temperature; None when they are too few."""
+    rate = data.channels.table_rate_dps()
+    near_rate = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
+    order = np.lexsort((data.temperature_c, np.round(rate / near_rate)))
+    first, second = order[:-1], order[1:]
+    close = (np.abs(rate[first] - rate[second]) <= near_rate) & (
+        np.abs(data.temperature_c[first] - data.temperature_c[second]) <= REPEAT_TEMPERATURE_C
+    )
+    position = np.asarray(data.channels["position"])
+    close &= position[first] == position[second]
+    if close.sum() < REPEATS_NEEDED:
+        return None
+    differences = np.concatenate([(values[first] - values[second])[close] for values in residual.values()])
+    return float(np.sqrt(np.mean(differences**2) / 2))

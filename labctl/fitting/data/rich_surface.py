@@ -1,0 +1,130 @@
+"""Rich surface of an axis' error: what data sets can have in common whatever the model, so that the rest is noise.
+
+A level of its own for every rate of every position (a dead band or missed steps need no shape), smooth functions of
+temperature that also multiply the rate, what is logged of the surroundings, the time since power-on, and the direction
+in which the temperature goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.levels import rate_levels
+from labctl.fitting.numeric.arrays import Array
+
+#: The surface has at most this share of as many columns as there are data sets, and leaves at least so many free.
+MOST_SHARE, LEAST_FREE = 0.5, 8
+#: Largest degree in temperature of the bias, of the scale factor and of the terms quadratic and cubic in the rate.
+DEGREES = (6, 4, 2, 2)
+#: Time constants of a warm-up after power-on, s.
+WARM_UP_S = (600.0, 3600.0)
+#: A column of which those before it leave less than this share says nothing new.
+LEAST_NEW = 1e-7
+#: What is logged and no cause of an error by itself, or is there in another form.
+NO_SURROUNDINGS = frozenset({
+    "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
+    "since_begin_s", "valid", "temperature_c", "temperature_x_c", "temperature_y_c", "temperature_z_c", "power_s",
+})  # fmt: skip
+
+
+def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
+    """Return orthonormal columns (m, k), the most important first; k is at most half of m, and at most m - 8."""
+    m = len(channels)
+    most = min(int(MOST_SHARE * m), m - LEAST_FREE)
+    found: list[Array] = []
+    for block in _blocks(channels, axis):
+        for column in block.T:
+            if len(found) >= most:
+                return np.column_stack(found) if found else np.zeros((m, 0))
+            if (new := _new_part(column, found)) is not None:
+                found.append(new)
+    return np.column_stack(found) if found else np.zeros((m, 0))
+
+
+def _new_part(column: Array, found: list[Array]) -> Array | None:
+    size = float(np.linalg.norm(column))
+    if size == 0:
+        return None
+    left = column / size
+    if found:
+        basis = np.column_stack(found)
+        for _ in range(2):  # the second time takes out what rounding left
+            left = left - basis @ (basis.T @ left)
+    new = float(np.linalg.norm(left))
+    return np.asarray(left / new) if new > LEAST_NEW else None
+
+
+def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
+    """Yield columns (m, k), the most important first."""
+    m = len(channels)
+    rate = _scaled(channels.rate_dps(axis), about_zero=True)
+    powers = np.column_stack([np.ones(m), rate, rate**2, rate**3])
+    warm = _chebyshev(channels.temperature_c(axis), max(DEGREES))
+    places = np.column_stack([rows.astype(np.float64) for _, rows in channels.positions()])
+    yield places
+    yield powers[:, 1:]
+    for degree in range(1, max(DEGREES) + 1):
+        yield np.column_stack([warm[:, degree] * powers[:, n] for n, most in enumerate(DEGREES) if degree <= most])
+    yield _levels_of_rate(channels)
+    yield from _history(channels, warm, rate)
+    for name in sorted(set(channels.columns) - NO_SURROUNDINGS):
+        values = channels[name]
+        if not name.startswith("gyro_") and np.issubdtype(values.dtype, np.number) and np.all(np.isfinite(values)):
+            around = _scaled(np.asarray(values, dtype=np.float64))
+            yield np.column_stack([around, around * rate])
+    yield np.column_stack([(place * powers[:, 1:].T).T for place in places.T])
+    yield np.column_stack([(place * warm[:, 1:4].T).T for place in places.T])
+
+
+def _levels_of_rate(channels: Channels) -> NDArray[np.float64]:
+    """Return the indicators of every rate of every position, (m, k)."""
+    level = rate_levels(channels.table_rate_dps())
+    position = np.asarray(channels["position"]).astype(np.str_)
+    _, cell = np.unique(np.char.add(position, level.astype(np.str_)), return_inverse=True)
+    return np.asarray(np.eye(int(cell.max()) + 1)[cell])
+
+
+def _history(channels: Channels, warm: NDArray[np.float64], rate: Array) -> Iterator[NDArray[np.float64]]:
+    """Yield what tells rising from falling temperatures, and the time since power-on."""
+    if "t_s" not in channels:
+        return
+    t_s = np.asarray(channels["t_s"], dtype=np.float64)
+    order = np.argsort(t_s, kind="stable")
+    steps = np.diff(warm[order, 1], prepend=warm[order[0], 1])
+    rising = np.empty(len(t_s))
+    rising[order] = np.sign(np.where(np.abs(steps) > 1e-3, steps, 0.0))
+    leg = _carried(rising[order])
+    direction = np.empty(len(t_s))
+    direction[order] = leg
+    if np.ptp(direction) > 0:
+        yield np.column_stack([direction, direction * warm[:, 1], direction * warm[:, 2], direction * rate])
+    since = np.asarray(channels["power_s"], dtype=np.float64) if "power_s" in channels else t_s - t_s.min()
+    since = np.maximum(since, 0.0)
+    decays = np.column_stack([np.exp(-since / tau) for tau in WARM_UP_S])
+    yield np.column_stack([decays, decays * rate[:, None]])
+
+
+def _carried(signs: Array) -> Array:
+    """Return signs (m,) in order of time with each 0 replaced by the last sign before it, at the begin by the first."""
+    where = np.flatnonzero(signs)
+    if not len(where):
+        return signs
+    last = np.searchsorted(where, np.arange(len(signs)), side="right") - 1
+    return np.asarray(signs[where[np.maximum(last, 0)]])
+
+
+def _scaled(values: Array, *, about_zero: bool = False) -> Array:
+    """Return values (m,) in -1 to 1: about their middle, or as they are over the largest."""
+    if about_zero:
+        return np.asarray(values / max(float(np.abs(values).max()), 1e-300))
+    half = float(np.ptp(values)) / 2
+    return np.asarray((values - values.min()) / half - 1.0) if half > 0 else np.zeros(len(values))
+
+
+def _chebyshev(temperature_c: Array, degree: int) -> NDArray[np.float64]:
+    return np.asarray(chebyshev.chebvander(_scaled(temperature_c), degree))

@@ -1,0 +1,93 @@
+"""Noise floor of a recording: that of the simulated units, whatever is hidden in them and however many data sets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from labctl.fitting import fit
+from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.noise_floor import noise_floor_of
+from labctl.fitting.data.rich_surface import rich_surface
+from tests.helpers.simulated_recordings import single_axis
+
+#: Standard deviation of what a simulated unit's bias wanders by, deg/s: half of the data sheet's stability.
+DRIFT_DPS = 0.001
+
+
+def true_floor_dps(data: FitData) -> float:
+    """Return the noise of a mean from the readings' own spread and the drift that was simulated."""
+    assert data.white_var is not None
+    return float(np.sqrt(data.white_var["z"].mean() + DRIFT_DPS**2))
+
+
+def test_it_is_the_noise_that_was_simulated() -> None:
+    ratios = []
+    for seed in range(1, 9):
+        data = fit_data_of(single_axis(seed))
+        floor = data.noise_floor
+        assert floor.source == "within and between data sets"
+        ratios.append((floor.rms_dps or 0.0) / true_floor_dps(data))
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.12)
+    assert max(ratios) < 1.4
+    assert min(ratios) > 0.5  # of 15 h of drift a few hours of one unit may show little
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        {"scale_factor_odd": 1e-6},
+        {"dead_band": 0.02},
+        {"missed_steps": 1e-3},
+        {"saturation": -0.01},
+        {"supply_sensitivity": 0.01},
+    ],
+    ids=lambda hidden: next(iter(hidden)),
+)
+def test_it_does_not_depend_on_what_the_model_misses(hidden: dict[str, float]) -> None:
+    bare, spoiled = single_axis(3), single_axis(3, **hidden)
+    before, after = fit(bare, "bias_scale").error, fit(spoiled, "bias_scale").error
+    assert before.noise_floor_dps is not None
+    assert after.noise_floor_dps == pytest.approx(before.noise_floor_dps, rel=0.1)
+
+
+def test_it_does_not_depend_on_the_model() -> None:
+    recording = single_axis(2, scale_factor_odd=1e-6)
+    floors = {fit(recording, model).error.noise_floor_dps for model in ("bias_scale", "ojeda2000", "weiss1995")}
+    assert len(floors) == 1
+
+
+def test_few_data_sets_have_the_drift_of_the_data_sheet() -> None:
+    data = fit_data_of(single_axis(1))
+    few = data.take(np.arange(len(data)) < 7)
+    floor = noise_floor_of(few)
+    assert floor.source == "within data sets, and by the data sheet"
+    assert floor.rms_dps == pytest.approx(true_floor_dps(few), rel=1e-6)
+
+
+def test_without_readings_repeats_tell_else_the_scatter_else_nothing() -> None:
+    data = replace(fit_data_of(single_axis(1)), white_var=None)
+    scatter = noise_floor_of(data)
+    assert scatter.source == "scatter about a smooth surface"
+    assert scatter.rms_dps == pytest.approx(DRIFT_DPS, rel=0.4)
+    twice = np.repeat(np.arange(len(data)), 2)
+    doubled = replace(
+        data,
+        channels=data.channels.take(twice),
+        outputs={"z": data.outputs["z"][twice] + np.tile([0.01, -0.01], len(data))},
+    )
+    repeats = noise_floor_of(doubled)
+    assert repeats.source == "repeats"
+    assert repeats.rms_dps == pytest.approx(0.01 * np.sqrt(2), rel=0.05)
+    few = noise_floor_of(data.take(np.arange(len(data)) < 7))
+    assert (few.source, few.rms_dps) == ("none", None)
+
+
+def test_the_surface_is_orthonormal_and_leaves_at_least_half() -> None:
+    data = fit_data_of(single_axis(1))
+    surface = rich_surface(data.channels, "z")
+    assert surface.shape[0] == len(data)
+    assert surface.shape[1] <= len(data) // 2
+    assert surface.T @ surface == pytest.approx(np.eye(surface.shape[1]), abs=1e-9)
