@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from labctl.actor import Actor, acting
+from labctl.acting_user import Actor, acting
 from labctl.cli.commands import (
     audit,
     bench,

@@ -9,7 +9,7 @@ from labctl.cli.error_reporting import ending_is_an_interrupt
 from labctl.cli.output import stderr
 from labctl.cli.progress_bar import CampaignProgress
 from labctl.cli.terminal_operator import TerminalOperator
-from labctl.services.commands.foreground import CampaignTerminal, OpenTerminal
+from labctl.services.commands.foreground_control import CampaignTerminal, OpenTerminal
 
 
 def campaign_terminal(*, quiet: bool) -> OpenTerminal:

@@ -15,11 +15,11 @@ import pytest
 
 from labctl.calibration import Calibration, build_calibration, read_calibration
 from labctl.compensator import Compensator
+from labctl.error_per_turn import error_per_turn, static_bias
 from labctl.errors import BadCalibrationFile, BadInput, NotEnoughData
 from labctl.exports import export_calibration
 from labctl.fitting import Channels, fit
 from labctl.recording import Recording
-from labctl.turn_error import error_per_turn, static_bias
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 Grid = tuple[np.ndarray, np.ndarray]

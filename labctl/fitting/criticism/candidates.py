@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.channel_functions import channel_options
-from labctl.fitting.criticism.option import Option
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.earth import turning_size_dps
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
@@ -87,7 +87,7 @@ def _turning(data: ReducedRecording, axis: str) -> list[Column]:
 
 def options_of(
     data: ReducedRecording, axis: str, reference: Reference, catalogue: Mapping[str, Effect] = CATALOGUE
-) -> list[Option]:
+) -> list[CandidateShape]:
     """Return every shape of every testable effect on one axis, and a smooth function of every channel."""
     span, absent = span_of(data), untestable_channels(data, catalogue)
     found = []
@@ -99,13 +99,15 @@ def options_of(
     return found + channel_options(data, axis)
 
 
-def option_of(data: ReducedRecording, axis: str, reference: Reference, kind: Effect, term: Term) -> Option | None:
+def option_of(
+    data: ReducedRecording, axis: str, reference: Reference, kind: Effect, term: Term
+) -> CandidateShape | None:
     """Return one shape of an effect on one axis, or None where it does not touch the axis."""
     columns = [c for c in kind.columns(data.nodes, axis, term, reference) if np.any(c.values)]
     if not columns:
         return None
     rows = np.stack([data.rows(column) for column in columns], axis=2)
-    return Option(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
+    return CandidateShape(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
 
 
 def _is_known(data: ReducedRecording, effect_id: str) -> bool:

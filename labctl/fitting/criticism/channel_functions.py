@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from labctl.fitting.criticism.option import Option
+from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.numeric.arrays import Array
 
@@ -38,7 +38,7 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
     return {name: v for name, v in channels.items() if np.all(np.isfinite(v)) and np.ptp(v) > 1e-9 * (1 + abs(v[0]))}
 
 
-def channel_options(data: ReducedRecording, axis: str) -> list[Option]:
+def channel_options(data: ReducedRecording, axis: str) -> list[CandidateShape]:
     """Return piecewise linear functions, steps and waves of every channel that varies, for one axis."""
     found = []
     for name, values in smooth_channels(data, axis).items():
@@ -51,10 +51,10 @@ def channel_options(data: ReducedRecording, axis: str) -> list[Option]:
     return found
 
 
-def _steps(data: ReducedRecording, name: str, values: Array, places: Array) -> list[Option]:
+def _steps(data: ReducedRecording, name: str, values: Array, places: Array) -> list[CandidateShape]:
     half = SPREAD * np.ptp(values) / 2
     return [
-        Option(
+        CandidateShape(
             name, None, data.rows_of(np.clip((values - place) / half, -1.0, 1.0)[:, None]),
             (f"{name}>{place:.6g}",), ("deg/s",),
         )
@@ -62,18 +62,18 @@ def _steps(data: ReducedRecording, name: str, values: Array, places: Array) -> l
     ]  # fmt: skip
 
 
-def _waves(data: ReducedRecording, name: str, values: Array) -> list[Option]:
+def _waves(data: ReducedRecording, name: str, values: Array) -> list[CandidateShape]:
     phase = 2 * np.pi * (values - values.min()) / np.ptp(values)
     names, units = (f"cos {name}", f"sin {name}"), ("deg/s", "deg/s")
     return [
-        Option(name, None, data.rows_of(np.column_stack([np.cos(n * phase), np.sin(n * phase)])), names, units)
+        CandidateShape(name, None, data.rows_of(np.column_stack([np.cos(n * phase), np.sin(n * phase)])), names, units)
         for n in WAVES_OVER_RANGE
     ]
 
 
-def _smooth(data: ReducedRecording, name: str, values: Array, knots: Array) -> list[Option]:
+def _smooth(data: ReducedRecording, name: str, values: Array, knots: Array) -> list[CandidateShape]:
     if len(knots) < 3:
         return []
     hats = np.column_stack([np.interp(values, knots, np.eye(len(knots))[k]) for k in range(1, len(knots))])
     names = tuple(f"{name}@{knot:.6g}" for knot in knots[1:])
-    return [Option(name, None, data.rows_of(hats), names, ("deg/s",) * len(names))]
+    return [CandidateShape(name, None, data.rows_of(hats), names, ("deg/s",) * len(names))]

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from labctl.fitting.criticism.candidate_shape import slices_of
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
 from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
 from labctl.fitting.criticism.evidence.noise_grid import Noise
-from labctl.fitting.criticism.option import slices_of
 from labctl.fitting.numeric.arrays import Array
 
 
