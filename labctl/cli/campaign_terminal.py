@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
-from labctl.cli.error_reporting import ending_is_an_interrupt
+from labctl.cli.interrupts import ending_is_an_interrupt
 from labctl.cli.output import stderr
 from labctl.cli.progress_bar import CampaignProgress
 from labctl.cli.terminal_operator import TerminalOperator

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from labctl.errors import NotCertified
-from labctl.services.schemas.recordings import UnitResponse
+from labctl.services.schemas.units import UnitResponse
 from labctl.store import Store, Unit
 
 
