@@ -11,6 +11,7 @@ from instruments.bench import check_settings, open_bench
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
 from instruments.drivers import registry
+from instruments.drivers.watlow_f4 import WatlowF4
 
 
 def two_units(**second: Any) -> dict[str, Any]:
@@ -58,7 +59,9 @@ def test_a_driver_of_the_registry_needs_no_other_list(monkeypatch: pytest.Monkey
     record["chamber"]["driver"] = "watlow-f5"
     bench = BenchFile.model_validate(record)
     check_settings(bench)
-    open_bench(bench, VirtualClock()).close()
+    opened = open_bench(bench, VirtualClock())
+    assert isinstance(opened.chamber, WatlowF4)
+    opened.close()
 
 
 def test_a_simulated_gyro_whose_driver_has_no_profile_is_told_to_name_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,4 +75,6 @@ def test_a_simulated_gyro_whose_driver_has_no_profile_is_told_to_name_one(monkey
     with pytest.raises(ValueError, match="gyro driver 'kvh-new': no usual rate is known"):
         open_bench(BenchFile.model_validate(record), VirtualClock())
     gyro["sample_rate_hz"] = 10.0
-    open_bench(BenchFile.model_validate(record), VirtualClock()).close()
+    opened = open_bench(BenchFile.model_validate(record), VirtualClock())
+    assert list(opened.gyros) == ["fog"]
+    opened.close()

@@ -1,1 +1,1 @@
-"""One simulated instrument per protocol; `instruments/simulators/registry.py` lists them by the kind of their address."""
+"""One simulated instrument per protocol; `instruments/simulators/registry.py` lists them by kind."""
