@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from labctl.services.schemas.base import ResponseModel
+
+
+class ExportFormatResponse(ResponseModel):
+    """A format in which a calibration can be had."""
+
+    id: str = Field(description="The value of `format`.")
+    title: str
+    suffix: str = Field(description="Of a file name, without the dot.")
 
 
 class UnitResponse(ResponseModel):
@@ -14,3 +24,4 @@ class UnitResponse(ResponseModel):
     recordings: list[int]
     calibrations: list[int]
     certified_version: int | None
+    formats: list[ExportFormatResponse] = Field(description="In which formats a calibration of it can be had.")
