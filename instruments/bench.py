@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock, SystemClock
@@ -46,9 +49,10 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
     """Return the drivers of a bench; no byte is sent before one of them is used.
 
     `simulation` is the world of the simulated instruments where it exists already. Raises pydantic.ValidationError for
-    options that are not of a gyro's driver, LimitError for an option that the driver cannot use, and ValueError for an
-    unknown profile, setting or hidden effect of the simulation.
+    an unknown driver and for options that are not of a gyro's driver, LimitError for an option that the driver cannot
+    use, and ValueError for an unknown profile, setting or hidden effect of the simulation.
     """
+    check_drivers(bench)
     if simulation is None and bench.has_simulated:
         simulation = open_simulation(bench, clock)
     ports = Ports(clock, None if simulation is None else simulated_links(simulation, clock))
@@ -61,8 +65,25 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
     )
 
 
-def check_options(bench: BenchFile) -> None:
-    """Raise pydantic.ValidationError for options that are not of a gyro's driver; no byte is sent."""
+def check_drivers(bench: BenchFile) -> None:
+    """Raise pydantic.ValidationError with each unknown driver, its place in the bench file and the known names."""
+    given: list[tuple[tuple[str | int, ...], str, Iterable[str]]] = [
+        (("table", "driver"), bench.table.driver, TABLES),
+        (("chamber", "driver"), bench.chamber.driver, CHAMBERS),
+        *((("gyros", number, "driver"), gyro.driver, GYROS) for number, gyro in enumerate(bench.gyros)),
+    ]
+    unknown: list[InitErrorDetails] = [
+        {"type": "literal_error", "loc": place, "input": name, "ctx": {"expected": _alternatives(known)}}
+        for place, name, known in given
+        if name not in known
+    ]
+    if unknown:
+        raise ValidationError.from_exception_data(type(bench).__name__, unknown)
+
+
+def check_settings(bench: BenchFile) -> None:
+    """Raise pydantic.ValidationError for an unknown driver, or options that are not of a gyro's; no byte is sent."""
+    check_drivers(bench)
     clock = SystemClock()
     for gyro in bench.gyros:
         GYROS[gyro.driver](gyro, Ports(clock), clock)
@@ -92,3 +113,9 @@ def _unit_handler(bench: BenchFile, simulation: Simulation | None, clock: Clock)
     if bench.simulation is not None and bench.simulation.control is not None:
         return RemoteUnitHandler(bench.simulation.control)
     return ManualUnitHandler()
+
+
+def _alternatives(names: Iterable[str]) -> str:
+    """Return names as pydantic lists the values of a literal: 'a', 'b' or 'c'."""
+    *most, last = map(repr, names)
+    return f"{', '.join(most)} or {last}" if most else last

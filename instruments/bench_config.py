@@ -1,6 +1,7 @@
 """A bench file: the table, chamber and gyros of one bench, their addresses and their limits.
 
 Real and simulated instruments differ in `port` and `host` only; `sim://...` leads to the simulators of `[simulation]`.
+A `driver` is a name in the registry of drivers. `instruments.bench` checks it: this module is below the drivers.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class Strict(BaseModel):
 class TableSettings(Strict):
     """Address, mechanics and limits of the rate table."""
 
-    driver: Literal["arrick-c4"] = "arrick-c4"
+    driver: str = "arrick-c4"
     port: str
     baudrate: int = 9600
     steps_per_turn: int = 1600  #: half steps of the table, after the reduction
@@ -50,7 +51,7 @@ class TableSettings(Strict):
 class ChamberSettings(Strict):
     """Address, options and limits of the chamber controller."""
 
-    driver: Literal["watlow-f4", "watlow-f4t"]
+    driver: str
     port: str | None = None  #: serial (watlow-f4)
     host: str | None = None  #: Modbus TCP (watlow-f4t)
     tcp_port: int = 502
@@ -78,7 +79,7 @@ class GyroSettings(Strict):
     """One unit on the bench: address, identity and limits of exposure."""
 
     name: str
-    driver: Literal["kvh-dsp3000", "kvh-rd2100", "stim300", "gyrostar"]
+    driver: str
     port: str | None = None  #: serial devices
     host: str | None = None  #: Modbus TCP devices
     tcp_port: int = 502

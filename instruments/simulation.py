@@ -53,7 +53,7 @@ def simulated_links(simulation: Simulation, clock: Clock) -> LinkFactory:
 
 def simulated_unit_handler(simulation: Simulation, clock: Clock) -> UnitHandler:
     """Return the unit handler that turns and switches the units of a simulated world."""
-    from instruments.simulators.unit_handler import SimulatedUnitHandler
+    from instruments.simulators.devices.unit_handler import SimulatedUnitHandler
 
     return SimulatedUnitHandler(simulation.world, clock)
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from instruments.simulators.adam6017 import SimulatedAdam6017
-from instruments.simulators.arrick_c4 import SimulatedC4
-from instruments.simulators.kvh import SimulatedDsp3000, SimulatedRd2100
+from instruments.simulators.devices.adam6017 import SimulatedAdam6017
+from instruments.simulators.devices.arrick_c4 import SimulatedC4
+from instruments.simulators.devices.kvh import SimulatedDsp3000, SimulatedRd2100
+from instruments.simulators.devices.stim300 import SimulatedStim300
+from instruments.simulators.devices.watlow_f4 import SimulatedF4
+from instruments.simulators.devices.watlow_f4t import SimulatedF4T
 from instruments.simulators.links.device import SimulatedDevice
 from instruments.simulators.setup import InstrumentSetup
-from instruments.simulators.stim300 import SimulatedStim300
-from instruments.simulators.watlow_f4 import SimulatedF4
-from instruments.simulators.watlow_f4t import SimulatedF4T
 
 #: Instrument at sim://KIND or sim://KIND/GYRO.
 KINDS: dict[str, Callable[[InstrumentSetup], SimulatedDevice]] = {

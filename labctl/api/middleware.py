@@ -8,7 +8,7 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from labctl.actor import Actor, acting
+from labctl.acting_user import Actor, acting
 from labctl.api.access_policy import OPEN, READING, AccessPolicy, role_needed
 from labctl.api.problems import as_problem
 from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, TooLarge

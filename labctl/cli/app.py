@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from labctl.actor import Actor, acting
+from labctl.acting_user import Actor, acting
 from labctl.cli.commands import (
     audit,
     bench,
@@ -23,7 +23,7 @@ from labctl.cli.commands import (
     schedule,
     server,
 )
-from labctl.cli.error_reporting import process_of_one_command
+from labctl.cli.interrupts import process_of_one_command
 from labctl.config import os_user
 
 app = typer.Typer(

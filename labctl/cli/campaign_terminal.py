@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
-from labctl.cli.error_reporting import ending_is_an_interrupt
+from labctl.cli.interrupts import ending_is_an_interrupt
 from labctl.cli.output import stderr
 from labctl.cli.progress_bar import CampaignProgress
 from labctl.cli.terminal_operator import TerminalOperator
-from labctl.services.commands.foreground import CampaignTerminal, OpenTerminal
+from labctl.services.commands.foreground_control import CampaignTerminal, OpenTerminal
 
 
 def campaign_terminal(*, quiet: bool) -> OpenTerminal:

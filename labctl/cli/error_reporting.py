@@ -2,34 +2,14 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
-from types import FrameType
 
 import typer
 from pydantic import ValidationError
 
+from labctl.cli.interrupts import INTERRUPTED, ignore_signals, signals_restored
 from labctl.cli.output import stderr
-from procedures.execution.signals import ENDING, is_main_thread, restore, signal_handlers
-
-#: Whether the process ends with the command that runs.
-_PROCESS_ENDS: ContextVar[bool] = ContextVar("_PROCESS_ENDS", default=False)
-
-
-@contextmanager
-def process_of_one_command() -> Iterator[None]:
-    """Run the block as the last thing that this process does.
-
-    What an interrupted command ignores then stays ignored until the exit: Python ends by the signal, not by the exit
-    status, when one comes while it waits for its last threads.
-    """
-    token = _PROCESS_ENDS.set(True)
-    try:
-        yield
-    finally:
-        _PROCESS_ENDS.reset(token)
 
 
 @contextmanager
@@ -38,13 +18,8 @@ def one_clear_line() -> Iterator[None]:
 
     Raises typer.Exit. The handlers of signals are restored, unless the process ends with this command.
     """
-    before = {number: signal.getsignal(number) for number in ENDING}
-    try:
-        with _errors_as_lines():
-            yield
-    finally:
-        if not _PROCESS_ENDS.get():
-            restore(before)
+    with signals_restored(), _errors_as_lines():
+        yield
 
 
 @contextmanager
@@ -56,7 +31,7 @@ def _errors_as_lines() -> Iterator[None]:
     try:
         yield
     except Stopped as error:
-        _ignore_signals()
+        ignore_signals()
         raise _exit(str(error), error.exit_status) from error
     except LabctlError as error:
         raise _exit(str(error), error.exit_status) from error
@@ -71,42 +46,14 @@ def _errors_as_lines() -> Iterator[None]:
     except OSError as error:
         raise _exit(f"{error.filename or 'output'}: {error.strerror or error}; nothing was written there", 2) from error
     except KeyboardInterrupt as error:
-        _ignore_signals()
+        ignore_signals()
         # further ones, while what the first one stopped was being closed, change nothing
         stopped: BaseException | None = error
         while stopped is not None and not isinstance(stopped, Stopped):
             stopped = stopped.__context__
-        raise _exit("interrupted" if stopped is None else str(stopped), 130) from None
+        raise _exit("interrupted" if stopped is None else str(stopped), INTERRUPTED) from None
 
 
 def _exit(text: str, status: int) -> typer.Exit:
     stderr.print(f"labctl: {' '.join(text.split())}", markup=False)
     return typer.Exit(status)
-
-
-def _ignore_signals() -> None:
-    """Ignore the ending signals from here to the end of `one_clear_line`, or of the process: they were obeyed."""
-    if is_main_thread():
-        for number in ENDING:
-            signal.signal(number, signal.SIG_IGN)
-
-
-@contextmanager
-def ending_is_an_interrupt() -> Iterator[None]:
-    """Let a request to end (SIGTERM) and a lost terminal (SIGHUP) do what Ctrl-C does: the bench is left safe.
-
-    For use within `one_clear_line`: once a signal came, all are ignored from the end of this block to the end of that.
-    """
-    interrupted = False
-
-    def interrupt(_number: int, _frame: FrameType | None) -> None:
-        nonlocal interrupted
-        interrupted = True
-        raise KeyboardInterrupt
-
-    with signal_handlers(dict.fromkeys(ENDING, interrupt)):
-        try:
-            yield
-        finally:
-            if interrupted:
-                _ignore_signals()  # a handler that was replaced is not restored at the end of the scope

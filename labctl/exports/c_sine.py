@@ -25,10 +25,9 @@ static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c
 {{
     const double degree = 0.017453292519943295;
     double k[{name}_AXES][{name}_AXES], b[{name}_AXES], squared[{name}_AXES], held[{name}_AXES], x[{name}_AXES];
-    double m[{name}_AXES][{name}_AXES + 1], weight[{points}], t = (double)temperature_c;
+    double m[{name}_AXES][{name}_AXES + 1], weight[{points}], t;
     int outside = 0, last, step, i, j, r, c, p;
-    if (!(t >= {name}_temperature_c[0])) {{ t = {name}_temperature_c[0]; outside = 1; }}
-    if (t > {name}_temperature_c[1]) {{ t = {name}_temperature_c[1]; outside = 1; }}
+    t = (double){name}_held_c(temperature_c, &outside);
     for (last = {points} - 1; last < {name}_NODES - 1 && t > {name}_node_c[last]; last++) {{ }}
     for (i = 0; i < {points}; i++) {{
         weight[i] = 1;

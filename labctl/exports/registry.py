@@ -12,16 +12,17 @@ from labctl.exports.c_header import c_header
 
 @dataclass(frozen=True)
 class Format:
-    """A consumer's format."""
+    """A consumer's format: its title on a page, and the suffix of its files."""
 
+    title: str
     media_type: str
     suffix: str
     write: Callable[[Calibration], bytes]
 
 
 FORMATS: dict[str, Format] = {
-    "json": Format("application/json", "json", Calibration.to_bytes),
-    "c": Format("text/x-c", "h", c_header),
+    "json": Format("JSON", "application/json", "json", Calibration.to_bytes),
+    "c": Format("C header", "text/x-c", "h", c_header),
 }
 
 

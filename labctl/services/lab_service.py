@@ -10,7 +10,7 @@ from typing import Any
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
-from labctl.actor import ITSELF, acting
+from labctl.acting_user import ITSELF, acting
 from labctl.errors import StoreError
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
@@ -18,7 +18,7 @@ from labctl.services.campaigns.execution import describe_safe_state
 from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses_of
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.service import ServiceControl
+from labctl.services.commands.service_control import ServiceControl
 from labctl.services.schedule.scheduler import Scheduler
 from labctl.services.schemas.campaigns import (
     CampaignResponse,

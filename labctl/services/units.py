@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from labctl.errors import NotCertified
-from labctl.services.schemas.recordings import UnitResponse
+from labctl.exports import FORMATS
+from labctl.services.schemas.units import ExportFormatResponse, UnitResponse
 from labctl.store import Store, Unit
 
 
@@ -29,4 +30,5 @@ def _answer(store: Store, found: Unit) -> UnitResponse:
         recordings=[row.id for row in store.recordings.of_unit(found.serial)],
         calibrations=store.calibrations.versions(found.serial),
         certified_version=certified,
+        formats=[ExportFormatResponse(id=name, title=each.title, suffix=each.suffix) for name, each in FORMATS.items()],
     )

@@ -13,7 +13,7 @@ from procedures.contracts.steps import Acquire
 from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.campaign_time import CampaignTime
-from procedures.monitoring.recorder import warning
+from procedures.monitoring.event_recorder import warning
 
 LEAD_S = 0.5  #: streams are cleared this long before the gate opens
 BLOCK_S = 1.0  #: readings are written down this often

@@ -15,9 +15,9 @@ from procedures.contracts.journal import CampaignState, Event
 from procedures.contracts.operator import Operator
 from procedures.contracts.steps import Soak
 from procedures.execution.active_bench import ActiveBench
+from procedures.monitoring.event_recorder import CampaignRecorder
 from procedures.monitoring.guards import GuardViolation
 from procedures.monitoring.monitor import BenchMonitor
-from procedures.monitoring.recorder import CampaignRecorder
 from procedures.recipe.recipe import Recipe
 
 CHECK_S = 1.0  #: how long the clock runs at most between two looks at the control

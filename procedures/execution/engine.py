@@ -16,10 +16,10 @@ from procedures.execution.resume import Restart, take_up
 from procedures.execution.shutdown import Outcome, Shutdown
 from procedures.execution.step_executor import StepExecutor
 from procedures.monitoring.campaign_time import CampaignTime
+from procedures.monitoring.event_recorder import CampaignRecorder
 from procedures.monitoring.guards import Guards
 from procedures.monitoring.monitor import BenchMonitor
 from procedures.monitoring.progress import Observer, Progress, ProgressTracker
-from procedures.monitoring.recorder import CampaignRecorder
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan
 

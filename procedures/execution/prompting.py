@@ -8,7 +8,7 @@ from procedures.contracts.errors import StepFailed, Unanswered
 from procedures.contracts.journal import CampaignState, Event
 from procedures.contracts.operator import Answer, Prompt
 from procedures.execution.context import CHECK_S, POLL_S, ExecutionContext
-from procedures.monitoring.recorder import warning
+from procedures.monitoring.event_recorder import warning
 
 
 def ask(context: ExecutionContext, prompt: Prompt) -> Answer:

@@ -11,7 +11,7 @@ from procedures.execution.reconnect import reconnect
 from procedures.execution.recovery import Recovery
 from procedures.execution.step_handlers import HANDLERS, Figures
 from procedures.execution.suspension import suspend
-from procedures.monitoring.recorder import warning
+from procedures.monitoring.event_recorder import warning
 from procedures.planning.plan import Plan
 
 

@@ -15,7 +15,7 @@ from procedures.execution.acquire import acquire
 from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
-from procedures.execution.soak import SoakJudge
+from procedures.execution.soak_criterion import SoakCriterion
 
 Figures = dict[str, float]
 #: A unit that is silent when its stream is opened is asked again after these.
@@ -117,7 +117,7 @@ def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
 
 def soak(context: ExecutionContext, step: Soak) -> Figures:
     """Hold a temperature until the units have taken it. When they do not in time, the recipe says what follows."""
-    judge = SoakJudge(step)
+    judge = SoakCriterion(step)
     began_s = context.clock.now_s() - context.paused_s
     with context.monitor.listening(judge.add):
         for _ in context.polls():
@@ -131,7 +131,7 @@ def soak(context: ExecutionContext, step: Soak) -> Figures:
     return judge.figures()
 
 
-def _unsettled(context: ExecutionContext, step: Soak, judge: SoakJudge, took_s: float) -> None:
+def _unsettled(context: ExecutionContext, step: Soak, judge: SoakCriterion, took_s: float) -> None:
     """Do what the recipe says about a soak that does not settle. Raises SoakFailed or GuardTripped, or warns."""
     action = context.recipe.guards.actions.get("soak", "fail")
     reason = f"the soak at {step.temperature_c:g} deg C did not settle within {step.timeout_s:g} s: {judge.why_not()}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from procedures.contracts.journal import Event
-from procedures.monitoring.recorder import CampaignRecorder
+from procedures.monitoring.event_recorder import CampaignRecorder
 
 LinkState = Literal["well", "degraded", "lost"]  #: degraded: silent for a moment; lost: silent for too long
 

@@ -12,9 +12,9 @@ from instruments.interfaces.table import Spin
 from procedures.contracts.bench import Bench
 from procedures.contracts.journal import EnvironmentSample, Event
 from procedures.monitoring.bench_snapshot import BenchSnapshot, ReadingCounts, gyro_temperature_c
+from procedures.monitoring.event_recorder import CampaignRecorder
 from procedures.monitoring.guards import Guards, GuardViolation
 from procedures.monitoring.links import LinkStates
-from procedures.monitoring.recorder import CampaignRecorder
 
 Listener = Callable[[float, float, Mapping[str, float]], None]  #: campaign time, air and unit temperatures
 

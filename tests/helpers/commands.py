@@ -5,7 +5,7 @@ from __future__ import annotations
 from instruments.clock import Clock
 from labctl.services.commands.command import LocalExecutor
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.foreground import ForegroundControl
+from labctl.services.commands.foreground_control import ForegroundControl
 from labctl.store import Store
 
 

@@ -1,88 +1,23 @@
-"""A calibration file alone is enough: corrected rates, flags, a C header that computes the same, static bias, turns."""
+"""A calibration file alone is enough: corrected rates, and flags outside of the calibrated range."""
 
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
 from collections.abc import Callable
-from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from labctl.calibration import Calibration, build_calibration, read_calibration
-from labctl.compensator import MARGIN_C, MARGIN_SHARE, Compensator
-from labctl.errors import BadCalibrationFile, BadInput, NotEnoughData
-from labctl.exports import export_calibration
+from labctl.calibration import Calibration, read_calibration
+from labctl.compensator import Compensator
+from labctl.errors import BadCalibrationFile, BadInput
 from labctl.fitting import Channels, fit, fit_data_of
 from labctl.recording import Recording, to_points
-from labctl.turn_error import error_per_turn, static_bias
-from tests.helpers.simulated_recordings import single_axis
-from tests.helpers.static_recordings import resting
+from tests.helpers.calibrations import calibrated, inside
 
-AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 Grid = tuple[np.ndarray, np.ndarray]
-
-
-def calibrated(recording: Recording, model: str | None = None, effects: list[str] | None = None) -> Calibration:
-    result = fit(recording, model, effects)
-    return build_calibration(recording.info, result, version=1, parent=None, issued_at=AT, provenance={"recording": 1})
-
-
-@pytest.fixture
-def fog(make_points: Callable[..., Recording], grid_11_by_11: Grid) -> Calibration:
-    rate, warm = grid_11_by_11
-    rng = np.random.default_rng(1)
-    u = (warm - 35) / 10
-    output = rate + 0.2 + 0.05 * u + rate * (0.01 + 0.003 * u) - 4e-7 * rate**3 + rng.normal(0, 1e-3, 121)
-    return calibrated(make_points(rate, warm, output), "ojeda2000")
-
-
-@pytest.fixture
-def mems(triaxial: Callable[[int], Any]) -> Calibration:
-    return calibrated(triaxial(2).campaign(2), "yang2018")
-
-
-@pytest.fixture
-def open_loop(make_points: Callable[..., Recording], grid_11_by_11: Grid) -> Calibration:
-    rate, warm = 3 * grid_11_by_11[0], grid_11_by_11[1]
-    optical = np.rad2deg(np.sin(0.12 * np.deg2rad(rate)) / 0.12)
-    output = optical + rate * (0.01 + 1e-4 * (warm - 30)) + 0.1 + 0.01 * (warm - 30)
-    return calibrated(make_points(rate, warm, output), "bias_scale", ["sine_response"])
-
-
-@pytest.fixture
-def open_loops(triaxial: Callable[[int], Any]) -> Calibration:
-    recording = triaxial(2).campaign(2)
-    columns = dict(recording.columns)
-    for axis, k in zip("xyz", (0.02, 0.05, 0.1), strict=True):
-        own = np.where(columns["position"] == axis, columns["table_rate_dps"], 0.0)
-        columns[f"gyro_{axis}"] = columns[f"gyro_{axis}"] + np.rad2deg(np.sin(k * np.deg2rad(own)) / k) - own
-    return calibrated(replace(recording, columns=columns), "yang2018", ["sine_response"])
-
-
-@pytest.fixture(params=["fog", "mems", "plain", "open_loop", "open_loops"])
-def any_calibration(request: pytest.FixtureRequest) -> Calibration:
-    if request.param == "plain":
-        make, (rate, warm) = request.getfixturevalue("make_points"), request.getfixturevalue("grid_11_by_11")
-        output = rate * (1.01 + 1e-4 * (warm - 30)) + 0.1 + 0.01 * (warm - 30)
-        return calibrated(make(rate, warm, output), "bias_scale")
-    return request.getfixturevalue(request.param)  # type: ignore[no-any-return]
-
-
-@pytest.fixture(scope="module")
-def single_axis_run() -> Recording:
-    return single_axis(3)
-
-
-def inside(calibration: Calibration, n: int = 500) -> tuple[np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(3)
-    (low, high), (slow, fast) = calibration.temperature_c, calibration.rate_dps
-    return rng.uniform(slow, fast, (n, len(calibration.axes))) * 0.9, rng.uniform(low, high, n)
 
 
 def test_every_fast_way_agrees_with_the_model(any_calibration: Calibration) -> None:
@@ -168,107 +103,6 @@ def test_only_what_belongs_to_the_unit_leaves_the_house(fog: Calibration, mems: 
     assert json.loads(mems.to_bytes())["papers"]["yang2018"][0].keys() >= {"Kxx", "Kxy", "Kyx", "Bz", "temperature_c"}
 
 
-MAIN = """
-#include <stdio.h>
-#include "calibration.h"
-int main(void) {{
-    double in[{axes}], t; LABCTL_REAL w[{axes}], rate[{axes}]; int a;
-    while (scanf("%lf", &t) == 1) {{
-        for (a = 0; a < {axes}; a++) {{ if (scanf("%lf", &in[a]) != 1) return 1; w[a] = (LABCTL_REAL)in[a]; }}
-        printf("%d", {name}_correct(w, (LABCTL_REAL)t, rate));
-        for (a = 0; a < {axes}; a++) printf(" %.17g", (double)rate[a]);
-        printf("\\n");
-    }}
-    return 0;
-}}
-"""
-
-
-def in_c(calibration: Calibration, raw: np.ndarray, warm: np.ndarray, folder: Path, real: str = "double") -> np.ndarray:
-    """Compile a calibration's C header; return flag and rates of samples, (n, 1 + axes)."""
-    content, media_type = export_calibration(calibration.to_bytes(), "c")
-    assert media_type == "text/x-c"
-    (folder / "calibration.h").write_bytes(content)
-    name = next(
-        line.split()[1] for line in content.decode().splitlines() if line.endswith(f"_AXES {len(calibration.axes)}")
-    )
-    source = MAIN.format(axes=len(calibration.axes), name=name.removesuffix("_AXES"))
-    (folder / "main.c").write_text(source)
-    compiler = shutil.which("cc")
-    assert compiler is not None
-    command = [compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", f"-DLABCTL_REAL={real}", "-O1", "main.c"]
-    subprocess.run([*command, "-o", "main", "-lm"], cwd=folder, check=True, capture_output=True)
-    lines = "\n".join(f"{t:.17g} " + " ".join(f"{v:.17g}" for v in row) for t, row in zip(warm, raw, strict=True))
-    out = subprocess.run([folder / "main"], input=lines, text=True, check=True, capture_output=True).stdout
-    return np.array([[float(word) for word in line.split()] for line in out.splitlines()])
-
-
-@pytest.mark.needs_cc
-@pytest.mark.parametrize(("real", "tolerance"), [("double", 1e-11), ("float", 2e-3)])
-def test_the_c_header_computes_the_same(
-    any_calibration: Calibration, tmp_path: Path, real: str, tolerance: float
-) -> None:
-    raw, warm = inside(any_calibration, 200)
-    warm = np.append(warm, [any_calibration.temperature_c[1] + 50])
-    raw = np.vstack([raw, raw[:1]])
-    table = in_c(any_calibration, raw, warm, tmp_path, real)
-    expected = Compensator(any_calibration).compensate(raw, warm)
-    assert table[:, 1:] == pytest.approx(expected.rate_dps, abs=tolerance)
-    assert table[:-1, 0].sum() == 0
-    assert table[-1, 0] == 1
-
-
-def test_what_has_no_closed_form_in_c_is_named_alone(
-    make_points: Callable[..., Recording], grid_11_by_11: Grid
-) -> None:
-    rate, warm = grid_11_by_11
-    bent = calibrated(make_points(rate, warm, rate * 1.01 + 0.1), effects=["bias", "scale_factor", "dead_band"])
-    with pytest.raises(BadInput, match=r"without a closed form in C \(dead_band\)"):
-        export_calibration(bent.to_bytes(), "c")
-
-
-def around(low: float, high: float, margin: float) -> np.ndarray:
-    """Return values on, just within and just beyond both edges of a range and of the range with its margin."""
-    edges = np.array([low, high, low - margin, high + margin])
-    just = np.concatenate([edges, np.nextafter(edges, -np.inf), np.nextafter(edges, np.inf)])
-    return np.concatenate([just, edges - 0.3 * margin, edges + 0.3 * margin, np.linspace(low, high, 5), [np.nan]])
-
-
-@pytest.mark.needs_cc
-def test_c_flags_and_corrects_the_samples_that_python_does(any_calibration: Calibration, tmp_path: Path) -> None:
-    (low, high), (slow, fast) = any_calibration.temperature_c, any_calibration.rate_dps
-    temperatures, rates = around(low, high, MARGIN_C), around(slow, fast, MARGIN_SHARE * (fast - slow))
-    warm, first = (grid.ravel() for grid in np.meshgrid(temperatures, rates))
-    raw = np.column_stack([first, *(np.zeros((len(any_calibration.axes) - 1, len(first))))])
-    table = in_c(any_calibration, raw, warm, tmp_path)
-    expected = Compensator(any_calibration).compensate(raw, warm)
-    assert 0 < expected.outside.sum() < len(raw)
-    assert table[:, 0].astype(bool).tolist() == expected.outside.tolist()
-    assert np.allclose(table[:, 1:], expected.rate_dps, rtol=0, atol=1e-9, equal_nan=True)
-
-
-@pytest.fixture
-def at_rest() -> Recording:
-    """Readings of one axis on a loop of temperature at rest, where the Earth turns."""
-    rng = np.random.default_rng(4)
-    warm = np.repeat([*range(20, 41, 5), *range(35, 19, -5)], 40) + rng.normal(0, 0.05, 360)
-    dataset = np.repeat(np.arange(1, 10), 40)
-    moved = {"dataset": dataset, "t_s": np.arange(360.0), "temperature_c": warm}
-    recording = resting(0.1 + 0.002 * (warm - 30) + rng.normal(0, 1e-3, 360), **moved)
-    return replace(recording, info=recording.info.model_copy(update={"latitude_deg": 48.0}))
-
-
-@pytest.mark.needs_cc
-def test_a_model_without_a_rate_in_it_has_no_limit_of_rate(at_rest: Recording, tmp_path: Path) -> None:
-    calibration = calibrated(at_rest, effects=["bias", "bias_temperature"])
-    assert calibration.document["validity"]["rate_dps"] == [None, None]
-    raw, warm = np.array([[0.1], [-300.0], [1e6], [np.nan], [0.1]]), np.array([30.0, 25.0, 35.0, 30.0, 60.0])
-    found = Compensator(read_calibration(calibration.to_bytes())).compensate(raw, warm)
-    assert found.outside.tolist() == [False, False, False, True, True]
-    assert found.rate_dps[1, 0] == pytest.approx(-300.09, abs=0.01)
-    assert in_c(calibration, raw, warm, tmp_path)[:, 0].astype(bool).tolist() == found.outside.tolist()
-
-
 def test_a_calibrations_own_readings_are_inside(at_rest: Recording, single_axis_run: Recording) -> None:
     """Validity is that of the readings: means alone leave out the hottest and coldest of them."""
     for recording, calibration in (
@@ -285,24 +119,3 @@ def test_means_keep_the_range_of_their_readings(single_axis_run: Recording) -> N
     covered = fit_data_of(single_axis_run).covered
     result = fit(to_points(single_axis_run), "ojeda2000", covered=covered)
     assert result.temperature_c == fit(single_axis_run, "ojeda2000").temperature_c
-
-
-def test_unknown_formats_are_named(fog: Calibration) -> None:
-    with pytest.raises(BadInput, match="format 'pdf' is not known"):
-        export_calibration(fog.to_bytes(), "pdf")
-
-
-def test_error_per_turn_is_error_times_time() -> None:
-    assert error_per_turn(np.array([0.1, 0.1]), np.array([10.0, -90.0])) == pytest.approx([3.6, 0.4])
-    with pytest.raises(BadInput, match="rate 4 deg/s"):
-        error_per_turn(np.array([0.1]), np.array([4.0]))
-
-
-def test_static_bias_says_how_well_it_is_known() -> None:
-    rng = np.random.default_rng(1)
-    at_rest = 0.02 + rng.normal(0, 0.0044, 100)
-    found = static_bias(at_rest, instability_dps=0.002)
-    assert found.bias_dps == pytest.approx(0.02, abs=3 * found.u_dps)
-    assert found.u_dps == pytest.approx(np.hypot(0.00044, 0.002), rel=0.1)
-    with pytest.raises(NotEnoughData, match="at least 10"):
-        static_bias(at_rest[:5])

@@ -7,10 +7,10 @@ import pytest
 
 from instruments.bench import open_bench
 from instruments.clock import VirtualClock
+from labctl.error_per_turn import static_bias
 from labctl.errors import BadInput
 from labctl.orientation import Orientation, StandstillRule
 from labctl.services.planning.loading import load_bench
-from labctl.turn_error import static_bias
 
 HZ = 10.0
 

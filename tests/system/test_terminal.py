@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from labctl.actor import Actor, acting, actor
+from labctl.acting_user import Actor, acting, actor
 from labctl.cli import terminal_operator
 from labctl.cli.terminal_operator import TerminalOperator
 from labctl.config import os_user

@@ -54,6 +54,8 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     expect(page.get_by_role("region", name="In force")).to_contain_text("version 2")
     with page.expect_download() as download:
         page.get_by_role("button", name="Download JSON").click()
+    assert download.value.suggested_filename == "FOG-0001.json"
+    expect(page.get_by_role("button", name="Download C header")).to_be_visible()
     file = json.loads(download.value.path().read_bytes())
     assert file["serial"] == "FOG-0001"
     assert "scale_factor_asymmetry" in [term["effect"] for term in file["model"]["terms"]]

@@ -125,12 +125,26 @@ PROFILES: dict[str, Callable[[tuple[str, ...], np.random.Generator], UnitTruth]]
 
 #: Profile of a unit without one in the bench file, by driver.
 DEFAULT_PROFILES = {"stim300": "mems-triaxial", "kvh-rd2100": "rd2100", "kvh-dsp3000": "rd2100", "gyrostar": "gyrostar"}
+#: Sampling rate of a unit, Hz, where the bench file gives none: the rate of the wire.
+USUAL_RATE_HZ = {"stim300": 125.0, "kvh-dsp3000": 100.0, "kvh-rd2100": 10.0, "gyrostar": 10.0}
+
+
+def usual_rate_hz(driver: str) -> float:
+    """Return the sampling rate of a unit without one in the bench file, Hz; raises ValueError where none is known."""
+    if driver not in USUAL_RATE_HZ:
+        raise ValueError(f"gyro driver {driver!r}: no usual rate is known; set sample_rate_hz in the bench file")
+    return USUAL_RATE_HZ[driver]
 
 
 def make_unit(driver: str, axes: tuple[str, ...], settings: dict[str, Any], seed: list[int]) -> UnitTruth:
     """Return one unit of a profile with the deviations of the bench file; raises ValueError for unknown names."""
     given = dict(settings)
-    profile = given.pop("profile", DEFAULT_PROFILES[driver])
+    profile = given.pop("profile", DEFAULT_PROFILES.get(driver))
+    if profile is None:
+        raise ValueError(
+            f"gyro driver {driver!r}: no profile of a simulated unit is known; set one in [simulation.units] of the "
+            f"bench file (there are {', '.join(PROFILES)})"
+        )
     if profile not in PROFILES:
         raise ValueError(f"simulated unit profile {profile!r} is not known (there are {', '.join(PROFILES)})")
     made = PROFILES[profile](axes, np.random.default_rng(seed))

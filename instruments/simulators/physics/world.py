@@ -18,11 +18,9 @@ from instruments.simulators.physics.earth import BodyFrame, EarthRotation
 from instruments.simulators.physics.instability import BiasInstability
 from instruments.simulators.physics.motion import TableMotion
 from instruments.simulators.physics.thermal import Body, Heat
-from instruments.simulators.physics.unit_profiles import UnitTruth, make_unit
+from instruments.simulators.physics.unit_profiles import UnitTruth, make_unit, usual_rate_hz
 
 Array = NDArray[np.float64]
-#: Sampling rate of a unit, Hz, where the bench file gives none: the rate of the wire.
-USUAL_RATE_HZ = {"stim300": 125.0, "kvh-dsp3000": 100.0, "kvh-rd2100": 10.0, "gyrostar": 10.0}
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ class SimulatedGyro:
         self.world = world
         self.settings = settings
         self.truth = truth
-        self.sample_rate_hz = settings.sample_rate_hz or USUAL_RATE_HZ[settings.driver]
+        self.sample_rate_hz = settings.sample_rate_hz or usual_rate_hz(settings.driver)
         seed = [world.settings.seed, zlib.crc32(settings.name.encode()), zlib.crc32(settings.serial.encode())]
         self._rng = np.random.default_rng([*seed, world.settings.noise_seed])
         # one generator for both noises: instability draws first here, white noise first in every sample

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from labctl.api.dependencies import ServiceDep
-from labctl.services.schemas.recordings import UnitResponse
+from labctl.services.schemas.units import UnitResponse
 from labctl.services.units import list_units, unit
 
 router = APIRouter(prefix="/api", tags=["what there is"])

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from labctl.cli.error_reporting import ending_is_an_interrupt, one_clear_line
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.interrupts import ending_is_an_interrupt
 from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import console, print_json, stderr
 

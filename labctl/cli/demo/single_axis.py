@@ -6,8 +6,8 @@ import numpy as np
 
 from labctl.cli.demo.runner import DemoRunner
 from labctl.cli.output import table
+from labctl.error_per_turn import LEAST_RATE_DPS, error_per_turn
 from labctl.fitting import fit, fit_data_of
-from labctl.turn_error import LEAST_RATE_DPS, error_per_turn
 
 SERIAL = "FOG-0001"
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.channel_functions import channel_options
-from labctl.fitting.criticism.option import Option
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.earth import turning_size_dps
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
@@ -93,7 +93,7 @@ def _turning(data: ReducedRecording, axis: str) -> list[Column]:
 
 def options_of(
     data: ReducedRecording, axis: str, reference: Reference, catalogue: Mapping[str, Effect] = CATALOGUE
-) -> list[Option]:
+) -> list[CandidateShape]:
     """Return every shape of every testable effect on one axis, and a smooth function of every channel."""
     span, absent = span_of(data), untestable_channels(data, catalogue)
     turning = bool(np.any(data.nodes.table_rate_dps()))
@@ -108,16 +108,18 @@ def options_of(
     return found + channel_options(data, axis)
 
 
-def option_of(data: ReducedRecording, axis: str, reference: Reference, kind: Effect, term: Term) -> Option | None:
+def option_of(
+    data: ReducedRecording, axis: str, reference: Reference, kind: Effect, term: Term
+) -> CandidateShape | None:
     """Return one shape of an effect on one axis, or None where it does not touch the axis."""
     columns = [c for c in kind.columns(data.nodes, axis, term, reference) if np.any(c.values)]
     if not columns:
         return None
     rows = np.stack([data.rows(column) for column in columns], axis=2)
-    return Option(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
+    return CandidateShape(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))
 
 
-def thermometer_options(data: ReducedRecording, model: ErrorModel, axis: str) -> list[Option]:
+def thermometer_options(data: ReducedRecording, model: ErrorModel, axis: str) -> list[CandidateShape]:
     """Return what a thermometer that drifts in time would do: the base's own slope over temperature, times time."""
     name = f"temperature_{axis}_c" if f"temperature_{axis}_c" in data.nodes else "temperature_c"
     if "t_s" not in data.nodes or name not in data.nodes:
@@ -138,7 +140,7 @@ def thermometer_options(data: ReducedRecording, model: ErrorModel, axis: str) ->
     if not np.ptp(t_s) > 0 or not np.any(slope):
         return []
     elapsed = (t_s - t_s.min()) / np.ptp(t_s)
-    return [Option(THERMOMETER, None, (slope * elapsed)[:, :, None], ("thermometer drift",), ("K",))]
+    return [CandidateShape(THERMOMETER, None, (slope * elapsed)[:, :, None], ("thermometer drift",), ("K",))]
 
 
 def _is_known(data: ReducedRecording, effect_id: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.option import Option
+from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.numeric.arrays import Array
 
@@ -47,7 +47,7 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
     return {name: v for name, v in channels.items() if np.all(np.isfinite(v)) and np.ptp(v) > 1e-9 * (1 + abs(v[0]))}
 
 
-def channel_options(data: ReducedRecording, axis: str) -> list[Option]:
+def channel_options(data: ReducedRecording, axis: str) -> list[CandidateShape]:
     """Return piecewise linear functions, steps and waves of every channel that varies, for one axis.
 
     Each as bias and as scale factor; of temperature also as both. Time since power-on is left out where it is time.
@@ -68,24 +68,24 @@ def channel_options(data: ReducedRecording, axis: str) -> list[Option]:
     return found
 
 
-def _steps(data: ReducedRecording, axis: str, name: str, values: Array, places: Array) -> list[Option]:
+def _steps(data: ReducedRecording, axis: str, name: str, values: Array, places: Array) -> list[CandidateShape]:
     """Return steps of a channel, of the bias, and in time, where a step is sharp, of the scale factor."""
     half = (SHARP if name in TIMES else SPREAD) * np.ptp(values) / 2
     found = []
     for place in places:
         step = np.clip((values - place) / half, -1.0, 1.0)[:, None]
-        found.append(Option(name, None, data.rows_of(step), (f"{name}>{place:.6g}",), ("deg/s",)))
+        found.append(CandidateShape(name, None, data.rows_of(step), (f"{name}>{place:.6g}",), ("deg/s",)))
         if name in TIMES:
             scaled = data.rows_of(step * data.nodes.rate_dps(axis)[:, None])
-            found.append(Option(name, None, scaled, (f"{name}>{place:.6g} x rate",), ("1",)))
+            found.append(CandidateShape(name, None, scaled, (f"{name}>{place:.6g} x rate",), ("1",)))
     return found
 
 
-def _waves(data: ReducedRecording, name: str, values: Array, over_range: tuple[float, ...]) -> list[Option]:
+def _waves(data: ReducedRecording, name: str, values: Array, over_range: tuple[float, ...]) -> list[CandidateShape]:
     phase = 2 * np.pi * (values - values.min()) / np.ptp(values)
     names, units = (f"cos {name}", f"sin {name}"), ("deg/s", "deg/s")
     return [
-        Option(name, None, data.rows_of(np.column_stack([np.cos(n * phase), np.sin(n * phase)])), names, units)
+        CandidateShape(name, None, data.rows_of(np.column_stack([np.cos(n * phase), np.sin(n * phase)])), names, units)
         for n in over_range
     ]
 
@@ -105,18 +105,18 @@ def _knots(values: Array, number: int) -> Array:
     return np.unique(np.quantile(np.unique(np.round(values, 9)), np.linspace(0, 1, number)))
 
 
-def _smooth(data: ReducedRecording, axis: str, name: str, values: Array, number: int) -> list[Option]:
+def _smooth(data: ReducedRecording, axis: str, name: str, values: Array, number: int) -> list[CandidateShape]:
     """Return a piecewise linear function of a channel as bias, as scale factor, and as both."""
     functions = hats(values, number)
     if functions is None:
         return []
     names = tuple(f"{name}@{knot:.6g}" for knot in _knots(values, number)[1:])
-    bias = Option(name, None, data.rows_of(functions), names, ("deg/s",) * len(names))
+    bias = CandidateShape(name, None, data.rows_of(functions), names, ("deg/s",) * len(names))
     if name == "table_rate_dps" or (number == max(KNOTS) and name not in OF_TEMPERATURE_AND_TIME):
         return [bias]
     scaled = data.rows_of(functions * data.nodes.rate_dps(axis)[:, None])
-    scale = Option(name, None, scaled, tuple(f"{each} x rate" for each in names), ("1",) * len(names))
+    scale = CandidateShape(name, None, scaled, tuple(f"{each} x rate" for each in names), ("1",) * len(names))
     if name != "temperature_c":
         return [bias, scale]
     both = np.concatenate([bias.rows, scale.rows], axis=2)
-    return [bias, scale, Option(name, None, both, bias.names + scale.names, bias.units + scale.units)]
+    return [bias, scale, CandidateShape(name, None, both, bias.names + scale.names, bias.units + scale.units)]

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.candidates import base_rows, options_of, thermometer_options
 from labctl.fitting.criticism.evidence.axis_comparison import compare_axis
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
 from labctl.fitting.criticism.evidence.elimination import eliminate_base
 from labctl.fitting.criticism.evidence.gains import gains_of
-from labctl.fitting.criticism.option import Option
 from labctl.fitting.criticism.ranking import Candidate, rank_candidates
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.effects import CATALOGUE, Effect
@@ -93,7 +93,7 @@ def constant_coordinates(base: NDArray[np.float64], data: ReducedRecording) -> N
     return constant if np.max(np.abs(base[0] @ taken - constant[0]), initial=0.0) < 1e-6 else None
 
 
-def centred(option: Option, level: NDArray[np.float64] | None) -> Option:
+def centred(option: CandidateShape, level: NDArray[np.float64] | None) -> CandidateShape:
     """Return an option without its constant part, where the base has that anyway.
 
     A supply of 5 V that wanders by millivolts would otherwise look like nothing but that constant.
@@ -103,7 +103,7 @@ def centred(option: Option, level: NDArray[np.float64] | None) -> Option:
     return replace(option, rows=option.rows - level[:, :, None] * option.rows[0].mean(axis=0))
 
 
-def orthogonalised(option: Option, base: NDArray[np.float64]) -> Option:
+def orthogonalised(option: CandidateShape, base: NDArray[np.float64]) -> CandidateShape:
     """Return a formula orthogonalised to the base (R, m, k); other options unchanged.
 
     A formula is not centred on what was measured: of `supply_v * table_rate_dps` all but a hundredth is scale factor,

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
+from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
 from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.plausibility import log_size_prior
-from labctl.fitting.criticism.option import Option
 from labctl.fitting.effects import Term
 from labctl.fitting.numeric.arrays import Array
 
@@ -98,6 +98,6 @@ def _candidate(
     return Candidate(name, smooth, float(logsumexp(alternatives)), best, term, gain, priors is not None)
 
 
-def _key(option: Option) -> tuple[object, ...]:
+def _key(option: CandidateShape) -> tuple[object, ...]:
     term = option.term
     return () if term is None else (term.effect, term.order, *sorted(term.parameters.items()))

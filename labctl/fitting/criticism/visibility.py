@@ -9,13 +9,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.candidates import untestable_channels
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
 from labctl.fitting.criticism.evidence.elimination import eliminate_base
 from labctl.fitting.criticism.evidence.gains import visible_share
 from labctl.fitting.criticism.evidence.noise_grid import Noise, expected_drift_dps
 from labctl.fitting.criticism.model_comparison import Comparison, design_of
-from labctl.fitting.criticism.option import Option, slices_of
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Effect
@@ -40,7 +40,7 @@ class Schedule:
     left: Mapping[str, EliminatedBase]  #: by axis
     slices: Mapping[str, list[slice]]  #: by axis
 
-    def options(self, axis: str) -> list[tuple[Option, slice]]:
+    def options(self, axis: str) -> list[tuple[CandidateShape, slice]]:
         """Return every shape of every effect on one axis, with its place in the Gram matrix."""
         return list(zip(self.designs[axis].options, self.slices[axis], strict=True))
 

@@ -48,7 +48,8 @@ class FitData:
     @cached_property
     def noise_floor(self) -> NoiseFloor:
         """The noise of these data sets, whatever the model."""
-        return noise_floor_of(self)
+        errors = {axis: self.outputs[axis] - self.true_rate_dps(axis) for axis in self.outputs}
+        return noise_floor_of(self.channels, errors, {axis: self.scatter(axis) for axis in self.outputs})
 
     def true_rate_dps(self, axis: str) -> Array:
         """Return the true rate along an axis, (m,) deg/s."""

@@ -10,19 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.levels import SAME_TEMPERATURE_C
 from labctl.fitting.data.rich_surface import LEAST_FREE, rich_surface
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import Drift
+from labctl.fitting.numeric.drift_noise import Drift, Scatter
 from labctl.fitting.numeric.least_squares import solve
-
-if TYPE_CHECKING:
-    from labctl.fitting.data.fit_data import FitData
 
 #: Data sets closer than this in rate (of the fastest) and temperature repeat each other.
 REPEAT_RATE = 1e-3
@@ -55,46 +52,51 @@ class NoiseFloor:
         return float(np.sqrt(np.mean(every**2))) if len(every) and np.all(np.isfinite(every)) else None
 
 
-def noise_floor_of(data: FitData) -> NoiseFloor:
-    """Return the noise of a recording's data sets; it depends on nothing but the recording."""
-    surfaces = {axis: rich_surface(data.channels, axis) for axis in data.outputs}
-    errors = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
-    if data.white_var is not None:
-        return _with_known_white(data, data.white_var, surfaces, errors)
-    left = {axis: values - surfaces[axis] @ (surfaces[axis].T @ values) for axis, values in errors.items()}
-    repeats = repeats_dps(data, left)
+def noise_floor_of(channels: Channels, errors_dps: Mapping[str, Array], scatter: Mapping[str, Scatter]) -> NoiseFloor:
+    """Return the noise of m data sets; it depends on nothing but the recording.
+
+    `errors_dps` are output minus true rate, axis -> (m,); `scatter` is what the readings and the data sheet say, by
+    axis.
+    """
+    surfaces = {axis: rich_surface(channels, axis) for axis in errors_dps}
+    white = {axis: known.white_var for axis, known in scatter.items()}
+    if all(values is not None for values in white.values()):
+        return _with_known_white(surfaces, errors_dps, scatter)
+    left = {axis: values - surfaces[axis] @ (surfaces[axis].T @ values) for axis, values in errors_dps.items()}
+    m = len(channels)
+    repeats = repeats_dps(channels, left)
     if repeats is not None:
-        return _of_scatter(data, dict.fromkeys(errors, repeats), "repeats")
-    scatter = {axis: _scatter_dps(left[axis], surfaces[axis]) for axis in left}
-    known = {axis: value for axis, value in scatter.items() if value is not None}
-    if len(known) < len(scatter):
-        return _of_scatter(data, dict.fromkeys(errors, np.nan), "none")
-    return _of_scatter(data, known, "scatter about a smooth surface")
+        return _of_scatter(m, dict.fromkeys(errors_dps, repeats), "repeats")
+    about = {axis: _scatter_dps(left[axis], surfaces[axis]) for axis in left}
+    known = {axis: value for axis, value in about.items() if value is not None}
+    if len(known) < len(about):
+        return _of_scatter(m, dict.fromkeys(errors_dps, np.nan), "none")
+    return _of_scatter(m, known, "scatter about a smooth surface")
 
 
 def _with_known_white(
-    data: FitData, white_var: Mapping[str, Array], surfaces: Mapping[str, NDArray[np.float64]],
-    errors: Mapping[str, Array],
-) -> NoiseFloor:  # fmt: skip
-    enough = all(len(data) - surface.shape[1] >= LEAST_FREE for surface in surfaces.values())
-    stability = data.info.datasheet.get("bias_stability_dps")
+    surfaces: Mapping[str, NDArray[np.float64]], errors_dps: Mapping[str, Array], scatter: Mapping[str, Scatter]
+) -> NoiseFloor:
+    enough = all(len(surface) - surface.shape[1] >= LEAST_FREE for surface in surfaces.values())
+    stability = next(iter(scatter.values())).datasheet_drift_dps
     axes = {}
     for axis, surface in surfaces.items():
+        known = scatter[axis]
+        assert known.white_var is not None
         if enough:
-            drift = solve(surface, errors[axis], data.scatter(axis)).drift
+            drift = solve(surface, errors_dps[axis], known).drift
         else:
             drift = Drift(DATASHEET_SHARE * float(stability or 0.0), 1.0)
-        table = drift.per_rate * data.channels.table_rate_dps()
-        floor = np.sqrt(white_var[axis] + drift.drift_dps**2 + table**2)
-        axes[axis] = AxisNoise(np.asarray(floor), float(np.sqrt(white_var[axis].mean())), drift)
+        floor = np.sqrt(known.white_var + drift.drift_dps**2 + (drift.per_rate * known.rate_dps) ** 2)
+        axes[axis] = AxisNoise(np.asarray(floor), float(np.sqrt(known.white_var.mean())), drift)
     if enough:
         return NoiseFloor(axes, "within and between data sets")
     return NoiseFloor(axes, "within data sets, and by the data sheet" if stability else "within data sets")
 
 
-def _of_scatter(data: FitData, scatter_dps: Mapping[str, float], source: str) -> NoiseFloor:
+def _of_scatter(m: int, scatter_dps: Mapping[str, float], source: str) -> NoiseFloor:
     return NoiseFloor(
-        {axis: AxisNoise(np.full(len(data), value), None, Drift(0.0, 1.0)) for axis, value in scatter_dps.items()},
+        {axis: AxisNoise(np.full(m, value), None, Drift(0.0, 1.0)) for axis, value in scatter_dps.items()},
         source,
     )
 
@@ -104,16 +106,17 @@ def _scatter_dps(left: Array, surface: NDArray[np.float64]) -> float | None:
     return float(np.sqrt(left @ left / freedom)) if freedom >= LEAST_FREE else None
 
 
-def repeats_dps(data: FitData, residual: Mapping[str, Array]) -> float | None:
+def repeats_dps(channels: Channels, residual: Mapping[str, Array]) -> float | None:
     """Return the noise of one data set from pairs that repeat a rate and a temperature; None when they are too few."""
-    rate = data.channels.table_rate_dps()
+    rate = channels.table_rate_dps()
+    warm = np.asarray(channels["temperature_c"], dtype=np.float64)
     near_rate = REPEAT_RATE * max(float(np.abs(rate).max()), 1e-9)
-    order = np.lexsort((data.temperature_c, np.round(rate / near_rate)))
+    order = np.lexsort((warm, np.round(rate / near_rate)))
     first, second = order[:-1], order[1:]
     close = (np.abs(rate[first] - rate[second]) <= near_rate) & (
-        np.abs(data.temperature_c[first] - data.temperature_c[second]) <= REPEAT_TEMPERATURE_C
+        np.abs(warm[first] - warm[second]) <= REPEAT_TEMPERATURE_C
     )
-    position = np.asarray(data.channels["position"])
+    position = np.asarray(channels["position"])
     close &= position[first] == position[second]
     if close.sum() < REPEATS_NEEDED:
         return None

@@ -12,17 +12,29 @@ from labctl.fitting.effects import (
     acceleration,
     alignment,
     bias,
+    environment,
     history,
+    nonlinearity,
     rate_table,
     scale_factor,
-    shape,
     surface,
     thermal,
 )
 from labctl.fitting.effects.base import Effect, Term
 from labctl.fitting.effects.formula import Formula
 
-FAMILIES = (bias, scale_factor, surface, alignment, shape, acceleration, rate_table, thermal, history)
+FAMILIES = (
+    bias,
+    scale_factor,
+    surface,
+    alignment,
+    nonlinearity,
+    acceleration,
+    rate_table,
+    thermal,
+    history,
+    environment,
+)
 
 CATALOGUE: Mapping[str, Effect] = MappingProxyType({kind.id: kind() for family in FAMILIES for kind in family.EFFECTS})
 

@@ -1,4 +1,4 @@
-"""What came before: time, power-ons, re-mountings, the rate before this one, the supply."""
+"""What came before: time, power-ons, re-mountings, the rate before this one."""
 
 from __future__ import annotations
 
@@ -122,29 +122,10 @@ class StartTransient(Effect):
         return by_parameter(self.id, tau_s=np.geomspace(1.5, 15.0, 4))
 
 
-class SupplySensitivity(Effect):
-    """Supply sensitivity."""
-
-    id = "supply_sensitivity"
-    term = "Supply voltage sensitivity"
-    sentence = "The bias follows the supply voltage."
-    origin: ClassVar[Origin] = "sensor"
-    rows: ClassVar[Rows] = "all"
-    shows_at_rest = True
-    needs = ("supply_v",)
-    ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.2), "piezo": (0.0, 50.0)}
-    experiment = "steps of 5 % in the supply, at rest and at one rate"
-    draws = ("supply_v", "time")
-
-    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        return [Column("supply", "deg/s/V", np.asarray(channels["supply_v"], dtype=np.float64))]
-
-
 EFFECTS: tuple[type[Effect], ...] = (
     BiasDrift,
     RunShift,
     MountingShift,
     RateHysteresis,
     StartTransient,
-    SupplySensitivity,
 )

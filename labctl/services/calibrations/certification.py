@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 from typing import Literal
 
-from labctl.actor import actor
+from labctl.acting_user import actor
 from labctl.services.schemas.calibrations import (
     CertificationResponse,
     CertifyRequest,

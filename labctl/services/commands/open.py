@@ -10,7 +10,7 @@ from labctl.config import default_database
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.command import Command, CommandExecutor, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.foreground import ForegroundControl, OpenTerminal, no_terminal
+from labctl.services.commands.foreground_control import ForegroundControl, OpenTerminal, no_terminal
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store, holder_of, open_store
 

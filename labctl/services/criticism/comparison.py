@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.calibration import Calibration, read_calibration
+from labctl.error_per_turn import AT_REST_DPS, LEAST_RATE_DPS, bias_at_rest, turn_errors
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -22,7 +23,6 @@ from labctl.services.criticism.verification import applied_errors
 from labctl.services.recordings.loading import newest_row, points_of
 from labctl.services.schemas.comparison import ComparisonColumns, ComparisonResponse
 from labctl.store import Store
-from labctl.turn_error import AT_REST_DPS, LEAST_RATE_DPS, bias_at_rest, turn_errors
 
 
 def compare_version(

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from instruments.bench import check_options
+from instruments.bench import check_settings
 from instruments.bench_config import BenchFile, read_bench, shipped_benches
 from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
@@ -56,7 +56,7 @@ def load_bench(source: str) -> BenchFile:
     """Return a bench by shipped name or path; raises BadBench naming the file and the key."""
     try:
         bench = read_bench(source)
-        check_options(bench)
+        check_settings(bench)
         return bench
     except FileNotFoundError:
         known = ", ".join(shipped_benches())

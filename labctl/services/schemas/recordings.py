@@ -1,4 +1,4 @@
-"""Units and recordings: imports, data sets, traces and Allan deviations."""
+"""Recordings: imports, data sets, traces and Allan deviations."""
 
 from __future__ import annotations
 
@@ -53,17 +53,6 @@ class SimulatedRecordingResponse(ImportResponse):
     bench: str
     seed: int
     hidden: dict[str, float] = Field(description="Effect -> size that is hidden in the unit.")
-
-
-class UnitResponse(ResponseModel):
-    """Who a unit is and what is known of it."""
-
-    serial: str
-    model: str
-    technology: str | None
-    recordings: list[int]
-    calibrations: list[int]
-    certified_version: int | None
 
 
 class RecordingResponse(ResponseModel):

@@ -16,7 +16,7 @@ from sqlalchemy.exc import DatabaseError
 
 from labctl.errors import DiskFull, StoreError
 from labctl.store import migrate
-from labctl.store.connection.commit_counter import count_commit, missing, seal
+from labctl.store.connection.commit_seal import count_commit, missing, seal
 from labctl.store.connection.engines import make_engine
 from labctl.store.connection.location import is_url, shown
 from labctl.store.connection.writer_lock import WriterLock

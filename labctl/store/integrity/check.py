@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from labctl.calibration import read_calibration
 from labctl.errors import BadCalibrationFile, StoreError
 from labctl.store import migrate, sample_codec
-from labctl.store.connection.commit_counter import missing
+from labctl.store.connection.commit_seal import missing
 from labctl.store.connection.database import Database
 from labctl.store.connection.location import is_url
 from labctl.store.integrity.check_means import KeptMeans

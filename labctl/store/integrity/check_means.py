@@ -9,7 +9,7 @@ import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
-from labctl.store.dataset_means import statistics
+from labctl.store.dataset_statistics import statistics
 from labctl.store.repositories.sample_blocks import scaled
 from labctl.store.schema import tables
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from labctl.actor import actor
+from labctl.acting_user import actor
 from labctl.store.connection.database import Database
 from labctl.store.records import AuditRow
 from labctl.store.schema import tables

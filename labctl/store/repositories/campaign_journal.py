@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from instruments.interfaces.gyro import Readings
 from labctl.store import sample_codec
 from labctl.store.connection.database import Database
-from labctl.store.dataset_means import means_rows
+from labctl.store.dataset_statistics import means_rows
 from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.sample_blocks import blocks_of, scaled, write_block

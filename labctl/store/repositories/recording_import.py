@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from labctl.recording import Recording, RecordingInfo, dataset_starts
 from labctl.store import sample_codec
-from labctl.store.dataset_means import means_rows
+from labctl.store.dataset_statistics import means_rows
 from labctl.store.repositories.sample_blocks import WHOLE_TABLE, block_row
 from labctl.store.repositories.units import remember_unit
 from labctl.store.schema import tables

@@ -49,7 +49,7 @@ def gyro(request: pytest.FixtureRequest, stand: Make) -> Any:
 
 def placed(stand: Make, kind: str, name: str) -> Any:
     bench, changes = PLACES[name]
-    s = stand(bench, gyro=changes)
+    s = stand(bench, **{kind: changes})
     s.kind = kind
     s.driver = {"table": s.bench.table, "chamber": s.bench.chamber, "gyro": s.gyro}[kind]
     place = {"table": s.file.table, "chamber": s.file.chamber, "gyro": s.file.gyros[0]}[kind]

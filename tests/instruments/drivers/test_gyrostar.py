@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from instruments.drivers.gyrostar import make_channels
 from instruments.errors import LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.protocols.adam6017 import FULL_CODE, RANGES_V, WiringOptions
-from instruments.simulators.adam6017 import code_of
+from instruments.simulators.devices.adam6017 import code_of
 
 pytest_plugins = ["tests.helpers.modbus_rig"]
 

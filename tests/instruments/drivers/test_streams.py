@@ -167,7 +167,7 @@ def test_what_stands_at_the_rail_is_not_valid(stand: Make) -> None:
 def test_status_bits_make_readings_invalid(stand: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     s = stim(stand)
     s.gyro.start()
-    import instruments.simulators.stim300 as simulated
+    import instruments.simulators.devices.stim300 as simulated
 
     monkeypatch.setattr(simulated, "OVERLOAD", 0)
     good = s.gyro.read(0.5)

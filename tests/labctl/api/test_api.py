@@ -11,6 +11,8 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
+from labctl.calibration import Calibration
+from labctl.exports import FORMATS, Format
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
@@ -62,6 +64,17 @@ def test_uncertainty_criticism_improve_and_ladder(fog: TestClient) -> None:
     formula = fog.get(f"{path}/criticism", params={"formula": "odd: __import__('os')"})
     assert formula.status_code == 400
     assert formula.headers["content-type"] == "application/problem+json"
+
+
+def test_a_unit_names_every_format_of_the_registry(fog: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(FORMATS, "text", Format("Plain text", "text/plain", "txt", Calibration.to_bytes))
+    assert fog.get("/api/units/OSU-FOG-2024").json()["formats"] == [
+        {"id": "json", "title": "JSON", "suffix": "json"},
+        {"id": "c", "title": "C header", "suffix": "h"},
+        {"id": "text", "title": "Plain text", "suffix": "txt"},
+    ]
+    got = fog.get("/api/units/OSU-FOG-2024/calibration", params={"version": 1, "format": "text"})
+    assert got.headers["content-type"].startswith("text/plain")
 
 
 def test_import_fit_certify_fetch(fog: TestClient) -> None:

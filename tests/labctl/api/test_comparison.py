@@ -11,9 +11,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from labctl.calibration import read_calibration
+from labctl.error_per_turn import LEAST_RATE_DPS
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.recording import Recording
-from labctl.turn_error import LEAST_RATE_DPS
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.service import add_recording
 from tests.helpers.simulated_recordings import single_axis

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from labctl.actor import Actor, acting
+from labctl.acting_user import Actor, acting
 from labctl.errors import Stopped
 from labctl.services.campaigns import preparation, resume
 from labctl.services.campaigns.execution import run_here

@@ -15,7 +15,7 @@ from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
 from instruments.clock import SystemClock, VirtualClock
-from labctl.actor import Actor, acting
+from labctl.acting_user import Actor, acting
 from labctl.api import create_app
 from labctl.api.access_policy import ASKING
 from labctl.cli.app import app

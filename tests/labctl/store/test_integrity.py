@@ -26,7 +26,7 @@ from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.calibrations import CertifyRequest, FitRequest
 from labctl.store import Store, check, copy_database, open_store
-from labctl.store.connection import commit_counter as seals
+from labctl.store.connection import commit_seal as seals
 from tests.helpers.commands import local_executor
 from tests.helpers.paths import EXAMPLES
 

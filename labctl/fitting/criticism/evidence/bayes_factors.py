@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
 from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
 from labctl.fitting.criticism.evidence.gains import visible_share
 from labctl.fitting.criticism.evidence.noise_grid import Noise
-from labctl.fitting.criticism.option import Option, slices_of
 from labctl.fitting.effects import kind_of
 from labctl.fitting.numeric.arrays import Array
 
@@ -72,7 +72,7 @@ def evidence(
     )  # fmt: skip
 
 
-def _is_of_base(option: Option) -> bool:
+def _is_of_base(option: CandidateShape) -> bool:
     """Return whether an option is a law of rate and temperature alone."""
     if option.term is None:
         return option.candidate in OF_BASE

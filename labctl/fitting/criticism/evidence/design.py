@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.evidence.noise_grid import Noise
-from labctl.fitting.criticism.option import Option
 from labctl.fitting.numeric.arrays import Array
 
 
@@ -18,7 +18,7 @@ class Design:
 
     base: NDArray[np.float64]  #: (R, m, kb)
     precision: Array  #: (kb,) prior precision of each coefficient of the base, 0: none
-    options: list[Option]
+    options: list[CandidateShape]
     present: NDArray[np.bool_]  #: (R, m): which coordinates exist in which data set
     t_s: Array  #: (m,)
     run: NDArray[np.int64]  #: (m,)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
 from labctl.fitting.criticism.evidence.gains import solve_option
-from labctl.fitting.criticism.option import Option
 from labctl.fitting.effects import CATALOGUE
 from labctl.fitting.numeric.arrays import Array
 
@@ -20,7 +20,7 @@ LARGEST = {"1": 3.0}
 SUPPORTED = 2.0
 
 
-def log_size_prior(option: Option, found: AxisEvidence, index: int, technology: str) -> float:
+def log_size_prior(option: CandidateShape, found: AxisEvidence, index: int, technology: str) -> float:
     """Return the log prior, nats <= 0, of the size that an option is fitted with; -inf where it is not physical.
 
     The prior is flat inside the span of plausible sizes of `technology` and falls as its inverse beyond. A size that
@@ -41,5 +41,5 @@ def log_size_prior(option: Option, found: AxisEvidence, index: int, technology: 
     return -float(np.log(max(least[0] / largest, 1.0)))
 
 
-def _is_beyond_all(option: Option, least: Array) -> bool:
+def _is_beyond_all(option: CandidateShape, least: Array) -> bool:
     return any(size > LARGEST.get(unit, np.inf) for size, unit in zip(least, option.units, strict=True))

@@ -9,7 +9,6 @@ import pytest
 
 from labctl.fitting import fit
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.noise_floor import noise_floor_of
 from labctl.fitting.data.rich_surface import rich_surface
 from tests.helpers.simulated_recordings import single_axis
 
@@ -62,14 +61,14 @@ def test_it_does_not_depend_on_the_model() -> None:
 def test_few_data_sets_have_the_drift_of_the_data_sheet() -> None:
     data = fit_data_of(single_axis(1))
     few = data.take(np.arange(len(data)) < 7)
-    floor = noise_floor_of(few)
+    floor = few.noise_floor
     assert floor.source == "within data sets, and by the data sheet"
     assert floor.rms_dps == pytest.approx(true_floor_dps(few), rel=1e-6)
 
 
 def test_without_readings_repeats_tell_else_the_scatter_else_nothing() -> None:
     data = replace(fit_data_of(single_axis(1)), white_var=None)
-    scatter = noise_floor_of(data)
+    scatter = data.noise_floor
     assert scatter.source == "scatter about a smooth surface"
     assert scatter.rms_dps == pytest.approx(DRIFT_DPS, rel=0.4)
     twice = np.repeat(np.arange(len(data)), 2)
@@ -78,10 +77,10 @@ def test_without_readings_repeats_tell_else_the_scatter_else_nothing() -> None:
         channels=data.channels.take(twice),
         outputs={"z": data.outputs["z"][twice] + np.tile([0.01, -0.01], len(data))},
     )
-    repeats = noise_floor_of(doubled)
+    repeats = doubled.noise_floor
     assert repeats.source == "repeats"
     assert repeats.rms_dps == pytest.approx(0.01 * np.sqrt(2), rel=0.05)
-    few = noise_floor_of(data.take(np.arange(len(data)) < 7))
+    few = data.take(np.arange(len(data)) < 7).noise_floor
     assert (few.source, few.rms_dps) == ("none", None)
 
 

@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
-from labctl.actor import Actor, acting
+from labctl.acting_user import Actor, acting
 from labctl.api import create_app
 from labctl.api.access_policy import AccessPolicy
 from labctl.errors import BenchBusy, Conflict

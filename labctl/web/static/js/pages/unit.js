@@ -8,8 +8,6 @@ import { query, updateQuery, show } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
 
-const FORMATS = [["json", "JSON", "json"], ["c", "C header", "h"]];
-
 export async function page({ params, signal }) {
   const base = `/api/units/${encodeURIComponent(params.serial)}`;
   const [unit, rows, history] = await Promise.all([get(base, { signal }), get(`${base}/calibrations`, { signal }), get(`${base}/certifications`, { signal })]);
@@ -37,7 +35,7 @@ function inForce(unit, rows, force, base) {
     ["RMS error", number(row?.rms_dps), "deg/s"],
     ["At unseen temperatures", number(row?.heldout_rms_dps), "deg/s"],
   ]), left !== null && left < 0 ? notice("bad", "This calibration is overdue.") : null,
-  h("div", { class: "row" }, FORMATS.map(([format, title, suffix]) => button(`Download ${title}`, () => download(`${base}/calibration?format=${format}`, `${unit.serial}.${suffix}`)))));
+  h("div", { class: "row" }, unit.formats.map(({ id, title, suffix }) => button(`Download ${title}`, () => download(`${base}/calibration?format=${encodeURIComponent(id)}`, `${unit.serial}.${suffix}`)))));
 }
 
 function versions(unit, rows, base, explore) {
@@ -50,7 +48,7 @@ function versions(unit, rows, base, explore) {
     { title: "Made", cell: (row) => h("div", { class: "nowrap" }, instant(row.created_at), h("div", { class: "muted small" }, h("code", { title: `hash ${row.hash}` }, row.hash.slice(0, 10)))) },
     { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
     { title: "Unseen, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
-    { title: "", cell: (row) => h("div", { class: "row tight", style: "gap: .2rem" }, act(row), FORMATS.map(([format, title, suffix]) => button(title, () => download(`${base}/calibration?version=${row.version}&format=${format}`, `${unit.serial}-v${row.version}.${suffix}`), { kind: "tiny quiet" }))) },
+    { title: "", cell: (row) => h("div", { class: "row tight", style: "gap: .2rem" }, act(row), unit.formats.map(({ id, title, suffix }) => button(title, () => download(`${base}/calibration?version=${row.version}&format=${encodeURIComponent(id)}`, `${unit.serial}-v${row.version}.${suffix}`), { kind: "tiny quiet" }))) },
   ], rows, { label: "Calibrations", selected: (row) => row.certified }));
 }
 

@@ -10,7 +10,7 @@ import numpy as np
 from procedures.contracts.steps import Soak
 
 
-class SoakJudge:
+class SoakCriterion:
     """Decides from the polls of the bench when the units have taken the temperature, and says why not yet.
 
     The chamber's air is held against the band; leaving it starts the count again. What ends a soak is the unit: the

@@ -1,28 +1,10 @@
-"""Hidden effects of temperature and time."""
+"""Hidden effects of changing temperature: rate of change, lag, hysteresis, warm-up, thermometer."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from instruments.simulators.hidden.base import Array, HiddenEffect, State
-
-
-class BiasTemperature(HiddenEffect):
-    """A bias that follows temperature, bending away from a line."""
-
-    id, unit, default = "bias_temperature", "deg/s/K", 1e-3
-
-    def error_dps(self, state: State, rate_dps: Array) -> Array:
-        return (self.size * 60.0 * np.sinh((state.sensor_c - 25.0) / 60.0))[:, None]
-
-
-class ScaleFactorTemperature(HiddenEffect):
-    """A gain that follows temperature."""
-
-    id, unit, default = "scale_factor_temperature", "1/K", 3e-5
-
-    def error_dps(self, state: State, rate_dps: Array) -> Array:
-        return state.own_dps * np.expm1(self.size * (state.sensor_c - 25.0))[:, None]
 
 
 class TemperatureRate(HiddenEffect):
@@ -63,16 +45,6 @@ class ThermalHysteresis(HiddenEffect):
         return (self.size * side)[:, None]
 
 
-class BiasDrift(HiddenEffect):
-    """A bias that creeps with time, slower and slower; size per hour at first."""
-
-    id, unit, default = "bias_drift", "deg/s/h", 1e-3
-
-    def error_dps(self, state: State, rate_dps: Array) -> Array:
-        hours = state.t_s / 3600.0
-        return (self.size * 200.0 * np.log1p(hours / 200.0))[:, None]
-
-
 class WarmUp(HiddenEffect):
     """A turn-on transient of two time constants."""
 
@@ -99,55 +71,3 @@ class ThermometerError(HiddenEffect):
 
     def thermometer_c(self, state: State) -> Array:
         return self.size * (1.0 + 0.1 * np.tanh((state.sensor_c - 25.0) / 40.0))
-
-
-class RunShift(HiddenEffect):
-    """Another bias after every switching-on; size is the standard deviation."""
-
-    id, unit, default = "run_shift", "deg/s", 0.01
-
-    def __init__(self, size: float, seed: list[int]) -> None:
-        super().__init__(size, seed)
-        self._shifts = self.rng.normal(0.0, 1.0, 4096)
-
-    def number(self, state: State) -> int:
-        """Return what the shift is counted by."""
-        return state.run
-
-    def error_dps(self, state: State, rate_dps: Array) -> Array:
-        shift = self.size * self._shifts[self.number(state) % len(self._shifts)]
-        return np.full((len(state.t_s), 1), shift)
-
-
-class MountingShift(RunShift):
-    """Another bias after every re-mounting."""
-
-    id = "mounting_shift"
-
-    def number(self, state: State) -> int:
-        return state.mounting
-
-
-class OutsideEtalon(HiddenEffect):
-    """No effect of the catalogue: a ripple over temperature, as from a parasitic reflection."""
-
-    id, unit, default = "outside_etalon", "deg/s", 0.01
-
-    def error_dps(self, state: State, rate_dps: Array) -> Array:
-        return (self.size * np.sin(2 * np.pi * state.sensor_c / 13.0 + 0.4))[:, None]
-
-
-EFFECTS: tuple[type[HiddenEffect], ...] = (
-    BiasTemperature,
-    ScaleFactorTemperature,
-    TemperatureRate,
-    ThermalLag,
-    ThermalHysteresis,
-    BiasDrift,
-    WarmUp,
-    SelfHeating,
-    ThermometerError,
-    RunShift,
-    MountingShift,
-    OutsideEtalon,
-)

@@ -7,7 +7,8 @@ import signal
 import pytest
 import typer
 
-from labctl.cli.error_reporting import ending_is_an_interrupt, one_clear_line, process_of_one_command
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.interrupts import ending_is_an_interrupt, process_of_one_command
 from labctl.errors import Stopped
 from procedures.execution.signals import ENDING
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from procedures.contracts.steps import Soak
-from procedures.execution.soak import SoakJudge
+from procedures.execution.soak_criterion import SoakCriterion
 
 STEP = Soak(temperature_c=20, hold_s=600, band_c=0.5, max_drift_c=0.1, drift_window_s=300, timeout_s=5000)
 
 
-def told(chamber_c: list[float], gyro_c: list[float] | None = None, step: Soak = STEP) -> SoakJudge:
-    judge = SoakJudge(step)
+def told(chamber_c: list[float], gyro_c: list[float] | None = None, step: Soak = STEP) -> SoakCriterion:
+    judge = SoakCriterion(step)
     for index, air_c in enumerate(chamber_c):
         judge.add(10.0 * index, air_c, {"imu": gyro_c[index]} if gyro_c else {})
     return judge
@@ -69,7 +69,7 @@ def test_thermometer_noise_does_not_keep_a_soak_open() -> None:
 
 
 def test_every_unit_has_to_come_to_rest() -> None:
-    judge = SoakJudge(STEP)
+    judge = SoakCriterion(STEP)
     for index in range(100):
         judge.add(10.0 * index, 20.0, {"a": 20.0, "b": 20.0 + index / 100})
     assert not judge.settled()

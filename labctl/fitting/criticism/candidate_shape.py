@@ -13,7 +13,7 @@ from labctl.fitting.effects import Term
 
 
 @dataclass(frozen=True)
-class Option:
+class CandidateShape:
     """One shape of one candidate on one axis: its coordinates and the names and units of its k coefficients."""
 
     candidate: str  #: effect id, or a channel's name with `smooth`
@@ -28,7 +28,7 @@ class Option:
         return self.term is None
 
 
-def slices_of(options: Sequence[Option]) -> list[slice]:
+def slices_of(options: Sequence[CandidateShape]) -> list[slice]:
     """Return the place of each option's columns when all options stand side by side."""
     ends = np.cumsum([0, *(option.rows.shape[2] for option in options)])
     return [slice(int(begin), int(end)) for begin, end in pairwise(ends)]

@@ -1,0 +1,1 @@
+"""One simulated instrument per protocol; `instruments/simulators/registry.py` lists them by kind."""

@@ -1,0 +1,70 @@
+"""From a signal that asks the process to end to an interrupt: exit status, handlers, and what later signals do."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from types import FrameType
+
+from procedures.execution.signals import ENDING, is_main_thread, restore, signal_handlers
+
+#: Exit status of an interrupted command: 128 + SIGINT.
+INTERRUPTED = 130
+
+#: Whether the process ends with the command that runs.
+_PROCESS_ENDS: ContextVar[bool] = ContextVar("_PROCESS_ENDS", default=False)
+
+
+@contextmanager
+def process_of_one_command() -> Iterator[None]:
+    """Run the block as the last thing that this process does.
+
+    What an interrupted command ignores then stays ignored until the exit: Python ends by the signal, not by the exit
+    status, when one comes while it waits for its last threads.
+    """
+    token = _PROCESS_ENDS.set(True)
+    try:
+        yield
+    finally:
+        _PROCESS_ENDS.reset(token)
+
+
+@contextmanager
+def signals_restored() -> Iterator[None]:
+    """Restore the handlers of the ending signals at the end, unless the process ends with this command."""
+    before = {number: signal.getsignal(number) for number in ENDING}
+    try:
+        yield
+    finally:
+        if not _PROCESS_ENDS.get():
+            restore(before)
+
+
+def ignore_signals() -> None:
+    """Ignore the ending signals from here to the end of `signals_restored`, or of the process: they were obeyed."""
+    if is_main_thread():
+        for number in ENDING:
+            signal.signal(number, signal.SIG_IGN)
+
+
+@contextmanager
+def ending_is_an_interrupt() -> Iterator[None]:
+    """Let a request to end (SIGTERM) and a lost terminal (SIGHUP) do what Ctrl-C does: the bench is left safe.
+
+    For use within `signals_restored`: once a signal came, all are ignored from the end of this block on.
+    """
+    interrupted = False
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        nonlocal interrupted
+        interrupted = True
+        raise KeyboardInterrupt
+
+    with signal_handlers(dict.fromkeys(ENDING, interrupt)):
+        try:
+            yield
+        finally:
+            if interrupted:
+                ignore_signals()  # a handler that was replaced is not restored at the end of the scope
