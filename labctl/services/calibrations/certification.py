@@ -89,11 +89,14 @@ def _set_in_force(
 
 
 def refusal(known: AssessmentResponse) -> str:
-    """Return in one sentence why a version is not certified, and what to do."""
-    objections = "; ".join(each.text for each in known.objections)
-    todo = "; ".join(dict.fromkeys(each.do for each in known.objections))
+    """Return in one message why a version is not certified, and what to do; of wrong data only the first is said."""
+    data = [each for each in known.objections if each.what == "data"]
+    said = [each for each in known.objections if each not in data[1:]]
+    more = f" (and {len(data) - 1} more in its data)" if len(data) > 1 else ""
+    objections = "; ".join(each.text for each in said)
+    todo = "; ".join(dict.fromkeys(each.do for each in said))
     return (
-        f"certification of version {known.version} of {known.serial} is refused: {objections}. To do: {todo}. To "
+        f"certification of version {known.version} of {known.serial} is refused: {objections}{more}. To do: {todo}. To "
         f"certify it all the same: --override (override: true), with a reason of at least {LEAST_REASON_CHARACTERS} "
         f"characters and {LEAST_REASON_WORDS} words"
     )
