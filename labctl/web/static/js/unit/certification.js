@@ -61,7 +61,7 @@ function assessed(known) {
       ["RMS error", number(known.error.rms_dps), "deg/s", known.error.raw_rms_dps === null ? null : `${number(known.error.raw_rms_dps)} without correction`],
       ["At unseen temperatures", number(known.error.heldout_rms_dps), "deg/s"],
     ]),
-    h("p", {}, known.verdict_text || `No verdict: ${known.verdict_reason}.`),
+    known.objections.some((each) => each.what === "verdict") ? null : h("p", {}, known.verdict_text || `No verdict: ${known.verdict_reason}.`),
     known.objections.length ? notice("bad", h("p", {}, h("strong", {}, "This speaks against it:")), h("ul", { class: "plain" }, known.objections.map((each) => h("li", {}, `${each.text}. To do: ${each.do}.`)))) : null);
 }
 
