@@ -10,6 +10,7 @@ LabctlError              exit 2, HTTP 400
 │   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
 ├── Conflict             somebody else holds it, or it is already so               HTTP 409
+│   ├── CertificationRefused   something speaks against a version; it can be overridden      HTTP 409
 │   └── BenchBusy        somebody drives the bench now: it may be free later          HTTP 409
 ├── NotAllowed           the key's role may not do this, or the request came a way it may not    HTTP 403
 │   └── NotIdentified    no key was given, or it is not one in force                             HTTP 401
@@ -99,6 +100,12 @@ class BenchBusy(Conflict):
     """Somebody drives the bench now: another campaign, or another process. It may be free later."""
 
     slug = "bench-busy"
+
+
+class CertificationRefused(Conflict):
+    """Something speaks against certifying a version; it can be overridden with a reason."""
+
+    slug = "certification-refused"
 
 
 class StoreError(LabctlError):

@@ -55,6 +55,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "ladder": criticism.ladder,
     "certify": calibrations.certify,
     "revoke": calibrations.revoke,
+    "certifications": calibrations.certifications,
     "calibration": calibrations.calibration,
     "compensate": calibrations.compensate,
     "backup": database.backup,

@@ -1,8 +1,8 @@
-"""Fits and coefficients as text."""
+"""Fits, coefficients and certifications as text."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from labctl.cli.output import console, format_number, print_warnings, table
@@ -10,6 +10,7 @@ from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
 if TYPE_CHECKING:
     from labctl.services.schemas.calibrations import FitResponse
+    from labctl.services.schemas.certification import CertificationResponse
 
 
 def print_fit(answer: FitResponse) -> None:
@@ -36,6 +37,40 @@ def print_fit(answer: FitResponse) -> None:
             shown = rounded_to_uncertainty(entry["value"], entry["u"])
             rows.add_row(name, entry["unit"], shown.value + shown.power, shown.u + shown.power if shown.u else "-")
         console.print(rows)
+
+
+def print_certification(answer: CertificationResponse) -> None:
+    """Print an act of certifying or revoking, and what was known of the version."""
+    done = "is now the calibration in force" if answer.act == "certify" else "is no longer in force"
+    console.print(f"{answer.serial} version {answer.version} {done} ({answer.by}: {answer.reason})", markup=False)
+    if answer.act == "certify":
+        console.print(f"  verdict: {_verdict(answer)}", markup=False, soft_wrap=True)
+    _print_objections(answer)
+
+
+def print_certifications(rows: Sequence[CertificationResponse]) -> None:
+    """Print acts, newest first."""
+    if not rows:
+        console.print("nothing has been certified yet")
+    for row in rows:
+        said = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {row.by}: {row.reason}"
+        console.print(said, markup=False, soft_wrap=True)
+        if row.act == "certify":
+            console.print(f"  verdict: {_verdict(row)}", markup=False, soft_wrap=True)
+        _print_objections(row)
+
+
+def _verdict(answer: CertificationResponse) -> str:
+    """Return the verdict that was kept with a certification, in words."""
+    if answer.verdict is not None:
+        when = f", {answer.verdict_at:%Y-%m-%d %H:%M} UTC" if answer.verdict_at else ""
+        return f"{answer.verdict} (recording {answer.verdict_recording}{when}): {answer.verdict_text}"
+    return f"none: {answer.verdict_reason}" if answer.verdict_reason else "not kept"
+
+
+def _print_objections(answer: CertificationResponse) -> None:
+    for each in answer.objections:
+        console.print(f"  overridden: {each.text}", style="bold red", markup=False, soft_wrap=True)
 
 
 def print_table(coefficients: Mapping[str, Any]) -> None:

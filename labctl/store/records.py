@@ -138,6 +138,17 @@ class CalibrationRecord:
 
 
 @dataclass(frozen=True)
+class Judgement:
+    """What was known of a version when it was certified."""
+
+    verdict: str | None  #: of its newest criticism on its own recording; None: impossible, `detail` says why
+    recording: int | None  #: of that criticism
+    at: datetime | None  #: when that criticism was made
+    override: bool  #: whether it was certified against objections
+    detail: Mapping[str, Any]  #: reason, text, error figures, objections
+
+
+@dataclass(frozen=True)
 class CertificationRow:
     """One act of certifying or revoking."""
 
@@ -148,6 +159,7 @@ class CertificationRow:
     reason: str
     at: datetime
     due_at: datetime | None
+    judgement: Judgement | None = None  #: None of a revocation, and of acts before verdicts were kept
 
 
 @dataclass(frozen=True)

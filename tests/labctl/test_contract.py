@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from labctl.api import create_app
+from tests.helpers.certifying import OVERRIDE_OPTIONS
 from tests.helpers.contract_names import command_names, has_key, route_names
 from tests.helpers.lab import Lab
 from tests.helpers.paths import EXAMPLES
@@ -51,7 +52,8 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     told["criticise"] = lab.json("criticise", FOG)
     told["improve"] = lab.json("improve", FOG, "--add", "scale_factor_asymmetry")
     told["ladder"] = lab.json("ladder", FOG)
-    told["certify"] = lab.json("certify", FOG, "2", "--by", "A", "--reason", "fits")
+    told["certify"] = lab.json("certify", FOG, "2", "--by", "A", *OVERRIDE_OPTIONS)
+    told["certifications"] = lab.json("certifications", FOG)
     told["calibration"] = lab.json("calibration", FOG)
     told["revoke"] = lab.json("revoke", FOG, "2", "--by", "A", "--reason", "dropped")
     lab.run("import", str(EXAMPLES / "weiss-gyrostar"))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.helpers.browser import NARROW, WIDE, Faults, Service, settled
+from tests.helpers.certifying import OVERRIDE
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -24,7 +25,7 @@ def furnished(service: Service) -> Service:
     unit = "/api/units/FOG-0001/calibrations"
     service.post(unit, {"effects": ["bias", "scale_factor"]})
     service.post(f"{unit}/1/improve", {"add": ["scale_factor_odd"]})
-    service.post(f"{unit}/1/certify", {"by": "A. Person", "reason": "fits", "due_days": 365})
+    service.post(f"{unit}/1/certify", {"by": "A. Person", "due_days": 365, **OVERRIDE})
     service.post("/api/recordings/example", {"name": "osu-fog"})
     return service
 

@@ -10,6 +10,7 @@ from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.fitting.effects import read_formula
 from labctl.services.calibrations import fitting as services
+from labctl.services.calibrations.assessment import assess
 from labctl.services.calibrations.certification import list_certifications
 from labctl.services.calibrations.revision import preview_unit
 from labctl.services.calibrations.surface import surface_of
@@ -23,8 +24,6 @@ from labctl.services.criticism.plots import pictures_unit
 from labctl.services.criticism.verification import verify_unit
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
-    CertificationResponse,
-    CertifyRequest,
     FitRequest,
     FitResponse,
     ImproveRequest,
@@ -33,6 +32,12 @@ from labctl.services.schemas.calibrations import (
     SurfaceResponse,
     UncertaintyResponse,
     VersionResponse,
+)
+from labctl.services.schemas.certification import (
+    AssessmentResponse,
+    CertificationResponse,
+    CertifyRequest,
+    RevokeRequest,
 )
 from labctl.services.schemas.comparison import ComparisonResponse
 from labctl.services.schemas.criticism import (
@@ -96,6 +101,12 @@ def one_version(serial: str, version: int, service: ServiceDep) -> VersionRespon
 def certifications(serial: str, service: ServiceDep) -> list[CertificationResponse]:
     """Every act of certifying and revoking a version of the unit, newest first: who, why, when, and due when."""
     return list_certifications(service.store, serial)
+
+
+@router.get("/calibrations/{version}/assessment", summary="What speaks against certifying a version")
+def assessment(serial: str, version: int, service: ServiceDep) -> AssessmentResponse:
+    """The verdict on the version by its own recording, its errors, and what certifying it would have to override."""
+    return assess(service.store, serial, version)
 
 
 @router.get("/calibrations/{version}/verification", summary="Apply a version to a recording")
@@ -189,12 +200,13 @@ def ladder(
 def certify(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
     """Make a version the one in force: who, why, and when it is due again. An older version again is a rollback.
 
-    Asks for an approver.
+    Its verdict is kept with the act. 409 where something speaks against it, unless `override` is set and the reason is
+    a sentence. Asks for an approver.
     """
     return service.execute(CERTIFY, ToVersion(serial, version, request))
 
 
 @command_route(router, REVOKE, "Take a version out of force", dependencies=[NEEDS_APPROVER])
-def revoke(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
+def revoke(serial: str, version: int, request: RevokeRequest, service: ServiceDep) -> CertificationResponse:
     """Take the version out of force; the unit then has no certified calibration. Asks for an approver."""
     return service.execute(REVOKE, ToVersion(serial, version, request))

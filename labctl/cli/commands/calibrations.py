@@ -1,24 +1,25 @@
-"""`labctl fit`, `certify`, `revoke`, `calibration` and `compensate`: from a recording to a corrected rate."""
+"""`labctl fit`, `certify`, `revoke`, `certifications`, `calibration`, `compensate`: to a corrected rate."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from labctl.cli.calibration_output import print_fit
+from labctl.cli.calibration_output import print_certification, print_certifications, print_fit
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
 from labctl.cli.output import console, print_json
 
-if TYPE_CHECKING:
-    pass
-
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
 By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it.")]
 Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")]
+Override = Annotated[
+    bool,
+    typer.Option("--override", help="Certify in spite of what speaks against it; the reason must be a sentence."),
+]
 
 
 def fit(
@@ -56,44 +57,56 @@ def certify(
     by: By,
     reason: Reason,
     due_days: Annotated[int | None, typer.Option("--due-days", metavar="N", help="Days until it is due again.")] = None,
+    override: Override = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Make a version the unit's current one. An older version again is a rollback."""
-    _set_in_force("certify", serial, version, by, reason, due_days, as_json, database)
+    """Make a version the unit's current one. An older version again is a rollback.
+
+    Refused where the verdict on it, its errors or its data speak against it, unless --override.
+    """
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import CERTIFY
+    from labctl.services.commands.requests import ToVersion
+    from labctl.services.schemas.certification import CertifyRequest
+
+    with one_clear_line():
+        request = CertifyRequest(by=by, reason=reason, due_days=due_days, override=override)
+        answer = execute(database, CERTIFY, ToVersion(serial, version, request))
+    if as_json:
+        print_json(answer)
+    else:
+        print_certification(answer)
 
 
 def revoke(
     serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
 ) -> None:
     """Take a version out of force."""
-    _set_in_force("revoke", serial, version, by, reason, None, as_json, database)
-
-
-def _set_in_force(
-    act: Literal["certify", "revoke"],
-    serial: str,
-    version: int,
-    by: str,
-    reason: str,
-    due_days: int | None,
-    as_json: bool,
-    database: str | None,
-) -> None:
     from labctl.services.commands.open import execute
-    from labctl.services.commands.registry import CERTIFY, REVOKE
+    from labctl.services.commands.registry import REVOKE
     from labctl.services.commands.requests import ToVersion
-    from labctl.services.schemas.calibrations import CertifyRequest
+    from labctl.services.schemas.certification import RevokeRequest
 
-    command = CERTIFY if act == "certify" else REVOKE
     with one_clear_line():
-        request = CertifyRequest(by=by, reason=reason, due_days=due_days)
-        answer = execute(database, command, ToVersion(serial, version, request))
+        answer = execute(database, REVOKE, ToVersion(serial, version, RevokeRequest(by=by, reason=reason)))
     if as_json:
         print_json(answer)
     else:
-        done = "is now the calibration in force" if act == "certify" else "is no longer in force"
-        console.print(f"{serial} version {version} {done} ({by}: {reason})", markup=False)
+        print_certification(answer)
+
+
+def certifications(serial: Serial, as_json: Json = False, database: Database = None) -> None:
+    """List what was certified and revoked, newest first, with the verdict of then and what was overridden."""
+    from labctl.services.calibrations.certification import list_certifications
+    from labctl.services.commands.open import open_readonly
+
+    with one_clear_line(), open_readonly(database) as store:
+        rows = list_certifications(store, serial)
+    if as_json:
+        print_json(rows)
+    else:
+        print_certifications(rows)
 
 
 def calibration(

@@ -1,4 +1,4 @@
-"""Certification: which version of a calibration is in force, by whom and why."""
+"""Certification: which version of a calibration is in force, by whom and why, and what was known of it."""
 
 from __future__ import annotations
 
@@ -6,11 +6,18 @@ from datetime import datetime, timedelta
 from typing import Literal
 
 from labctl.acting_user import actor
-from labctl.services.schemas.calibrations import (
+from labctl.errors import BadInput, CertificationRefused
+from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
+from labctl.services.schemas.certification import (
+    AssessmentResponse,
     CertificationResponse,
     CertifyRequest,
+    RevokeRequest,
 )
-from labctl.store import CertificationRow, Store
+from labctl.store import CertificationRow, Judgement, Store
+
+#: What is kept of an assessment beside its verdict.
+KEPT = ("verdict_reason", "verdict_text", "error", "objections")
 
 
 def list_certifications(store: Store, serial: str) -> list[CertificationResponse]:
@@ -20,9 +27,17 @@ def list_certifications(store: Store, serial: str) -> list[CertificationResponse
 
 def certification_response(row: CertificationRow) -> CertificationResponse:
     act: Literal["certify", "revoke"] = "certify" if row.act == "certify" else "revoke"
-    return CertificationResponse(
+    response = CertificationResponse(
         serial=row.serial, version=row.version, act=act, by=row.by, reason=row.reason, at=row.at, due=row.due_at
     )
+    known = row.judgement
+    if known is None:
+        return response
+    verdict = {
+        "verdict": known.verdict, "verdict_recording": known.recording, "verdict_at": known.at,
+        "override": known.override, **known.detail,
+    }  # fmt: skip
+    return CertificationResponse.model_validate({**response.model_dump(), **verdict})
 
 
 def version_in_force(store: Store, serial: str) -> int | None:
@@ -30,20 +45,68 @@ def version_in_force(store: Store, serial: str) -> int | None:
     return history[0].version if history and history[0].act == "certify" else None
 
 
-def certify(
+def certify(store: Store, serial: str, version: int, request: CertifyRequest, at: datetime) -> CertificationResponse:
+    """Put a version in force, and keep the verdict on it.
+
+    Raises NotFound; CertificationRefused where something speaks against it and `request` does not override that;
+    BadInput for an override whose reason is no sentence.
+    """
+    if request.override:
+        _refuse_short(request.reason)
+    known = assess(store, serial, version)
+    if known.objections and not request.override:
+        raise CertificationRefused(refusal(known))
+    judgement = Judgement(
+        known.verdict, known.verdict_recording, known.verdict_at, bool(known.objections),
+        known.model_dump(mode="json", include=set(KEPT)),
+    )  # fmt: skip
+    due = at + timedelta(days=request.due_days) if request.due_days else None
+    return _set_in_force(store, serial, version, "certify", request, at, due, judgement)
+
+
+def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: datetime) -> CertificationResponse:
+    """Take a version out of force. Raises NotFound, Conflict."""
+    store.units.get(serial)
+    return _set_in_force(store, serial, version, "revoke", request, at)
+
+
+def _set_in_force(
     store: Store,
     serial: str,
     version: int,
     act: Literal["certify", "revoke"],
-    request: CertifyRequest,
+    request: RevokeRequest,
     at: datetime,
+    due: datetime | None = None,
+    judgement: Judgement | None = None,
 ) -> CertificationResponse:
-    """Put a version in force, or take it out of force. Raises NotFound, Conflict."""
-    store.units.get(serial)
-    due = at + timedelta(days=request.due_days) if request.due_days and act == "certify" else None
-    door = actor()
+    caller = actor()
     row = store.calibrations.certify(
-        serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due,
-        who=door.name if door.via == "key" else request.by,
+        serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due, judgement=judgement,
+        who=caller.name if caller.via == "key" else request.by,
     )  # fmt: skip
-    return CertificationResponse(serial=serial, version=version, act=act, by=row.by, reason=row.reason, at=at, due=due)
+    return certification_response(row)
+
+
+def refusal(known: AssessmentResponse) -> str:
+    """Return in one message why a version is not certified, and what to do; of wrong data only the first is said."""
+    data = [each for each in known.objections if each.what == "data"]
+    said = [each for each in known.objections if each not in data[1:]]
+    more = f" (and {len(data) - 1} more in its data)" if len(data) > 1 else ""
+    objections = "; ".join(each.text for each in said)
+    todo = "; ".join(dict.fromkeys(each.do for each in said))
+    return (
+        f"certification of version {known.version} of {known.serial} is refused: {objections}{more}. To do: {todo}. To "
+        f"certify it all the same: --override (override: true), with a reason of at least {LEAST_REASON_CHARACTERS} "
+        f"characters and {LEAST_REASON_WORDS} words"
+    )
+
+
+def _refuse_short(reason: str) -> None:
+    """Raise BadInput for a reason that is no sentence."""
+    words = reason.split()
+    if len(words) < LEAST_REASON_WORDS or len(" ".join(words)) < LEAST_REASON_CHARACTERS:
+        raise BadInput(
+            f"--reason {reason!r} is too short for an override: say in a sentence of at least "
+            f"{LEAST_REASON_CHARACTERS} characters and {LEAST_REASON_WORDS} words why this version is used all the same"
+        )

@@ -2,23 +2,42 @@
 
 from __future__ import annotations
 
-from labctl.fitting import ErrorFigures
+from typing import Protocol
+
 from labctl.recording.sanity import Finding
 
-#: A fit that leaves more than this many times the raw error is certainly wrong; from 1 on it is said.
-REFUSED = 1.02
-#: A change is said to be worse from these ratios of errors on: on its own data, and on temperatures left out.
-WORSE, WORSE_HELD_OUT = 1.01, 1.1
+#: Errors that differ by less than this share are the same: what the rounding of a refit leaves.
+ROUNDING = 1e-6
+#: A changed model's error of its own data rises by more than this share: said.
+WORSE = 1.01
+#: A version is worse than another one of the same recording from this ratio of their errors on.
+WORSE_VERSION = 1.01
 
 
-def worse_than_raw(error: ErrorFigures) -> list[Finding]:
-    """Return a finding where a fit leaves more of its own data than there was without any correction."""
+class Errors(Protocol):
+    """Error figures, deg/s; None where one is not known."""
+
+    @property
+    def raw_rms_dps(self) -> float | None:
+        """Of the output without correction."""
+
+    @property
+    def rms_dps(self) -> float | None:
+        """On the data of the fit."""
+
+    @property
+    def heldout_rms_dps(self) -> float | None:
+        """On temperatures left out of the fit."""
+
+
+def worse_than_raw(error: Errors) -> list[Finding]:
+    """Return a finding, a certain one, where a fit leaves more of its own data than there was without correction."""
     raw, left = error.raw_rms_dps, error.rms_dps
-    if raw is None or left is None or not left > raw:
+    if raw is None or left is None or not left > (1.0 + ROUNDING) * raw:
         return []
     return [
         Finding(
-            "worse", "certain" if left > REFUSED * raw else "likely", "fit",
+            "worse", "certain", "fit",
             f"it leaves {left:.4g} deg/s RMS of its own data, where the output without correction is off by "
             f"{raw:.4g} deg/s", left, "deg/s", f"less than {raw:.4g} deg/s",
             "check sign, unit and axes of the output, or choose another model",
@@ -26,18 +45,36 @@ def worse_than_raw(error: ErrorFigures) -> list[Finding]:
     ]  # fmt: skip
 
 
-def worse_than_before(before: ErrorFigures, after: ErrorFigures) -> list[Finding]:
-    """Return findings where a changed model is worse than the one it was made from."""
+def worse_than_before(before: Errors, after: Errors) -> list[Finding]:
+    """Return findings where a changed model is worse than the one it was made from, or predicts no better."""
     found = worse_than_raw(after)
-    for name, first, second, ratio in (
-        ("RMS", before.rms_dps, after.rms_dps, WORSE),
-        ("held-out RMS", before.heldout_rms_dps, after.heldout_rms_dps, WORSE_HELD_OUT),
-    ):
-        if first is not None and second is not None and second > ratio * first:
-            found.append(
-                Finding(
-                    "worse", "likely", "change", f"the {name} error rises from {first:.4g} to {second:.4g} deg/s",
-                    second, "deg/s", f"at most {first:.4g} deg/s", "leave the model as it was",
-                )
-            )  # fmt: skip
+    first, second = before.rms_dps, after.rms_dps
+    if first is not None and second is not None and second > WORSE * first:
+        found.append(_of_change(f"the RMS error rises from {first:.4g} to {second:.4g} deg/s", first, second))
+    first, second = before.heldout_rms_dps, after.heldout_rms_dps
+    if first is not None and second is not None and second >= first:
+        rises = second > (1.0 + ROUNDING) * first
+        said = f"the held-out RMS error {'rises' if rises else 'does not fall'}: {first:.4g} deg/s before, "
+        found.append(_of_change(f"{said}{second:.4g} deg/s after", first, second))
     return found
+
+
+def _of_change(said: str, first: float, second: float) -> Finding:
+    return Finding(
+        "worse", "likely", "change", said, second, "deg/s", f"less than {first:.4g} deg/s", "leave the model as it was"
+    )
+
+
+def worse_than_version(other: Errors, own: Errors) -> str:
+    """Return in words by which error a version is worse than another one of the same recording; empty where it is not.
+
+    The held-out error decides; where one of them has none, the error of their own data.
+    """
+    for name, first, second in (
+        ("held-out", other.heldout_rms_dps, own.heldout_rms_dps),
+        ("RMS", other.rms_dps, own.rms_dps),
+    ):
+        if first is not None and second is not None:
+            said = f"its {name} error, {second:.4g} deg/s, is worse than the {first:.4g} deg/s"
+            return said if second > WORSE_VERSION * first else ""
+    return ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from labctl.services.admin import api_keys
 from labctl.services.calibrations import certification, fitting, revision
@@ -26,14 +26,9 @@ from labctl.services.recordings import examples, transfer
 from labctl.services.schedule import queue
 from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
 from labctl.services.schemas.benches import BenchStatus, ClearRequest
-from labctl.services.schemas.calibrations import (
-    CertificationResponse,
-    CertifyRequest,
-    FitRequest,
-    FitResponse,
-    ImproveRequest,
-)
+from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.services.schemas.certification import CertificationResponse, CertifyRequest, RevokeRequest
 from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
@@ -65,17 +60,11 @@ def _improve(context: CommandContext, asked: ToNewestOrVersion[ImproveRequest]) 
 
 
 def _certify(context: CommandContext, asked: ToVersion[CertifyRequest]) -> CertificationResponse:
-    return _set_in_force(context, asked, "certify")
+    return certification.certify(context.store, asked.serial, asked.version, asked.body, context.now())
 
 
-def _revoke(context: CommandContext, asked: ToVersion[CertifyRequest]) -> CertificationResponse:
-    return _set_in_force(context, asked, "revoke")
-
-
-def _set_in_force(
-    context: CommandContext, asked: ToVersion[CertifyRequest], act: Literal["certify", "revoke"]
-) -> CertificationResponse:
-    return certification.certify(context.store, asked.serial, asked.version, act, asked.body, context.now())
+def _revoke(context: CommandContext, asked: ToVersion[RevokeRequest]) -> CertificationResponse:
+    return certification.revoke(context.store, asked.serial, asked.version, asked.body, context.now())
 
 
 def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:

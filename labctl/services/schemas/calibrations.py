@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.certification import CertificationResponse
 from labctl.services.schemas.criticism import ResidualColumns
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
@@ -35,14 +36,6 @@ class ImproveRequest(Request):
     version: int | None = Field(default=None, description="Version to change; default: the newest.")
     recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
     accept_warnings: bool = Field(default=False, description=ACCEPT)
-
-
-class CertifyRequest(Request):
-    """Who makes a version current, and why."""
-
-    by: str = Field(min_length=1)
-    reason: str = Field(min_length=1)
-    due_days: int | None = Field(default=None, gt=0, le=36_500, description="Days until the unit is due again.")
 
 
 class ModelResponse(ResponseModel):
@@ -143,18 +136,6 @@ class CalibrationRow(ResponseModel):
     certified: bool
     rms_dps: float | None = None
     heldout_rms_dps: float | None = None
-
-
-class CertificationResponse(ResponseModel):
-    """A certification or its revocation."""
-
-    serial: str
-    version: int
-    act: Literal["certify", "revoke"]
-    by: str
-    reason: str
-    at: datetime
-    due: datetime | None = None
 
 
 class VersionResponse(FitResponse):

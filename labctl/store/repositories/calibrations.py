@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from labctl.errors import Conflict, NotCertified, NotFound
 from labctl.store.connection.database import Database
-from labctl.store.records import CalibrationRecord, CertificationRow
+from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
 from labctl.store.repositories.audit import append
 from labctl.store.schema import tables
 
@@ -26,6 +26,43 @@ def _in_force_query() -> sa.Select[bytes, str]:
     last = sa.select(sa.func.max(x.id)).where(x.serial == sa.bindparam("serial")).scalar_subquery()
     act = sa.select(x.version).where(x.id == last, x.act == "certify").scalar_subquery()
     return _document_query().where(tables.calibrations.c.version == act)
+
+
+def _acts_query() -> sa.Select[Any]:
+    """Return the query of a unit's acts of certifying and revoking, newest first."""
+    x = tables.certifications.c
+    columns = (x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at)
+    judgement = (x.verdict, x.verdict_recording, x.verdict_at, x.override, x.assessment)
+    return sa.select(*columns, *judgement).where(x.serial == sa.bindparam("serial")).order_by(x.id.desc())
+
+
+_ACTS = _acts_query()
+
+
+def _act(row: sa.Row[Any]) -> CertificationRow:
+    known = None
+    if row.override is not None:
+        detail = row.assessment or {}
+        known = Judgement(row.verdict, row.verdict_recording, row.verdict_at, bool(row.override), detail)
+    return CertificationRow(row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, known)
+
+
+def _judgement_columns(judgement: Judgement | None) -> dict[str, Any]:
+    if judgement is None:
+        return {}
+    return {
+        "verdict": judgement.verdict, "verdict_recording": judgement.recording, "verdict_at": judgement.at,
+        "override": judgement.override, "assessment": dict(judgement.detail),
+    }  # fmt: skip
+
+
+def _audited(judgement: Judgement) -> dict[str, Any]:
+    """Return what the audit trail keeps of a judgement, so that a later change of its row shows."""
+    return {
+        "verdict": judgement.verdict, "recording": judgement.recording,
+        "verdict_at": judgement.at.isoformat() if judgement.at else None, "override": judgement.override,
+        "objections": [each["text"] for each in judgement.detail.get("objections", [])],
+    }  # fmt: skip
 
 
 #: Made once: what every GET asks.
@@ -109,11 +146,9 @@ class Calibrations:
         return act.version
 
     def _last_act(self, serial: str) -> CertificationRow | None:
-        x = tables.certifications.c
-        query = sa.select(x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at).where(x.serial == serial)
         with self._database.reading() as connection:
-            row = connection.execute(query.order_by(x.id.desc()).limit(1)).first()
-        return None if row is None else CertificationRow(*row)
+            row = connection.execute(_ACTS.limit(1), {"serial": serial}).first()
+        return None if row is None else _act(row)
 
     def certify(
         self,
@@ -126,24 +161,29 @@ class Calibrations:
         at: datetime,
         due_at: datetime | None = None,
         who: str | None = None,
+        judgement: Judgement | None = None,
     ) -> CertificationRow:
         """Put a version in force, or take the one in force out of it. Raises NotFound, Conflict.
 
-        `by` is the person who answers for it; `who` did it, where that is known better than by whose word.
+        `by` is the person who answers for it; `who` did it, where that is known better than by whose word;
+        `judgement` is what was known of the version.
         """
         self.get(serial, version)
         last = self._last_act(serial)
         in_force = last.version if last is not None and last.act == "certify" else None
         if act == "revoke" and in_force != version:
             raise Conflict(f"{serial} version {version} is not in force (in force: {in_force or 'none'})")
-        row = CertificationRow(serial, version, act, by, reason, at, due_at)
+        row = CertificationRow(serial, version, act, by, reason, at, due_at, judgement)
         with self._database.writing() as connection:
             connection.execute(
                 sa.insert(tables.certifications).values(
-                    serial=serial, version=version, act=act, by=by, reason=reason, at=at, due_at=due_at
+                    serial=serial, version=version, act=act, by=by, reason=reason, at=at, due_at=due_at,
+                    **_judgement_columns(judgement),
                 )
-            )
+            )  # fmt: skip
             detail = {"by": by, "reason": reason, "due": due_at.isoformat() if due_at else None}
+            if judgement is not None:
+                detail |= _audited(judgement)
             append(connection, at, act, f"{serial} version {version}", detail, who=who or by)
         return row
 
@@ -166,10 +206,8 @@ class Calibrations:
 
     def history(self, serial: str) -> list[CertificationRow]:
         """Return every act of certifying and revoking, newest first."""
-        x = tables.certifications.c
-        query = sa.select(x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at).where(x.serial == serial)
         with self._database.reading() as connection:
-            return [CertificationRow(*row) for row in connection.execute(query.order_by(x.id.desc()))]
+            return [_act(row) for row in connection.execute(_ACTS, {"serial": serial})]
 
     def versions(self, serial: str) -> list[int]:
         """Return a unit's version numbers, rising."""

@@ -33,6 +33,11 @@ certifications = sa.Table(
     sa.Column("reason", sa.Text, nullable=False),
     sa.Column("at", Instant, nullable=False),
     sa.Column("due_at", Instant),
+    sa.Column("verdict", sa.String(20)),
+    sa.Column("verdict_recording", RowId),
+    sa.Column("verdict_at", Instant),
+    sa.Column("override", sa.Boolean),
+    sa.Column("assessment", sa.JSON(none_as_null=True)),
     sa.ForeignKeyConstraint(["serial", "version"], ["calibrations.serial", "calibrations.version"]),
     sa.Index(None, "serial", "id"),
 )

@@ -17,15 +17,17 @@ from labctl.services.commands.registry import CERTIFY, FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import CertifyRequest, FitRequest
+from labctl.services.schemas.calibrations import FitRequest
+from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
+from tests.helpers.certifying import REASON
 from tests.helpers.paths import EXAMPLES
 
 UNIT = "OSU-FOG-2024"
 THERE = {"serial": UNIT, "version": 1, "recording": 1}
 #: Seconds of work each: of these only few reach a version that is there.
-COSTLY = ("/criticism", "/improve", "/preview", "/residuals", "/pictures")
+COSTLY = ("/criticism", "/improve", "/preview", "/residuals", "/pictures", "/assessment", "/certify")
 #: Of each operation; drawn from the same seed every time.
 EXAMPLES_EACH, SEED = 10, 1
 
@@ -37,7 +39,7 @@ def application(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     lab_service = LabService(store, VirtualClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
     lab_service.execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
     lab_service.execute(FIT, ToUnit(UNIT, FitRequest(effects=["bias", "scale_factor"])))
-    lab_service.execute(CERTIFY, ToVersion(UNIT, 1, CertifyRequest(by="A", reason="B")))
+    lab_service.execute(CERTIFY, ToVersion(UNIT, 1, CertifyRequest(by="A", reason=REASON, override=True)))
     made = create_app(lab_service)
     assert schema["/health"]["GET"].Case().call(app=made).status_code == 200  # begins the event loop that all share
     yield made

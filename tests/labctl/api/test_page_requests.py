@@ -14,6 +14,7 @@ from labctl.compensator import Compensator
 from labctl.recording import Recording
 from labctl.services.criticism import measurements
 from labctl.store import Store
+from tests.helpers.certifying import OVERRIDE
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.service import add_recording, service_of
 
@@ -37,7 +38,7 @@ def test_a_version_says_whether_it_is_in_force(fog: TestClient) -> None:
         1, None, False, None,
     )  # fmt: skip
     assert version["created_at"].endswith("Z")
-    fog.post(f"{FOG}/calibrations/2/certify", json={"by": "A", "reason": "fits", "due_days": 365})
+    fog.post(f"{FOG}/calibrations/2/certify", json={"by": "A", "due_days": 365, **OVERRIDE})
     now = fog.get(f"{FOG}/calibrations/2").json()
     assert now["in_force"] is True
     assert now["due"] == now["certification"]["due"] > now["created_at"]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from labctl.fitting import ErrorFigures
+from labctl.fitting import ErrorFigures, FitResult, fit
 from labctl.recording import Recording, to_points, write_recording
+from labctl.services.calibrations import fitting
 from labctl.services.calibrations.comparison import worse_than_before, worse_than_raw
 from tests.helpers.lab import Lab
 from tests.helpers.recordings import Triaxial
@@ -43,7 +46,10 @@ def test_good_data_have_no_warning_anywhere(lab: Lab, brought_in: Callable[[Reco
     found = lab.json("criticise", FOG)
     assert found["warnings"] == []
     assert found["text"][0] == "Adequate: nothing is missing, what is left is noise."
-    assert lab.json("improve", FOG, "--add", "scale_factor_asymmetry")["warnings"] == []
+    improved = lab.json("improve", FOG, "--add", "scale_factor_asymmetry")
+    assert [each["said"] for each in improved["warnings"]] == [
+        each.said for each in worse_than_before(errors(improved["before"]), errors(improved["error"]))
+    ]
 
 
 def test_certainly_wrong_data_are_refused_in_one_line_unless_accepted(
@@ -130,20 +136,58 @@ def test_validity_of_a_stored_recording_is_that_of_its_readings(
     assert "any rate" in lab.run("fit", FOG, "--effects", "bias").stdout
 
 
+def errors(answer: dict[str, Any]) -> ErrorFigures:
+    return ErrorFigures(*(answer[name] for name in ("raw_rms_dps", "rms_dps", "heldout_rms_dps", "noise_floor_dps")))
+
+
 def figures(raw: float, left: float, held_out: float | None = None) -> ErrorFigures:
     return ErrorFigures(raw, left, held_out, None)
 
 
 def test_a_fit_that_is_worse_than_none_is_certainly_wrong() -> None:
     assert worse_than_raw(figures(2.0, 1.99)) == []
+    assert worse_than_raw(figures(2.0, 2.0 * (1 + 1e-9))) == []
     (little,) = worse_than_raw(figures(2.0, 2.01))
     (much,) = worse_than_raw(figures(104.9, 109.4))
-    assert (little.severity, much.severity) == ("likely", "certain")
+    assert (little.severity, much.severity) == ("certain", "certain")
     assert "leaves 109.4 deg/s RMS" in much.text
 
 
+def test_a_fit_that_is_worse_than_none_is_refused_with_its_figures_and_not_kept(
+    lab: Lab, brought_in: Callable[[Recording], list[object]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    brought_in(single_axis(1))
+
+    def worse_fit(*arguments: Any, **options: Any) -> FitResult:
+        result = fit(*arguments, **options)
+        return replace(result, error=replace(result.error, raw_rms_dps=104.9, rms_dps=109.4))
+
+    monkeypatch.setattr(fitting, "fit", worse_fit)
+    before = lab.content()
+    refused = lab.run("fit", FOG, "--model", "ojeda2000", status=2).stderr
+    assert "it leaves 109.4 deg/s RMS of its own data" in refused
+    assert "is off by 104.9 deg/s" in refused
+    assert "--accept-warnings" in refused
+    assert lab.content() == before
+    accepted = lab.json("fit", FOG, "--model", "ojeda2000", "--accept-warnings")
+    assert [each["what"] for each in accepted["warnings"]] == ["worse"]
+
+
+def test_an_improvement_that_does_not_predict_better_says_so_loudly(
+    lab: Lab, brought_in: Callable[[Recording], list[object]]
+) -> None:
+    brought_in(single_axis(1))
+    lab.run("fit", FOG, "--effects", "bias,scale_factor,bias_temperature:2")
+    printed = lab.run("improve", FOG, "--remove", "bias_temperature").stdout
+    assert printed.startswith("check: change: the held-out RMS error rises: 0.349 deg/s before, 0.3512 deg/s after")
+    stored = lab.json("improve", FOG, "--version", "1", "--remove", "bias_temperature")
+    assert [each["where"] for each in stored["warnings"]] == ["change"]
+
+
 def test_a_change_that_makes_held_out_temperatures_worse_is_said() -> None:
-    assert worse_than_before(figures(1, 0.036, 0.036), figures(1, 0.03, 0.037)) == []
+    assert worse_than_before(figures(1, 0.036, 0.036), figures(1, 0.03, 0.035)) == []
     (worse,) = worse_than_before(figures(1, 0.036, 0.036), figures(1, 0.03, 0.134))
     assert worse.severity == "likely"
-    assert "held-out RMS error rises from 0.036 to 0.134 deg/s" in worse.text
+    assert "the held-out RMS error rises: 0.036 deg/s before, 0.134 deg/s after" in worse.text
+    (same,) = worse_than_before(figures(1, 0.036, 0.036), figures(1, 0.03, 0.036))
+    assert "the held-out RMS error does not fall" in same.text

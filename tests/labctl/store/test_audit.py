@@ -31,6 +31,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.store import Store, migrate, open_store
 from labctl.store.connection.database import Database
+from tests.helpers.certifying import OVERRIDE, OVERRIDE_OPTIONS, REASON
 from tests.helpers.paths import EXAMPLES
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -171,7 +172,7 @@ def test_what_a_person_does_on_the_command_line_is_in_it(labctl: Callable[..., A
     labctl("import", str(EXAMPLES / "osu-fog"))
     labctl("fit", "OSU-FOG-2024", "--effects", "bias,scale_factor")
     labctl("improve", "OSU-FOG-2024", "--remove", "scale_factor")
-    labctl("certify", "OSU-FOG-2024", "1", "--by", "A. Person", "--reason", "fits")
+    labctl("certify", "OSU-FOG-2024", "1", "--by", "A. Person", *OVERRIDE_OPTIONS)
     labctl("revoke", "OSU-FOG-2024", "1", "--by", "B. Person", "--reason", "drifts")
     labctl("key", "create", "robot", "--role", "viewer")
     labctl("key", "revoke", "robot", "--reason", "lost")
@@ -182,9 +183,12 @@ def test_what_a_person_does_on_the_command_line_is_in_it(labctl: Callable[..., A
         (me, "import"), (me, "fit"), (me, "improve"), ("A. Person", "certify"), ("B. Person", "revoke"),
         (me, "key create"), (me, "key revoke"), (me, "backup"),
     ]  # fmt: skip
-    assert rows[3]["detail"] | {"due": None} == {
-        "by": "A. Person", "reason": "fits", "due": None, "via": "command line", "caller": me,
+    certified = {
+        "by": "A. Person", "reason": REASON, "due": None, "via": "command line", "caller": me,
+        "verdict": "ambiguous", "recording": 1, "override": True,
     }  # fmt: skip
+    assert rows[3]["detail"] | certified == rows[3]["detail"]
+    assert "the verdict on recording 1 is 'ambiguous'" in rows[3]["detail"]["objections"][0]
     assert rows[6]["detail"]["reason"] == "lost"
     assert labctl("audit", "verify", "--json")["ok"] is True
     assert labctl("audit", "list", "--since", "2999-01-01", "--json") == []
@@ -231,7 +235,7 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
         "improve", lambda c: c.post(f"{UNIT}/1/improve", json={"remove": ["scale_factor"]}),
     ),
     "/api/units/{serial}/calibrations/{version}/certify": (
-        "certify", lambda c: c.post(f"{UNIT}/1/certify", json=PERSON),
+        "certify", lambda c: c.post(f"{UNIT}/1/certify", json=PERSON | OVERRIDE),
     ),
     "/api/units/{serial}/calibrations/{version}/revoke": ("revoke", lambda c: c.post(f"{UNIT}/1/revoke", json=PERSON)),
     "/api/campaigns/{campaign}/abort": (

@@ -19,7 +19,7 @@ from sqlalchemy.dialects import postgresql
 
 from labctl.errors import BadInput, Conflict, NotCertified, NotFound, StoreError
 from labctl.recording import Recording, RecordingInfo, to_points
-from labctl.store import NewCalibration, Store, holder_of, migrate, open_store
+from labctl.store import Judgement, NewCalibration, Store, holder_of, migrate, open_store
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 
@@ -82,6 +82,7 @@ def test_migrations_can_be_written_for_postgresql() -> None:
     text = out.getvalue()
     assert "CREATE TABLE sample_blocks" in text
     assert "BYTEA" in text
+    assert "ALTER TABLE certifications ADD COLUMN override BOOLEAN" in text
     for table in tables.metadata.sorted_tables:
         assert str(sa.schema.CreateTable(table).compile(dialect=postgresql.dialect()))
 
@@ -190,6 +191,28 @@ def test_certifying_an_older_version_is_a_rollback(store: Store) -> None:
     with pytest.raises(NotCertified):
         store.calibrations.certified_version("G-1")
     assert [row.act for row in store.calibrations.history("G-1")] == ["revoke", "certify", "certify"]
+
+
+def test_acts_of_before_verdicts_were_kept_have_none(store: Store, location: str) -> None:
+    """A database that stood at step 0005 is migrated; its acts have null where later ones have a verdict."""
+    store.calibrations.add("G-1", AT, _calibration)
+    store.calibrations.certify("G-1", 1, "certify", by="A", reason="fits", at=AT)
+    with store.calibrations._database.writing() as connection:
+        command.downgrade(migrate.configuration(connection), "0005")
+        columns = {column["name"] for column in sa.inspect(connection).get_columns("certifications")}
+        assert columns == {"id", "serial", "version", "act", "by", "reason", "at", "due_at"}
+    store.close()
+    known = Judgement("missing", 1, AT, True, {"verdict_text": "So it is.", "objections": [{"text": "it lacks"}]})
+    with open_store(location, write=True) as migrated:
+        assert [row.judgement for row in migrated.calibrations.history("G-1")] == [None]
+        assert migrated.calibrations.certified_version("G-1") == 1
+        migrated.calibrations.certify("G-1", 1, "certify", by="B", reason="again", at=AT, judgement=known)
+        migrated.calibrations.certify("G-1", 1, "revoke", by="B", reason="not now", at=AT)
+        assert [row.judgement for row in migrated.calibrations.history("G-1")] == [None, known, None]
+        detail = migrated.audit.rows()[-2].detail
+        assert (detail["verdict"], detail["recording"], detail["override"]) == ("missing", 1, True)
+        assert (detail["objections"], detail["verdict_at"]) == (["it lacks"], AT.isoformat())
+        assert migrated.audit.first_broken() is None
 
 
 def test_naive_instants_are_refused(store: Store) -> None:

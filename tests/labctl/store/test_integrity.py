@@ -24,9 +24,11 @@ from labctl.services.campaigns.preparation import prepare
 from labctl.services.commands.registry import CERTIFY, FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import CertifyRequest, FitRequest
+from labctl.services.schemas.calibrations import FitRequest
+from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import Store, check, copy_database, open_store
 from labctl.store.connection import commit_seal as seals
+from tests.helpers.certifying import REASON
 from tests.helpers.commands import local_executor
 from tests.helpers.paths import EXAMPLES
 
@@ -43,7 +45,8 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
         commands = local_executor(store, clock)
         commands.execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
         commands.execute(FIT, ToUnit("OSU-FOG-2024", FitRequest(effects=["bias", "scale_factor"])))
-        commands.execute(CERTIFY, ToVersion("OSU-FOG-2024", 1, CertifyRequest(by="A", reason="B")))
+        request = CertifyRequest(by="A", reason=REASON, override=True)
+        commands.execute(CERTIFY, ToVersion("OSU-FOG-2024", 1, request))
     return path
 
 

@@ -30,6 +30,8 @@ export const chip = (text, kind = "") => h("span", { class: `chip ${kind}` }, te
 /** A model's name, which may break after each part: yang2018+ scale_factor_asymmetry. */
 export const modelName = (name) => (name ?? "").split(/(?<=\+)/).flatMap((part, k) => (k ? [h("wbr"), part] : [part]));
 export const notice = (kind, ...children) => h("div", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : "status" }, ...children);
+/** The warnings of a fit or of a change, null without any. */
+export const fitWarnings = (answer) => (answer.warnings?.length ? notice("bad", answer.warnings.map((each) => h("p", {}, `${each.severity === "certain" ? "Wrong" : "Check"}: ${each.text}`))) : null);
 export const emptyState = (...children) => h("div", { class: "empty stack" }, ...children);
 export const busyIndicator = (text) => h("p", { class: "busy muted", role: "status" }, text);
 
@@ -102,23 +104,24 @@ export function toast(kind, text) {
   if (kind !== "bad") setTimeout(() => element.remove(), 6000);
 }
 
-/** Modal dialog with a form: resolves to {name: value}, or null when cancelled. `fields`: [{name, label, value, hint, type, required}]. */
-export function dialog(title, fields, { text, confirm = "Go on", kind = "primary" } = {}) {
+/** Modal dialog with a form: resolves to {name: value}, or null when cancelled. `fields`: [{name, label, value, hint, type, required, minlength}].
+ * A checkbox resolves to true or false. `body`: an element above the fields. */
+export function dialog(title, fields, { text, body, confirm = "Go on", kind = "primary" } = {}) {
   return new Promise((resolve) => {
-    const inputs = fields.map((f) => h("input", { name: f.name, type: f.type ?? "text", value: f.value ?? "", required: f.required !== false, autocomplete: "off" }));
+    const inputs = fields.map((f) => h("input", { name: f.name, type: f.type ?? "text", value: f.value ?? "", minlength: f.minlength ?? null, required: f.required !== false, autocomplete: "off" }));
     const name = uniqueId("dialog");
     const box = h("dialog", { "aria-labelledby": name }, h("form", { method: "dialog", onsubmit: (event) => {
       event.preventDefault();
       box.close("yes");
     } },
-    h("h2", { id: name }, title), text ? h("p", { class: "muted" }, text) : null,
+    h("h2", { id: name }, title), text ? h("p", { class: "muted" }, text) : null, body ?? null,
     fields.map((f, k) => labelledField(f.label, inputs[k], f.hint)),
     h("div", { class: "row", style: "justify-content: flex-end" },
       h("button", { class: "button quiet", type: "button", onclick: () => box.close() }, "Cancel"),
       h("button", { class: `button ${kind}`, type: "submit" }, confirm))));
     box.addEventListener("close", () => {
       box.remove();
-      resolve(box.returnValue === "yes" ? Object.fromEntries(inputs.map((input) => [input.name, input.value])) : null);
+      resolve(box.returnValue === "yes" ? Object.fromEntries(inputs.map((input) => [input.name, input.type === "checkbox" ? input.checked : input.value])) : null);
     });
     document.body.append(box);
     box.showModal();

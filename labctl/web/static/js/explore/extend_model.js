@@ -4,7 +4,7 @@ import { post } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";
-import { button, selectField, labelledField, cardWithHeader, notice, table, toast } from "../core/components.js";
+import { button, fitWarnings, selectField, labelledField, cardWithHeader, notice, table, toast } from "../core/components.js";
 import { navigate } from "../core/router.js";
 import { selectedRows } from "./residual_map.js";
 import { shownText } from "./dataset_rows.js";
@@ -44,6 +44,7 @@ export function extendModel(state, path, effects) {
         { title: "Changed", number: true, cell: ([key]) => h("strong", {}, number(found.error[key])) },
         { title: "", cell: ([key]) => (key === "rms_dps" || key === "heldout_rms_dps" ? relativeChange(found.before[key], found.error[key]) : null) },
       ], ERRORS, { label: "Errors before and after" }),
+      fitWarnings(found),
       residualFigure(state, found, floor),
       plausibility(state, found, change),
       found.left_out.length ? notice("", `Fitted, but not exported with the calibration: ${found.left_out.map((line) => `${idText(line.effect)} (${line.origin ?? "bench"})`).join(", ")}.`) : null,

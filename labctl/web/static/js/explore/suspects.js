@@ -2,7 +2,7 @@
 
 import { setChildren, h } from "../core/elements.js";
 import { withUncertainty, number, percent, idText } from "../core/format.js";
-import { button, chip, factList, cardWithHeader, notice } from "../core/components.js";
+import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { axisNames } from "./dataset_rows.js";
 
 const VERDICTS = {
@@ -23,6 +23,7 @@ export function verdictCard(state) {
   const ratio = error.rms_dps / error.noise_floor_dps;
   return h("section", { class: `card stack verdict ${kind}`, "aria-label": "Verdict" },
     h("div", { class: "row" }, chip(title, kind), h("span", { class: "muted small" }, `version ${state.version} held against recording ${state.recording}`)),
+    fitWarnings({ warnings: state.calibration.warnings?.filter((each) => each.what === "worse") }),
     h("p", { class: "verdict-statement" }, first), others.map((line) => h("p", { class: "muted" }, line)),
     factList([
       ["Left after the fit, RMS", number(error.rms_dps), "deg/s", Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null],

@@ -1,11 +1,12 @@
 // The page of one unit: its calibrations, certifications, error ladder and coefficients.
 
-import { download, get, post } from "../core/api.js";
+import { download, get } from "../core/api.js";
 import { h } from "../core/elements.js";
 import { day, instant, number } from "../core/format.js";
-import { button, card, chip, dialog, emptyState, factList, pageHeader, cardWithHeader, loadInto, modelName, notice, table } from "../core/components.js";
-import { query, updateQuery, show } from "../core/router.js";
+import { button, card, chip, emptyState, factList, pageHeader, cardWithHeader, loadInto, modelName, notice, table } from "../core/components.js";
+import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
+import { askCertification, askRevocation, certificationTable, overridden, verdictChip } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
 
 export async function page({ params, signal }) {
@@ -32,16 +33,17 @@ function inForce(unit, rows, force, base) {
     ["In force", `version ${unit.certified_version}`, null, row ? modelName(row.model) : null],
     ["Certified by", force?.by ?? "–", null, force ? instant(force.at) : null],
     ["Due", force?.due ? day(force.due) : "no date", null, left === null ? null : left < 0 ? `${-left} days ago` : `in ${left} days`],
+    !force || force.override === null ? null : ["Verdict when certified", verdictChip(force), null, force.verdict_recording ? `recording ${force.verdict_recording}` : null],
     ["RMS error", number(row?.rms_dps), "deg/s"],
     ["At unseen temperatures", number(row?.heldout_rms_dps), "deg/s"],
-  ]), left !== null && left < 0 ? notice("bad", "This calibration is overdue.") : null,
+  ]), force?.override ? overridden(force) : null, left !== null && left < 0 ? notice("bad", "This calibration is overdue.") : null,
   h("div", { class: "row" }, unit.formats.map(({ id, title, suffix }) => button(`Download ${title}`, () => download(`${base}/calibration?format=${encodeURIComponent(id)}`, `${unit.serial}.${suffix}`)))));
 }
 
 function versions(unit, rows, base, explore) {
   const act = (row) => row.certified
-    ? button("Revoke", () => askCertification(base, row.version, "revoke"), { kind: "tiny" })
-    : button("Certify", () => askCertification(base, row.version, "certify"), { kind: "tiny" });
+    ? button("Revoke", () => askRevocation(base, row.version), { kind: "tiny" })
+    : button("Certify", () => askCertification(base, row.version), { kind: "tiny" });
   return cardWithHeader("Calibrations", null, table([
     { title: "Version", cell: (row) => h("span", { class: "row tight" }, h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`), row.certified ? chip("in force", "good") : null) },
     { title: "Model", cell: (row) => h("span", {}, modelName(row.model), row.parent ? h("span", { class: "muted small" }, ` from ${row.parent}`) : null) },
@@ -50,20 +52,6 @@ function versions(unit, rows, base, explore) {
     { title: "Unseen, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
     { title: "", cell: (row) => h("div", { class: "row tight", style: "gap: .2rem" }, act(row), unit.formats.map(({ id, title, suffix }) => button(title, () => download(`${base}/calibration?version=${row.version}&format=${encodeURIComponent(id)}`, `${unit.serial}-v${row.version}.${suffix}`), { kind: "tiny quiet" }))) },
   ], rows, { label: "Calibrations", selected: (row) => row.certified }));
-}
-
-async function askCertification(base, version, what) {
-  const fields = [{ name: "by", label: "Who" }, { name: "reason", label: "Why" }];
-  if (what === "certify") fields.push({ name: "due_days", label: "Due again in days", type: "number", value: "365", required: false });
-  const answers = await dialog(what === "certify" ? `Put version ${version} in force` : `Take version ${version} out of force`, fields, {
-    text: what === "certify" ? "Whoever asks for this unit's calibration gets this version from now on. It is written to the audit trail." : "The unit then has no calibration in force. It is written to the audit trail.",
-    confirm: what === "certify" ? "Certify" : "Revoke", kind: what === "certify" ? "primary" : "danger",
-  });
-  if (!answers) return;
-  const body = { by: answers.by, reason: answers.reason };
-  if (answers.due_days) body.due_days = Number(answers.due_days);
-  await post(`${base}/calibrations/${version}/${what}`, body);
-  await show();
 }
 
 function ladder(base, signal) {
@@ -89,13 +77,3 @@ function coefficientCard(base, rows, signal) {
   draw();
   return cardWithHeader("Coefficients", h("div", { class: "row" }, select("of", one, false, (value) => { one = value; draw(); }), select("beside", other, true, (value) => { other = value; draw(); })), place);
 }
-
-function certificationTable(history) {
-  return table([
-    { title: "When", cell: (act) => instant(act.at) },
-    { title: "What", cell: (act) => `${act.act} version ${act.version}` },
-    { title: "Who", cell: (act) => act.by },
-    { title: "Why", prose: true, cell: (act) => act.reason },
-  ], history, { label: "Certifications" });
-}
-

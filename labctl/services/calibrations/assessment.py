@@ -1,0 +1,131 @@
+"""Assessment of a version before it is certified: the verdict on it, and what speaks against certifying it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from labctl.errors import BadInput, NotEnoughData, NotFound
+from labctl.fitting.models.inversion import NotConverged
+from labctl.services.calibrations.comparison import worse_than_raw, worse_than_version
+from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.recordings.inspection import inspect_stored
+from labctl.services.schemas.certification import AssessmentResponse, CertifiedErrors, Objection
+from labctl.services.schemas.criticism import CriticismResponse
+from labctl.store import CalibrationRecord, Store
+
+#: The least length of a reason for an override: a sentence.
+LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS = 20, 3
+
+
+def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
+    """Return what is known of a version; makes the criticism on its own recording where there is none yet.
+
+    Raises NotFound.
+    """
+    row = store.calibrations.get(store.units.get(serial).serial, version)
+    criticism, reason, unusable = _criticised(store, row)
+    objections = [*unusable, *_of_verdict(criticism), *_of_errors(store, row), *_of_data(store, row)]
+    return AssessmentResponse(
+        serial=serial,
+        version=version,
+        verdict=criticism.verdict if criticism else None,
+        verdict_reason=reason,
+        verdict_recording=criticism.recording if criticism else None,
+        verdict_at=criticism.made_at if criticism else None,
+        verdict_text=_sentence(criticism) if criticism else "",
+        error=_errors(row),
+        objections=objections,
+        override_needed=bool(objections),
+        least_reason_characters=LEAST_REASON_CHARACTERS,
+        least_reason_words=LEAST_REASON_WORDS,
+    )
+
+
+def _criticised(store: Store, row: CalibrationRecord) -> tuple[CriticismResponse | None, str, list[Objection]]:
+    """Return the criticism of a version on its own recording, or None and why there cannot be one.
+
+    A model that has no inverse on its own recording is an objection.
+    """
+    if row.recording is None:
+        return None, "the version was made without a recording", []
+    if store.recordings.get(row.recording).kind == "coefficients":
+        return None, f"recording {row.recording} is a table of coefficients: no measurements to judge by", []
+    try:
+        return criticise_unit(store, row.serial, row.version, row.recording), "", []
+    except (BadInput, NotEnoughData, NotFound) as error:
+        return None, str(error), []
+    except NotConverged as error:
+        return None, str(error), [Objection(what="verdict", text=f"no verdict: {error}", do="fit another model")]
+
+
+def _sentence(criticism: CriticismResponse) -> str:
+    """Return the verdict in words, without the warnings that stand before it."""
+    return criticism.text[len(criticism.warnings)]
+
+
+def _of_verdict(criticism: CriticismResponse | None) -> Iterator[Objection]:
+    """Yield the objection of a verdict by which the model lacks something."""
+    if criticism is None or not _lacks_something(criticism):
+        return
+    error = criticism.error
+    figures = ", ".join(
+        f"{name} {error[key]:.4g} deg/s"
+        for name, key in (("RMS error", "rms_dps"), ("held-out", "heldout_rms_dps"), ("noise floor", "noise_floor_dps"))
+        if error.get(key) is not None
+    )
+    version = f"{criticism.serial} --version {criticism.version}"
+    do = f"find out what is missing: labctl criticise {version}"
+    if criticism.verdict == "missing":
+        do = f"add it and certify the new version: labctl improve {version} --add {criticism.named[0]}"
+    elif criticism.verdict == "ambiguous":
+        do = f"measure what tells them apart (labctl criticise {version}), add that and certify the new version"
+    said = (
+        f"the verdict on recording {criticism.recording} is {criticism.verdict!r} ({figures}): {_sentence(criticism)}"
+    )
+    yield Objection(what="verdict", text=said.rstrip("."), do=do)
+
+
+def _lacks_something(criticism: CriticismResponse) -> bool:
+    """Return whether the model leaves more than noise.
+
+    Of an ambiguous verdict: whether its leader takes off a share of the excess over noise, 0 where there is no excess.
+    """
+    if criticism.verdict == "ambiguous":
+        leader = [each for each in criticism.suspects if each["effect"] in criticism.named[:1]]
+        return all(each["share_removed"] > 0 for each in leader)
+    return criticism.verdict in {"missing", "unexplained"}
+
+
+def _of_errors(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
+    """Yield an objection for every error before it that is smaller: raw, its parent's, that of the one in force."""
+    own = _errors(row)
+    for finding in worse_than_raw(own):
+        yield Objection(what="worse", text=finding.said, do=finding.do)
+    history = store.calibrations.history(row.serial)
+    in_force = history[0].version if history and history[0].act == "certify" else None
+    others = {row.parent: "which it was made from"} | {in_force: "which is in force"}
+    for version, role in others.items():
+        if version is None or version == row.version:
+            continue
+        other = store.calibrations.get(row.serial, version)
+        if other.recording != row.recording:
+            continue
+        worse = worse_than_version(_errors(other), own)
+        if worse:
+            said = f"{worse} of version {version}, {role}, on the same recording"
+            yield Objection(what="worse", text=said, do=f"certify version {version}, or improve this one")
+
+
+def _errors(row: CalibrationRecord) -> CertifiedErrors:
+    error = row.answer["error"]
+    return CertifiedErrors(**{key: error.get(key) for key in CertifiedErrors.model_fields})
+
+
+def _of_data(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
+    """Yield what is certainly wrong with the data that a version was fitted to."""
+    if row.recording is None:
+        return
+    for warning in inspect_stored(store, store.recordings.get(row.recording)).warnings:
+        if warning.severity == "certain":
+            said = f"recording {row.recording}: {warning.where}: {warning.said} (expected {warning.expected})"
+            yield Objection(what="data", text=said, do=f"{warning.do}, and fit again")

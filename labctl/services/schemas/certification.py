@@ -1,0 +1,83 @@
+"""Certification of a version: the request, the act as it was kept, and the assessment before it."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from labctl.services.schemas.base import Request, ResponseModel
+
+WHEN = "When the criticism that gave the verdict was made."
+NO_VERDICT = (
+    "Verdict of the newest criticism on the version's own recording; null: there is none, `verdict_reason` says why."
+)
+
+
+class RevokeRequest(Request):
+    """Who takes a version out of force, and why."""
+
+    by: str = Field(min_length=1)
+    reason: str = Field(min_length=1)
+    due_days: int | None = Field(default=None, gt=0, le=36_500, description="Days until the unit is due again.")
+
+
+class CertifyRequest(RevokeRequest):
+    """Who makes a version current, and why."""
+
+    override: bool = Field(default=False, description="Certify against objections; the reason must then be a sentence.")
+
+
+class Objection(ResponseModel):
+    """One thing that speaks against certifying a version."""
+
+    what: Literal["verdict", "worse", "data"]
+    text: str = Field(description="What is the case, with figures in deg/s.")
+    do: str = Field(description="What to do instead of certifying it.")
+
+
+class CertifiedErrors(ResponseModel):
+    """Errors that a version states, deg/s."""
+
+    raw_rms_dps: float | None = None
+    rms_dps: float | None = None
+    heldout_rms_dps: float | None = None
+    noise_floor_dps: float | None = None
+
+
+class AssessmentResponse(ResponseModel):
+    """What is known of a version when it is to be certified."""
+
+    serial: str
+    version: int
+    verdict: str | None = Field(description=NO_VERDICT)
+    verdict_reason: str = Field(description="Why there is no verdict; empty where there is one.")
+    verdict_recording: int | None
+    verdict_at: datetime | None = Field(description=WHEN)
+    verdict_text: str = Field(description="The verdict in words; empty without one.")
+    error: CertifiedErrors
+    objections: list[Objection]
+    override_needed: bool = Field(description="Whether certifying it needs `override`.")
+    least_reason_characters: int = Field(description="Length of the reason that goes with an override.")
+    least_reason_words: int
+
+
+class CertificationResponse(ResponseModel):
+    """A certification or its revocation; without a verdict's keys for a revocation and before verdicts were kept."""
+
+    serial: str
+    version: int
+    act: Literal["certify", "revoke"]
+    by: str
+    reason: str
+    at: datetime
+    due: datetime | None = None
+    verdict: str | None = Field(default=None, description=NO_VERDICT)
+    verdict_reason: str | None = Field(default=None, description="Why there is no verdict; empty where there is one.")
+    verdict_recording: int | None = None
+    verdict_at: datetime | None = Field(default=None, description=WHEN)
+    verdict_text: str | None = Field(default=None, description="The verdict in words.")
+    error: CertifiedErrors | None = None
+    override: bool | None = Field(default=None, description="Whether it was certified against objections.")
+    objections: list[Objection] = Field(default_factory=list)
