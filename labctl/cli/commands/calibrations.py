@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from labctl.cli.calibration_output import print_fit
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
 from labctl.cli.output import console, print_json
@@ -47,6 +46,8 @@ def fit(
     if as_json:
         print_json(answer)
     else:
+        from labctl.cli.calibration_output import print_fit
+
         print_fit(answer)
 
 

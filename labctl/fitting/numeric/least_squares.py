@@ -83,7 +83,7 @@ def _at(design: NDArray[np.float64], y: Array, scatter: Scatter, drifts: Sequenc
     norms = np.linalg.norm(rows[:, :, :k], axis=1)
     rows[:, :, :k] /= norms[:, None, :]
     # the triangle of columns and data together holds the data's projection on the columns, and below it what is left
-    triangles = np.linalg.qr(rows, mode="r")
+    triangles: NDArray[np.float64] = np.asarray(np.linalg.qr(rows, mode="r"))
     r, projected = triangles[:, :k, :k], triangles[:, :k, k:]
     identity = np.broadcast_to(np.eye(k), r.shape)
     solved = np.linalg.solve(r, np.concatenate([projected, identity], axis=2)) / norms[:, :, None]
