@@ -56,8 +56,9 @@ def design_of(
         t_s = data.at_sets(np.asarray(nodes["t_s"], dtype=np.float64))
     run = data.at_sets(np.asarray(nodes["run"] if "run" in nodes else np.ones(len(nodes)), dtype=np.float64))
     level = constant_coordinates(base, data)
+    without_prior = base[:, :, precision == 0]
     options = [
-        orthogonalised(centred(option, level), base[:, :, precision == 0])
+        orthogonalised(centred(option, level), without_prior)
         for option in (*options_of(data, axis, model.reference, catalogue), *thermometer_options(data, model, axis))
     ]
     return Design(base, precision, options, data.present, t_s, np.rint(run).astype(np.int64))
