@@ -7,19 +7,15 @@ import shutil
 import tempfile
 import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import pyarrow as pa
-import pyarrow.csv as pacsv
-import pyarrow.parquet as pq
 import tomli_w
 from pydantic import ValidationError
 
 from labctl.errors import BadRecording
 from labctl.recording.checks import checked, checked_environment
 from labctl.recording.info import RecordingInfo
-from labctl.recording.recording import Columns, Recording
-from labctl.recording.tables import read_table
+from labctl.recording.recording import Recording
 
 HEAD = "recording.toml"
 ENVIRONMENT = "environment"
@@ -33,6 +29,8 @@ def read_recording(folder: Path) -> Recording:
     Raises BadRecording, which names the file, the column, the row (1 is the first row below the header) and what was
     expected.
     """
+    from labctl.recording.tables import read_table  # noqa: PLC0415  0.2 s that only files need
+
     info = _read_head(folder / HEAD)
     path = _data_file(folder, info.kind)
     columns = checked(path, info, read_table(path))
@@ -74,6 +72,8 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
 
     The folder appears whole or not at all. Raises BadRecording when it exists already.
     """
+    from labctl.recording.tables import write_table  # noqa: PLC0415  as above
+
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BadRecording(f"{folder}: exists already and is not empty; name a new folder")
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -82,9 +82,9 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
         whole.mkdir()
         head = recording.info.model_dump(mode="json", exclude_none=True, exclude_defaults=False)
         (whole / HEAD).write_bytes(tomli_w.dumps(head).encode())
-        _write_table(recording.columns, whole / f"{recording.info.kind}.{file_format}")
+        write_table(recording.columns, whole / f"{recording.info.kind}.{file_format}")
         if recording.environment is not None:
-            _write_table(recording.environment, whole / f"{ENVIRONMENT}.{file_format}")
+            write_table(recording.environment, whole / f"{ENVIRONMENT}.{file_format}")
         files = sorted(whole.iterdir())
         for file in (*files, whole):
             _sync(file)
@@ -93,16 +93,6 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
         shutil.move(whole, folder)
         _sync(folder.parent)
     return [file.name for file in files]
-
-
-def _write_table(columns: Columns, path: Path) -> None:
-    table: Any = pa.table({name: pa.array(values) for name, values in columns.items()})
-    if path.suffix == ".parquet":
-        floats = [name for name in table.column_names if pa.types.is_floating(table.schema.field(name).type)]
-        others = [name for name in table.column_names if name not in floats]
-        pq.write_table(table, path, compression="zstd", use_dictionary=others, use_byte_stream_split=floats)
-    else:
-        pacsv.write_csv(table, path)
 
 
 def _sync(path: Path) -> None:

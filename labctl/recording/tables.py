@@ -1,4 +1,4 @@
-"""Data files to columns: Parquet and CSV in, with the file, the column and the row in every complaint."""
+"""Data files to columns and back: Parquet and CSV, with the file, the column and the row in every complaint."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
 from labctl.recording.columns import BY_NAME, Kind
+from labctl.recording.recording import Columns
 
 
 def read_table(path: Path) -> dict[str, NDArray[Any]]:
@@ -27,6 +28,17 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
     if table.num_rows == 0:
         raise BadRecording(f"{path}: no rows below the header; expected at least one")
     return {name: _column(path, name, table.column(name)) for name in table.column_names}
+
+
+def write_table(columns: Columns, path: Path) -> None:
+    """Write columns as a .parquet or .csv file."""
+    table: Any = pa.table({name: pa.array(values) for name, values in columns.items()})
+    if path.suffix == ".parquet":
+        floats = [name for name in table.column_names if pa.types.is_floating(table.schema.field(name).type)]
+        others = [name for name in table.column_names if name not in floats]
+        pq.write_table(table, path, compression="zstd", use_dictionary=others, use_byte_stream_split=floats)
+    else:
+        pacsv.write_csv(table, path)
 
 
 def _parquet(path: Path) -> pa.Table:

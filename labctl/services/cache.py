@@ -10,18 +10,18 @@ import hashlib
 import json
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import Generic, TypeVar
-from weakref import WeakValueDictionary
 from zipfile import BadZipFile
 
 from platformdirs import user_cache_path
 
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.single_flight import single_flight
 
 ResponseT = TypeVar("ResponseT", bound=ResponseModel)
 ResultT = TypeVar("ResultT")
@@ -29,26 +29,6 @@ PACKAGES = ("instruments", "labctl", "procedures")
 LIBRARIES = ("numpy", "scipy")
 #: What a damaged file raises while it is read.
 DAMAGED = (OSError, EOFError, ValueError, KeyError, BadZipFile)
-
-
-class _Flight:
-    """A lock that is forgotten when no thread holds it."""
-
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-
-
-_flights: WeakValueDictionary[str, _Flight] = WeakValueDictionary()
-_flights_guard = threading.Lock()
-
-
-@contextmanager
-def single_flight(asked: str) -> Iterator[None]:
-    """Let one thread of this process at a time work at the same question."""
-    with _flights_guard:
-        flight = _flights.setdefault(asked, _Flight())
-    with flight.lock:
-        yield
 
 
 class FileCache:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi.responses import StreamingResponse
 
 from labctl.api.access_policy import NEEDS_APPROVER
+from labctl.api.computation import follow, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.fitting.effects import read_formula
 from labctl.services.calibrations import fitting as services
@@ -22,6 +25,7 @@ from labctl.services.criticism.comparison import compare_version
 from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
 from labctl.services.criticism.verification import verify_unit
+from labctl.services.lab_service import LabService
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
@@ -50,6 +54,7 @@ from labctl.services.schemas.criticism import (
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 OtherUnit = Annotated[bool, Query(description="The recording may be of another unit.")]
 RecordingNumber = Annotated[int | None, Query(description="Recording; default: the unit's newest.")]
+Formulas = Annotated[list[str] | None, Query(description="Effects of your own that compete: 'name: expr'.")]
 
 
 @router.head("/calibration", include_in_schema=False)
@@ -118,25 +123,60 @@ def verification(
 
 
 @router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")
-def criticism(
+async def criticism(
+    request: Request,
     serial: str,
     version: int,
     service: ServiceDep,
     recording: RecordingNumber = None,
     other_unit: OtherUnit = False,
-    formula: Annotated[list[str] | None, Query(description="Effects of your own that compete: 'name: expr'.")] = None,
+    formula: Formulas = None,
 ) -> CriticismResponse:
-    """What the model leaves, where, which effect may be missing, and what this recording cannot say."""
+    """What the model leaves, where, which effect may be missing, and what this recording cannot say.
+
+    The computation is cancelled when the client leaves.
+    """
+    return await while_connected(request, _criticism(service, serial, version, recording, other_unit, formula))
+
+
+@router.get(
+    "/calibrations/{version}/criticism/events",
+    summary="Follow a criticism while it is computed",
+    response_class=StreamingResponse,
+)
+async def criticism_events(
+    request: Request,
+    serial: str,
+    version: int,
+    service: ServiceDep,
+    recording: RecordingNumber = None,
+    other_unit: OtherUnit = False,
+    formula: Formulas = None,
+) -> StreamingResponse:
+    """Server-sent events: `stage` as each stage begins, then `answer`, the criticism, or `problem`.
+
+    The computation is cancelled when the client leaves.
+    """
+    return await follow(request, _criticism(service, serial, version, recording, other_unit, formula))
+
+
+def _criticism(
+    service: LabService, serial: str, version: int, recording: int | None, other_unit: bool, formula: list[str] | None
+) -> Callable[[], CriticismResponse]:
     competing = [read_formula(line) for line in formula or []]
-    return criticism_services.criticise_unit(
+    return lambda: criticism_services.criticise_unit(
         service.store, serial, version, recording, competing, other_unit=other_unit
     )
 
 
 @router.get("/calibrations/{version}/residuals", summary="What a model leaves, data set by data set")
-def residuals(serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None) -> ResidualsResponse:
+async def residuals(
+    request: Request, serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None
+) -> ResidualsResponse:
     """The rows behind the map of the criticism, one per data set and axis: measured, modelled, and what is left."""
-    return criticism_services.residuals_unit(service.store, serial, version, recording)
+    return await while_connected(
+        request, lambda: criticism_services.residuals_unit(service.store, serial, version, recording)
+    )
 
 
 @router.get("/calibrations/{version}/pictures", summary="The pictures of a criticism")

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from labctl.cli.calibration_output import print_certification, print_certifications, print_fit
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
 from labctl.cli.output import console, print_json
@@ -48,6 +47,8 @@ def fit(
     if as_json:
         print_json(answer)
     else:
+        from labctl.cli.calibration_output import print_fit
+
         print_fit(answer)
 
 
@@ -76,6 +77,8 @@ def certify(
     if as_json:
         print_json(answer)
     else:
+        from labctl.cli.calibration_output import print_certification
+
         print_certification(answer)
 
 
@@ -93,6 +96,8 @@ def revoke(
     if as_json:
         print_json(answer)
     else:
+        from labctl.cli.calibration_output import print_certification
+
         print_certification(answer)
 
 
@@ -106,6 +111,8 @@ def certifications(serial: Serial, as_json: Json = False, database: Database = N
     if as_json:
         print_json(rows)
     else:
+        from labctl.cli.calibration_output import print_certifications
+
         print_certifications(rows)
 
 

@@ -16,6 +16,7 @@ from labctl.cli.criticism_output import (
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
 from labctl.cli.output import print_json
+from labctl.cli.stage_line import stage_line
 
 if TYPE_CHECKING:
     from labctl.fitting.effects import Formula
@@ -72,7 +73,9 @@ def criticise(
     from labctl.services.criticism.criticise import criticise_unit, write_next
 
     with one_clear_line(), open_readonly(database) as store:
-        answer = criticise_unit(store, serial, version, recording, written(formula), other_unit=other_unit)
+        competing = written(formula)
+        with stage_line():
+            answer = criticise_unit(store, serial, version, recording, competing, other_unit=other_unit)
         if next_recipe is not None:
             write_next(answer, next_recipe)
         if report is not None:

@@ -28,6 +28,7 @@ from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed, unchanged
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.progress import report_stage
 from labctl.recording import Recording
 
 #: Data sets beyond the base's coefficients that a verdict needs.
@@ -92,11 +93,13 @@ def criticise(
     """Hold a model against a recording. Without `full` only the verdict is sought, as long studies do.
 
     `points` are the recording's means, where they are already known. Raises NotEnoughData only where the model cannot
-    even be fitted; too little for a verdict is a verdict.
+    even be fitted; too little for a verdict is a verdict. Raises Cancelled at a stage that finds it cancelled.
     """
+    report_stage("reducing the recording")
     recording = with_temperature(recording)
     data = replace(reduce_recording(recording), static=static_record(recording, 0.0 if full else LONG_S))
     fit_data = fit_data_of(points or recording)
+    report_stage("fitting the model")
     base = fit_preset(fit_data, changed(model)) if full else None
     forward, _ = changed(model).build(fit_data)
     if (short := _too_little(data, forward)) is not None:
@@ -106,6 +109,7 @@ def criticise(
     found = Criticism(verdict, data, fit_data, base, None, comparison, final)
     if not full or found.beside_missing is None:
         return found
+    report_stage("listing suspects and residuals")
     suspects = tuple(suspects_of(comparison, found.beside_missing, fit_data, forward, refined_term))
     suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return replace(

@@ -20,6 +20,7 @@ from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.numeric.arrays import Array
+from labctl.progress import report_stage
 
 #: A formula of which the base leaves less than this share is not orthogonalised.
 LEAST_ORTHOGONAL_SHARE = 1e-5
@@ -55,8 +56,9 @@ def design_of(
         t_s = data.at_sets(np.asarray(nodes["t_s"], dtype=np.float64))
     run = data.at_sets(np.asarray(nodes["run"] if "run" in nodes else np.ones(len(nodes)), dtype=np.float64))
     level = constant_coordinates(base, data)
+    without_prior = base[:, :, precision == 0]
     options = [
-        orthogonalised(centred(option, level), base[:, :, precision == 0])
+        orthogonalised(centred(option, level), without_prior)
         for option in (*options_of(data, axis, model.reference, catalogue), *thermometer_options(data, model, axis))
     ]
     return Design(base, precision, options, data.present, t_s, np.rint(run).astype(np.int64))
@@ -127,8 +129,13 @@ def compare_models(
     designs: Mapping[str, Design] | None = None,
 ) -> Comparison:
     """Compare every candidate with a model. `designs` may be those of an earlier call for the same model and data."""
+    report_stage("preparing candidates")
     designs = designs or {axis: design_of(data, model, axis, catalogue) for axis in data.info.axes}
-    found = {axis: compare_axis(data, design, axis) for axis, design in designs.items()}
+    found = {}
+    for axis, design in designs.items():
+        number = len({(option.candidate, option.smooth) for option in design.options})
+        report_stage(f"comparing {number} candidates, axis {axis}")
+        found[axis] = compare_axis(data, design, axis)
     axes = {axis: one.evidence for axis, one in found.items()}
     return Comparison(
         data, model, designs, axes,

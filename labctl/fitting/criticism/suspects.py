@@ -27,6 +27,7 @@ from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.numeric.json_numbers import none_for_nan
+from labctl.progress import report_stage
 
 #: At most this many suspects are reported.
 SHOWN = 6
@@ -93,6 +94,7 @@ def _fit_with(
     """Return a fit of the model with the candidate added; None without evidence for it, or where it cannot be had."""
     if candidate.log_bf < 0 or candidate.term is None:
         return None
+    report_stage(f"fitting the model with {candidate.id}")
     try:
         return fit_preset(data, changed(model, (shape_of(comparison, candidate),)))
     except LabctlError:  # it cannot be fitted beside the base, or not be inverted: there is no figure

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -106,6 +105,8 @@ def _fewest(design: NDArray[np.float64], variance: Array, freedom: Array) -> Arr
 
 def _fit(design: NDArray[np.float64], variance: Array, freedom: Array, kept: list[int]) -> tuple[Array, float]:
     """Return squared coefficients >= 0 that make chi-square distributed variances likeliest, and their deviance."""
+    from scipy.optimize import nnls  # noqa: PLC0415  0.1 s that a recording without a static record does not need
+
     terms = np.zeros(design.shape[1])
     model = variance
     for _ in range(ROUNDS):

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dtbtrs
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -62,28 +64,44 @@ def whitened(
     covariances, (drifts,).
 
     Row by row in time, as a Kalman filter goes: of an Ornstein-Uhlenbeck process only the last value matters, so it is
-    the same as by the Cholesky factors, in a number of operations that grows with m and not with its cube.
+    the same as by the Cholesky factors, in a number of operations that grows with m and not with its cube. What is
+    expected of each row is a linear recurrence, solved for all columns at once.
     """
-    size_var = np.array([drift.drift_dps**2 for drift in drifts])
-    tau_s = np.array([drift.tau_s for drift in drifts])
-    white = white_var + (np.array([[drift.per_rate] for drift in drifts]) * scatter.rate_dps) ** 2
-    found = np.empty((len(drifts), *values.shape))
-    log_det = np.zeros(len(drifts))
-    expected, variance = np.zeros((len(drifts), values.shape[1])), size_var
     order = np.lexsort((scatter.t_s, scatter.run))
-    for before, row in zip((None, *order[:-1]), order, strict=True):
-        if before is None or scatter.run[before] != scatter.run[row]:
-            expected, variance = np.zeros_like(expected), size_var
-        else:
-            kept = np.exp(-(scatter.t_s[row] - scatter.t_s[before]) / tau_s)
-            expected, variance = kept[:, None] * expected, size_var + kept**2 * (variance - size_var)
-        total = variance + white[:, row]
-        surprise = values[row] - expected
-        found[:, row] = surprise / np.sqrt(total)[:, None]
-        log_det += np.log(total)
-        expected = expected + (variance / total)[:, None] * surprise
-        variance = variance * white[:, row] / total
-    return found, log_det
+    ordered = np.asfortranarray(values[order])
+    kept, total, share = _filter(scatter, drifts, white_var, order)
+    found = np.empty((len(drifts), *values.shape))
+    band = np.ones((2, len(order)))
+    for k in range(len(drifts)):
+        band[1, :-1] = -kept[k, 1:] * (1.0 - share[k, :-1])
+        expected = np.zeros_like(ordered)
+        expected[1:] = (kept[k, 1:] * share[k, :-1])[:, None] * ordered[:-1]
+        expected, _ = dtbtrs(band, expected, uplo="L", diag="U", overwrite_b=True)
+        found[k, order] = (ordered - expected) / np.sqrt(total[k])[:, None]
+    return found, np.log(total).sum(axis=1)
+
+
+def _filter(
+    scatter: Scatter, drifts: Sequence[Drift], white_var: Array, order: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return, (drifts, m) each, for rows in time: the share of the drift that is left since the row before (0 where a
+    run begins), the variance of a row about what is expected of it, and the drift's share of that variance.
+    """
+    size_var, tau_s, per_rate = np.array([(d.drift_dps**2, d.tau_s, d.per_rate) for d in drifts]).T[:, :, None]
+    begins = np.concatenate([[True], np.diff(scatter.run[order]) != 0])
+    kept = np.where(begins, 0.0, np.exp(-np.diff(scatter.t_s[order], prepend=scatter.t_s[order[0]]) / tau_s))
+    white = white_var[order] + (per_rate * scatter.rate_dps[order]) ** 2
+    size: Any = size_var[:, 0]
+    rows: Any = zip((kept**2).T, white.T, strict=True)
+    if len(drifts) == 1:  # single numbers are faster than arrays of one
+        size, rows = float(size[0]), zip((kept[0] ** 2).tolist(), white[0].tolist(), strict=True)
+    variances, variance = [], size
+    for part, noise in rows:
+        before = size + part * (variance - size)
+        variances.append(before)
+        variance = before * noise / (before + noise)
+    drift_var = np.array(variances).reshape(len(order), len(drifts)).T
+    return kept, drift_var + white, drift_var / (drift_var + white)
 
 
 def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr, solve_triangular
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric import drift_noise
@@ -79,29 +78,34 @@ def solve(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift 
 def _at(design: NDArray[np.float64], y: Array, scatter: Scatter, drifts: Sequence[Drift]) -> list[_Point]:
     """Return the weighted fit and its restricted log likelihood at each drift."""
     white = scatter.white_var if scatter.white_var is not None else np.ones(len(y))
-    whitened, log_dets = drift_noise.whitened(scatter, drifts, white, np.column_stack([design, y]))
-    known = scatter.white_var is not None
+    m, k = design.shape
+    rows, log_dets = drift_noise.whitened(scatter, drifts, white, np.column_stack([design, y]))
+    norms = np.linalg.norm(rows[:, :, :k], axis=1)
+    rows[:, :, :k] /= norms[:, None, :]
+    # the triangle of columns and data together holds the data's projection on the columns, and below it what is left
+    triangles: NDArray[np.float64] = np.asarray(np.linalg.qr(rows, mode="r"))
+    r, projected = triangles[:, :k, :k], triangles[:, :k, k:]
+    identity = np.broadcast_to(np.eye(k), r.shape)
+    solved = np.linalg.solve(r, np.concatenate([projected, identity], axis=2)) / norms[:, :, None]
+    chi2 = np.sum(triangles[:, k:, k] ** 2, axis=1)
+    log_dets = log_dets + 2 * np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)) * norms).sum(axis=1)
     return [
-        _point(drift, rows, float(log_det), drift_noise.log_prior(scatter, drift), known=known)
-        for drift, rows, log_det in zip(drifts, whitened, log_dets, strict=True)
-    ]
+        _point(drift, one, float(c), float(log_det), drift_noise.log_prior(scatter, drift), freedom=max(m - k, 1),
+               known=scatter.white_var is not None)
+        for drift, one, c, log_det in zip(drifts, solved, chi2, log_dets, strict=True)
+    ]  # fmt: skip
 
 
-def _point(drift: Drift, whitened: NDArray[np.float64], log_det: float, log_prior: float, *, known: bool) -> _Point:
-    """Return the fit of whitened columns (m, k + 1), the last of which are the data."""
-    m, k = whitened.shape[0], whitened.shape[1] - 1
-    norms = np.linalg.norm(whitened[:, :k], axis=0)
-    q, r = qr(whitened[:, :k] / norms, mode="economic", check_finite=False)
-    projected = q.T @ whitened[:, k]
-    values = solve_triangular(r, projected, check_finite=False) / norms
-    inverse = solve_triangular(r, np.eye(k), check_finite=False) / norms[:, None]
-    chi2 = float(whitened[:, k] @ whitened[:, k] - projected @ projected)
-    freedom = max(m - k, 1)
-    log_dets = log_det + 2 * float(np.log(np.abs(np.diag(r)) * norms).sum())
+def _point(
+    drift: Drift, solved: NDArray[np.float64], chi2: float, log_det: float, log_prior: float, *, freedom: int,
+    known: bool,
+) -> _Point:  # fmt: skip
+    """Return the fit at one drift: `solved` (k, 1 + k) holds the coefficients and a square root of their covariance."""
+    values, inverse = solved[:, 0], solved[:, 1:]
     # what no noise explains is the model's fault, and makes its coefficients that much less certain
     scale = max(chi2 / freedom, 1.0) if known else max(chi2, 1e-300) / freedom
     fit_term = chi2 if known else freedom * np.log(max(chi2, 1e-300))
-    return _Point(drift, values, inverse @ inverse.T * scale, -0.5 * (log_dets + fit_term) + log_prior, scale)
+    return _Point(drift, values, inverse @ inverse.T * scale, -0.5 * (log_det + fit_term) + log_prior, scale)
 
 
 def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, fit: _Point) -> float:

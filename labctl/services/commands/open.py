@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING
 
 from instruments.clock import SystemClock
 from labctl.config import default_database
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.command import Command, CommandExecutor, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.foreground_control import ForegroundControl, OpenTerminal, no_terminal
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store, holder_of, open_store
+
+if TYPE_CHECKING:
+    from labctl.services.commands.foreground_control import OpenTerminal
 
 
 @contextmanager
@@ -29,7 +32,7 @@ def service_url(database: str | None) -> str | None:
 
 
 @contextmanager
-def open_commands(database: str | None, open_terminal: OpenTerminal = no_terminal) -> Iterator[CommandExecutor]:
+def open_commands(database: str | None, open_terminal: OpenTerminal | None = None) -> Iterator[CommandExecutor]:
     """Give the executor of commands on a database: the service that holds it, or else this process.
 
     `open_terminal` opens the terminal of a campaign that runs in the foreground of this process.
@@ -40,12 +43,16 @@ def open_commands(database: str | None, open_terminal: OpenTerminal = no_termina
 
         yield HttpExecutor(url)
         return
+    from labctl.services.commands.foreground_control import ForegroundControl, no_terminal  # noqa: PLC0415  loads drivers
+
     with ExitStack() as opened:
 
         def open_writable() -> Store:
             return opened.enter_context(open_store(location, write=True))
 
-        yield LocalExecutor(CommandContext(open_writable, SystemClock(), ForegroundControl(location, open_terminal)))
+        yield LocalExecutor(
+            CommandContext(open_writable, SystemClock(), ForegroundControl(location, open_terminal or no_terminal))
+        )
 
 
 def execute(database: str | None, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:

@@ -6,14 +6,15 @@ A module of its own, because a kept answer needs none of it, and these libraries
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from labctl.errors import BadInput, LabctlError
-from labctl.fitting.criticism import criticise
+from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.inversion import NotConverged
+from labctl.progress import report_stage
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.criticism.next_experiment import experiments_for
 from labctl.services.criticism.report_text import answer_of, with_warnings
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.verification import verify
@@ -31,6 +32,7 @@ def evaluate(
     `competing` formulas are added to the catalogue.
     """
     catalogue, measured = catalogue_with(competing), Measurements(store, recording)
+    report_stage("inspecting the recording")
     warnings = measured.inspection.warnings
     try:
         found = criticise(measured.readings, model_of(calibration), catalogue, points=measured.points)
@@ -40,12 +42,21 @@ def evaluate(
         raise
     columns = residual_columns(found.data, found.residuals, measured.points, found.base)
     serial, version = calibration.serial, calibration.version
-    experiments = experiments_for(store, recording.campaign, found)
+    experiments = _experiments(store, recording.campaign, found)
     criticism = answer_of(serial, version, recording.id, found, experiments)
     return (
         with_warnings(criticism.model_copy(update={"applied": _applied(store, calibration, measured)}), warnings),
         ResidualsResponse(serial=serial, version=version, recording=recording.id, columns=columns),
     )
+
+
+def _experiments(store: Store, campaign: int | None, found: Criticism) -> list[dict[str, Any]]:
+    if not found.verdict.indistinguishable:
+        return []
+    report_stage("checking experiments")
+    from labctl.services.criticism.next_experiment import experiments_for  # noqa: PLC0415  it loads the drivers
+
+    return experiments_for(store, campaign, found)
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from labctl.errors import BadInput
 from labctl.fitting.criticism import decimate
+from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.output_steps import per_reading, quantisation_of
 from labctl.services.recordings.inspection import inspect_stored
@@ -37,6 +38,7 @@ class Measurements:
     @cached_property
     def readings(self) -> Recording:
         """The readings at no more than criticism needs; the means where there are no readings. Raises BadInput."""
+        report_stage("reading the recording")
         return load_reduced_readings(self.store, self.row, self.points)
 
 

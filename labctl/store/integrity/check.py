@@ -12,7 +12,6 @@ import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
-from labctl.calibration import read_calibration
 from labctl.errors import BadCalibrationFile, StoreError
 from labctl.store import migrate, sample_codec
 from labctl.store.connection.commit_seal import missing
@@ -192,6 +191,8 @@ class _Check:
         return columns
 
     def _check_calibrations(self, connection: sa.Connection) -> bool:
+        from labctl.calibration import read_calibration  # noqa: PLC0415  it loads every model, which no other part needs
+
         c = tables.calibrations.c
         for serial, version, own, document in connection.execute(sa.select(c.serial, c.version, c.hash, c.document)):
             self.calibrations += 1

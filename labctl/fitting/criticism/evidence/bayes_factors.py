@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
-from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
+from labctl.fitting.criticism.evidence.elimination import WhitenedBase, gains_by_noise, non_mean_products
 from labctl.fitting.criticism.evidence.gains import visible_share
 from labctl.fitting.criticism.evidence.noise_grid import Noise
 from labctl.fitting.effects import kind_of
@@ -52,9 +52,8 @@ def evidence(
     slices = slices_of(design.options)
     everything = np.concatenate([*(o.rows for o in design.options), y[:, :, None]], axis=2)
     others = non_mean_products(design, everything, scale)
-    bases = (WhitenedBase(design, white_var, noise) for noise in noises)
-    log_ps, gains, dimensions = zip(*(base.gains(everything[0], others, slices) for base in bases), strict=True)
-    log_p, gain, k, g = np.array(log_ps), np.array(gains), np.array(dimensions), float(len(design.t_s))
+    log_p, gain, k = gains_by_noise(design, white_var, everything[0], others, slices, noises)
+    g = float(len(design.t_s))
     log_bf = 0.5 * gain * g / (1 + g) - 0.5 * k * np.log1p(g)
     total = logsumexp(log_p[:, None] + log_bf, axis=0) - logsumexp(log_p)
     best = int(np.argmax(log_p))

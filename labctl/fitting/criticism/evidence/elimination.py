@@ -6,6 +6,7 @@ costs a small eigenproblem.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
 from labctl.fitting.criticism.evidence.gains import option_gains
-from labctl.fitting.criticism.evidence.noise_grid import Noise, factors, whiten
+from labctl.fitting.criticism.evidence.noise_grid import DriftModes, Noise, factors, whiten
 from labctl.fitting.numeric.arrays import Array
 
 
@@ -69,15 +70,31 @@ class WhitenedBase:
     """The base of one axis whitened at one noise, ready to be eliminated from other columns."""
 
     def __init__(self, design: Design, white_var: Array, noise: Noise) -> None:
-        self.noise = noise
-        self._blocks, self._log_det = factors(noise, white_var, design.t_s, design.run)
-        self._means = whiten(self._blocks, design.base[0])
+        self._blocks, log_det = factors(noise, white_var, design.t_s, design.run)
+        self._eliminated = _Elimination(noise, whiten(self._blocks, design.base[0]), log_det)
 
-    def _remainder(self, means: NDArray[np.float64], others: NonMeanProducts) -> _Remainder:
-        whitened = whiten(self._blocks, means)
-        crossed = self._means.T @ whitened + others.crossed
-        of_base = self._means.T @ self._means + others.of_base
-        log_det = self._log_det
+    def eliminate_from(self, means: NDArray[np.float64], others: NonMeanProducts) -> EliminatedBase:
+        """Return what remains of means (m, k), the last of which are the data, beside the base."""
+        left = self._eliminated.remainder(whiten(self._blocks, means), others)
+        gram = left.between(slice(None), slice(None))
+        chi2, noise = float(gram[-1, -1]), self._eliminated.noise
+        log_p = self._eliminated.log_p(left, chi2)
+        return EliminatedBase(noise, log_p, gram[:-1, :-1], left.squared_norms[:-1], gram[:-1, -1], chi2)
+
+
+@dataclass(frozen=True)
+class _Elimination:
+    """The whitened means of a base at one noise, and the log determinant of that noise."""
+
+    noise: Noise
+    means: NDArray[np.float64]  #: (m, kb)
+    log_det: float
+
+    def remainder(self, whitened: NDArray[np.float64], others: NonMeanProducts) -> _Remainder:
+        """Return whitened columns (m, k) with their projection on the base."""
+        crossed = self.means.T @ whitened + others.crossed
+        of_base = self.means.T @ self.means + others.of_base
+        log_det = self.log_det
         if len(of_base):
             size = np.sqrt(np.maximum(np.diag(of_base), 1e-300))
             scaled = of_base / np.outer(size, size) + 1e-10 * np.eye(len(size))
@@ -86,29 +103,35 @@ class WhitenedBase:
             log_det += 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum())
         return _Remainder(whitened, crossed, others.own, log_det)
 
-    def eliminate_from(self, means: NDArray[np.float64], others: NonMeanProducts) -> EliminatedBase:
-        """Return what remains of means (m, k), the last of which are the data, beside the base."""
-        left = self._remainder(means, others)
-        gram = left.between(slice(None), slice(None))
-        chi2 = float(gram[-1, -1])
-        return EliminatedBase(
-            self.noise, self._log_p(left, chi2), gram[:-1, :-1], left.squared_norms[:-1], gram[:-1, -1], chi2
-        )
-
-    def gains(
-        self, means: NDArray[np.float64], others: NonMeanProducts, slices: list[slice]
-    ) -> tuple[float, Array, NDArray[np.int64]]:
-        """Return the log likelihood, the chi2 that each option removes, and the number of its directions.
-
-        The same as from `eliminate_from`, without the inner products between options, which are most of the work.
-        """
-        left = self._remainder(means, others)
-        data_products = left.between(slice(None), -1)
-        found = option_gains(slices, left.within, left.squared_norms, data_products)
-        return self._log_p(left, float(data_products[-1])), *found
-
-    def _log_p(self, left: _Remainder, chi2: float) -> float:
+    def log_p(self, left: _Remainder, chi2: float) -> float:
+        """Return the restricted log likelihood of the base, with the noise's prior."""
         return -0.5 * (left.log_det + chi2) + self.noise.log_prior
+
+
+def gains_by_noise(
+    design: Design, white_var: Array, means: NDArray[np.float64], others: NonMeanProducts, slices: list[slice],
+    noises: Sequence[Noise],
+) -> tuple[Array, NDArray[np.float64], NDArray[np.int64]]:  # fmt: skip
+    """Return the log likelihood of the base at each noise, (noises,), and of each option, (noises, options), the chi2
+    that it removes and the number of its directions; `means` (m, k) are the options' columns and the data.
+
+    The same as from `WhitenedBase`, without the inner products between options, which are most of the work.
+    """
+    log_p, gain = np.empty(len(noises)), np.empty((len(noises), len(slices)))
+    dimensions = np.empty(gain.shape, dtype=np.int64)
+    for tau_s in dict.fromkeys(noise.tau_s for noise in noises):
+        modes = DriftModes.of(tau_s, white_var, design.t_s, design.run)
+        base, columns = modes.amplitudes(design.base[0]), modes.amplitudes(means)
+        for i, noise in enumerate(noises):
+            if noise.tau_s != tau_s:
+                continue
+            weights, log_det = modes.weights(noise.size_dps)
+            elimination = _Elimination(noise, weights[:, None] * base, log_det)
+            left = elimination.remainder(weights[:, None] * columns, others)
+            data_products = left.between(slice(None), -1)
+            log_p[i] = elimination.log_p(left, float(data_products[-1]))
+            gain[i], dimensions[i] = option_gains(slices, left.within, left.squared_norms, data_products)
+    return log_p, gain, dimensions
 
 
 def eliminate_base(

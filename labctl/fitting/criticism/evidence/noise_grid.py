@@ -92,6 +92,42 @@ def factors(
     return blocks, log_determinant
 
 
+@dataclass(frozen=True)
+class DriftModes:
+    """Modes of a drift of one time constant over white noise: with its size only the weight of each mode changes.
+
+    The same inner products as by Cholesky factors, one decomposition for all sizes.
+    """
+
+    blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]]  #: each run's rows, and its modes (n, n) over the noise
+    variance: Array  #: (m,) of each mode for a drift of 1 deg/s, over white noise
+    log_white: float  #: log determinant of the white noise
+
+    @staticmethod
+    def of(tau_s: float, white_var: Array, t_s: Array, run: NDArray[np.int64]) -> DriftModes:
+        """Return the modes of m data sets; `white_var` (m,) is the white variance of the means, (deg/s)^2."""
+        blocks, variance = [], np.empty(len(t_s))
+        for number in np.unique(run):
+            rows = np.flatnonzero(run == number)
+            white_dps = np.sqrt(white_var[rows])
+            values, vectors = np.linalg.eigh(correlation(t_s[rows], tau_s) / np.outer(white_dps, white_dps))
+            variance[rows] = np.maximum(values, 0.0)
+            blocks.append((rows, vectors / white_dps[:, None]))
+        return DriftModes(blocks, variance, float(np.log(white_var).sum()))
+
+    def amplitudes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values (m, k) as amplitudes of the modes, (m, k), over white noise."""
+        found = np.empty_like(values)
+        for rows, modes in self.blocks:
+            found[rows] = modes.T @ values[rows]
+        return found
+
+    def weights(self, size_dps: float) -> tuple[Array, float]:
+        """Return the factors (m,) that whiten amplitudes where the drift has a size, and the log determinant."""
+        total = 1.0 + size_dps**2 * self.variance
+        return 1.0 / np.sqrt(total), self.log_white + float(np.log(total).sum())
+
+
 def whiten(
     blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: NDArray[np.float64]
 ) -> NDArray[np.float64]:

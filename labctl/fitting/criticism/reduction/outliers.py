@@ -16,13 +16,22 @@ FEW = 0.05
 
 def inlier_mask(values: NDArray[np.float64], there: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return 1 where a reading is no outlier of its data set, (m, n)."""
-    masked = np.where(there > 0, values, np.nan)
-    middle = np.nanmedian(masked, axis=1, keepdims=True)
-    spread = 1.4826 * np.nanmedian(np.abs(masked - middle), axis=1, keepdims=True)
-    most = np.nanquantile(np.abs(masked - middle), 1.0 - 2 * FEW, axis=1, keepdims=True)
+    count = (there > 0).sum(axis=1)
+    middle = _quantile(np.sort(np.where(there > 0, values, np.inf), axis=1), count, 0.5)
+    distance = np.sort(np.where(there > 0, np.abs(values - middle), np.inf), axis=1)
+    spread, most = 1.4826 * _quantile(distance, count, 0.5), _quantile(distance, count, 1.0 - 2 * FEW)
     far = (np.abs(values - middle) > np.maximum(OUTLIER * spread, BEYOND * most)) & (there > 0)
     few = far.sum(axis=1, keepdims=True) <= FEW * there.sum(axis=1, keepdims=True)
     return np.where(far & few, 0.0, 1.0)
+
+
+def _quantile(ordered: NDArray[np.float64], count: NDArray[np.int64], share: float) -> NDArray[np.float64]:
+    """Return the quantile of the first `count` (m,) values of each ordered row (m, n), (m, 1), between neighbours."""
+    place = share * (np.maximum(count, 1) - 1)
+    low = np.floor(place).astype(np.int64)
+    rows, high = np.arange(len(ordered)), np.minimum(low + 1, np.maximum(count, 1) - 1)
+    below, above = ordered[rows, low], ordered[rows, high]
+    return np.asarray(below + (place - low) * (above - below))[:, None]
 
 
 def white_level_dps(values: NDArray[np.float64], there: NDArray[np.float64]) -> float:

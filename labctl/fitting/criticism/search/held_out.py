@@ -14,6 +14,7 @@ from labctl.fitting.data.temperature_levels import folds
 from labctl.fitting.effects import Effect, Term
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
+from labctl.progress import report_stage
 
 #: An effect is not named where the held-out chi2 rises by more than this share and this amount with it.
 RISES_BY, RISES_TO = 0.02, 9.0
@@ -32,6 +33,7 @@ def held_out_rises(comparison: Comparison, terms: tuple[Term, ...], catalogue: M
     `comparison` is that of the model without them. The prior of each added coefficient is as wide as the coefficient
     is large in the fit to all: what a fold cannot show is not held against an effect.
     """
+    report_stage(f"leaving data sets out to check {', '.join(term.effect for term in terms)}")
     axes = [_Axis.of(comparison, axis, terms, catalogue) for axis in comparison.axes]
     for masks in (_by_temperature(comparison), _by_rate(comparison)):
         pairs = [axis.errors(comparison, mask) for mask in masks for axis in axes]

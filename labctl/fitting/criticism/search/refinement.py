@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
@@ -18,6 +17,7 @@ from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.model_comparison import Comparison, centred, compare_models, constant_coordinates
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.effects import CATALOGUE, Effect, Term
+from labctl.progress import report_stage
 
 #: A parameter that is a choice between shapes, and no quantity, is not refined.
 CHOICES = frozenset({"of_gradient", "bowed", "by_sign", "by_position", "per_turn"})
@@ -51,6 +51,7 @@ def refined_term(comparison: Comparison, candidate: Candidate) -> Term:
         return term
     for name in term.parameters:
         if name not in CHOICES:
+            report_stage(f"refining the shape of {candidate.id}")
             term = _along(comparison, candidate, kind, term, name)
     return term
 
@@ -63,6 +64,8 @@ def _along(comparison: Comparison, candidate: Candidate, kind: Effect, term: Ter
     low, high = np.log(grid[max(at - 1, 0)]), np.log(grid[min(at + 1, len(grid) - 1)])
     if not high > low:
         return term
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415  0.1 s that an adequate model does not need
+
     gain = _gain_function(comparison, candidate, kind)
 
     def with_value(logarithm: float) -> Term:

@@ -86,8 +86,8 @@ export function saveBlob(blob, name) {
  * Yield {event, id, data} of a stream of server-sent events until it ends. A comment (keep-alive) is {event: "alive"}.
  * Not an EventSource, because that cannot send a key.
  */
-export async function* eventStream(path, { after, signal } = {}) {
-  const response = await request(path, { headers: headers(after ? { "Last-Event-ID": String(after) } : {}), signal });
+export async function* eventStream(path, { after, query, signal } = {}) {
+  const response = await request(withQuery(path, query), { headers: headers(after ? { "Last-Event-ID": String(after) } : {}), signal });
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";
   try {
@@ -102,6 +102,19 @@ export async function* eventStream(path, { after, signal } = {}) {
   } finally {
     reader.cancel().catch(() => {});
   }
+}
+
+/**
+ * The answer of a long computation, followed to its end: `onstage` is called with each stage, in words. Leaving the
+ * page (`signal`) cancels the computation in the service.
+ */
+export async function getFollowed(path, { query, signal, onstage }) {
+  for await (const { event, data } of eventStream(path, { query, signal })) {
+    if (event === "stage") onstage(data.stage);
+    else if (event === "answer") return data;
+    else if (event === "problem") throw new Problem(data);
+  }
+  throw new Unreachable();
 }
 
 function parseMessage(message) {

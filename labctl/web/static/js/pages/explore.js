@@ -1,6 +1,6 @@
 // The explore page: compare a version with a recording, diagnose residuals, find the missing effect, extend the model.
 
-import { get, post } from "../core/api.js";
+import { get, getFollowed, post } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
 import { busyIndicator, button, card, selectField, emptyState, pageHeader, notice, toggleGroup, errorPage } from "../core/components.js";
@@ -75,9 +75,10 @@ function firstFitCard(unit, recording) {
 
 /** A version compared with a recording; shown when the criticism is computed. */
 function versionView({ unit, version, versions, recording, asked, signal }) {
-  const place = h("div", { class: "page" }, h("div", { class: "card" }, busyIndicator("Holding the model against every reading; the first time takes some seconds.")));
+  const stage = h("p", { class: "muted", "aria-live": "polite" });
+  const place = h("div", { class: "page" }, h("div", { class: "card" }, busyIndicator("Holding the model against every reading; the first time takes some seconds."), stage));
   const path = `/api/units/${encodeURIComponent(unit.serial)}/calibrations/${version}`;
-  const asking = Promise.all([get(`${path}/criticism`, { query: { recording }, signal }), get(path, { signal }), get("/api/effects", { signal })]);
+  const asking = Promise.all([getFollowed(`${path}/criticism/events`, { query: { recording }, signal, onstage: (name) => setChildren(stage, `${name} …`) }), get(path, { signal }), get("/api/effects", { signal })]);
   asking.then(([criticism, calibration, catalogue]) => {
     const axes = axisNames(criticism);
     const state = new ExploreState({ serial: unit.serial, unit, version, versions, recording, criticism, calibration, axis: axes.includes(asked.axis) ? asked.axis : axes[0], pick: asked.pick });

@@ -1,0 +1,75 @@
+"""Single flight: threads that ask the same question at the same time work at it in turn, the first for all."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from weakref import WeakValueDictionary
+
+from labctl.progress import Cancelled, Progress, progress, reporting_to
+
+#: A thread that waits for another's result looks this often whether its own caller still wants it, s.
+LOOK_S = 0.1
+
+
+class _Flight:
+    """One question that threads work at in turn; forgotten when no thread holds it. Each thread reports to its own."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._guard = threading.Lock()
+        self._wanted_by: list[Progress] = []
+        self._stage = "waiting for the same question"
+
+    @contextmanager
+    def turn(self) -> Iterator[None]:
+        """Work at the question as the only thread; its stages are reported to all threads that wait for their turn.
+
+        Raises Cancelled where the caller does not want the result any more. The work of a thread whose caller has left
+        goes on while another waits for its result.
+        """
+        own = progress()
+        with self._guard:
+            self._wanted_by.append(own)
+        try:
+            while not self._lock.acquire(timeout=LOOK_S):
+                own(self._stage)
+            try:
+                with reporting_to(self._report):
+                    yield
+            finally:
+                self._lock.release()
+        finally:
+            self._leave(own)
+
+    def _report(self, stage: str) -> None:
+        self._stage = stage
+        with self._guard:
+            wanted_by = list(self._wanted_by)
+        for each in wanted_by:
+            try:
+                each(stage)
+            except Cancelled:
+                self._leave(each)
+        with self._guard:
+            if not self._wanted_by:
+                raise Cancelled(stage)
+
+    def _leave(self, who: Progress) -> None:
+        with self._guard:
+            if who in self._wanted_by:
+                self._wanted_by.remove(who)
+
+
+_flights: WeakValueDictionary[str, _Flight] = WeakValueDictionary()
+_flights_guard = threading.Lock()
+
+
+@contextmanager
+def single_flight(asked: str) -> Iterator[None]:
+    """Let one thread of this process at a time work at the same question. Raises Cancelled."""
+    with _flights_guard:
+        flight = _flights.setdefault(asked, _Flight())
+    with flight.turn():
+        yield

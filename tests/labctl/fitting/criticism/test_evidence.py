@@ -1,0 +1,47 @@
+"""Evidence over a grid of noises: by modes of the drift it is the same as noise by noise; outliers by order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.elimination import WhitenedBase, gains_by_noise, non_mean_products
+from labctl.fitting.criticism.evidence.gains import gains_of
+from labctl.fitting.criticism.evidence.noise_grid import noise_grid
+from labctl.fitting.criticism.reduction.outliers import FEW, inlier_mask
+
+
+def test_gains_at_every_noise_are_those_at_each_by_itself() -> None:
+    rng = np.random.default_rng(3)
+    m, present = 60, np.ones((2, 60), dtype=bool)
+    design = Design(
+        rng.normal(size=(2, m, 3)), np.array([0.0, 0.0, 4.0]), [], present,
+        np.sort(rng.uniform(0, 5000, m)), np.repeat([1, 2], m // 2),
+    )  # fmt: skip
+    white, scale = rng.uniform(0.5, 2.0, m) * 1e-6, np.full((2, m), 1e-3)
+    columns = rng.normal(size=(2, m, 6))
+    slices = [slice(0, 1), slice(1, 3), slice(3, 5)]
+    noises = noise_grid("mems", 0.003, 1e-3)
+    others = non_mean_products(design, columns, scale)
+    log_p, gain, dimensions = gains_by_noise(design, white, columns[0], others, slices, noises)
+    for i, noise in enumerate(noises):
+        left = WhitenedBase(design, white, noise).eliminate_from(columns[0], others)
+        expected, number = gains_of(left, slices)
+        assert log_p[i] == pytest.approx(left.log_p, rel=1e-10)
+        np.testing.assert_allclose(gain[i], expected, rtol=1e-9)
+        assert dimensions[i].tolist() == number.tolist()
+
+
+def test_outliers_are_those_by_median_and_quantile_of_what_is_there() -> None:
+    rng = np.random.default_rng(4)
+    values, there = rng.normal(size=(40, 101)), np.ones((40, 101))
+    there[::3, 70:] = 0.0
+    values[:, 5] += rng.choice([0.0, 30.0], 40)
+    masked = np.where(there > 0, values, np.nan)
+    far = np.abs(masked - np.nanmedian(masked, axis=1, keepdims=True))
+    limit = np.maximum(
+        6 * 1.4826 * np.nanmedian(far, axis=1, keepdims=True), 3 * np.nanquantile(far, 1 - 2 * FEW, axis=1)[:, None]
+    )
+    np.testing.assert_array_equal(inlier_mask(values, there) == 0.0, far > limit)
+    assert (inlier_mask(values, there) == 0.0).sum() > 5
