@@ -5,6 +5,7 @@ from __future__ import annotations
 from procedures.contracts.errors import GuardTripped, StepFailed
 from procedures.contracts.journal import CampaignState, Event
 from procedures.execution.context import POLL_S, ExecutionContext
+from procedures.execution.waiting import pass_time
 
 
 def suspend(context: ExecutionContext, violation: GuardTripped) -> None:
@@ -19,7 +20,7 @@ def suspend(context: ExecutionContext, violation: GuardTripped) -> None:
     recorder.change_state(CampaignState.PAUSED, f"suspended: {violation}")
     began_s = clear_since_s = clock.now_s()
     while clock.now_s() - clear_since_s < rules.release_s:
-        context.pass_time(POLL_S, pausing=False)
+        pass_time(context, POLL_S, pausing=False)
         violations = context.without_dropouts(context.monitor.poll(POLL_S))
         if any(each.action == "fail" for each in violations):
             raise StepFailed(f"while suspended: {violations[0].message}")
