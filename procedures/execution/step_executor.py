@@ -7,11 +7,10 @@ from procedures.contracts.errors import Aborted, GuardTripped, ProcedureError, S
 from procedures.contracts.journal import Event
 from procedures.contracts.steps import Acquire, SafeState, Step, StepResult
 from procedures.execution.context import ExecutionContext
-from procedures.execution.guard_suspension import suspend
 from procedures.execution.reconnect import reconnect
 from procedures.execution.step_handlers import HANDLERS, Figures
 from procedures.execution.step_recovery import Recovery
-from procedures.execution.waiting import checkpoint, hold
+from procedures.execution.waiting import checkpoint, hold, suspend
 from procedures.monitoring.event_recorder import warning
 from procedures.planning.plan import Plan
 
