@@ -1,7 +1,8 @@
 """Waiting: time that passes in slices, with a look at the requests of people and at the bench in each.
 
-Whatever waits, for a soak, a settled rate, a person, a link or limits to hold again, waits here: a request to stop takes
-effect within `CHECK_S`, as `Aborted` or `Interrupted`. Ctrl-C at a terminal is a `KeyboardInterrupt` out of the clock's sleep.
+Whatever waits, for a soak, a settled rate, a person, a link or limits to hold again, waits here: a request to stop
+takes effect within `CHECK_S`, as `Aborted` or `Interrupted`. Ctrl-C at a terminal is a `KeyboardInterrupt` out of the
+clock's sleep.
 """
 
 from __future__ import annotations
