@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.helpers.browser import Faults, Service
+from tests.helpers.browser import Faults, Service, settled
 from tests.helpers.simulated_recordings import single_axis
 from tests.helpers.spoilt import at_one_dataset, spoilt, wrong_rate
 
@@ -55,4 +55,6 @@ def test_wrong_data_are_refused_in_words_and_fitted_only_when_it_is_insisted_on(
     dialog.get_by_role("button", name="Make version anyway").click()
     page.wait_for_url("**version=2**")
     assert [row["version"] for row in service.get(path)] == [2, 1]
+    expect(page.get_by_role("region", name="Verdict")).to_contain_text("version 2 held against recording 1")
+    settled(page)
     faults.clear()  # the browser itself logs each refusal

@@ -14,7 +14,7 @@ export async function postFit(path, body, confirm) {
   } catch (error) {
     if (!error.type?.endsWith(":data-refused")) throw error;
     const answers = await dialog("The fit is refused", [], {
-      text: "A calibration from these data would be wrong. It can be made to look into it; the warnings stay with the version.",
+      text: "The calibration would be wrong. A version that is made anyway keeps these warnings.",
       body: against(error), confirm, kind: "danger",
     });
     return answers && post(path, { ...body, accept_warnings: true });
@@ -23,5 +23,5 @@ export async function postFit(path, body, confirm) {
 
 function against({ warnings, message }) {
   const sentences = warnings?.length ? warnings.map((each) => `${each.severity === "certain" ? "Wrong" : "Check"}: ${each.text}`) : [message];
-  return notice("bad", h("p", {}, h("strong", {}, "This speaks against it:")), h("ul", { class: "plain" }, sentences.map((each) => h("li", {}, each))));
+  return notice("bad", h("p", {}, h("strong", {}, "This speaks against it:")), h("ul", { class: "plain" }, sentences.map((each) => h("li", {}, `${each}.`))));
 }

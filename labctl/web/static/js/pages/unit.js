@@ -78,7 +78,7 @@ function versionCards(base, rows, signal) {
       const [first, second] = await asked;
       return h("div", { class: "stack" }, second ? comparison(first, second) : null, coefficients(first, second));
     });
-    asked.then(([first]) => uncertainty.show(first), () => setChildren(uncertainty.element));
+    asked.then(([first]) => first.version === one && uncertainty.show(first), () => setChildren(uncertainty.element));
   };
   draw();
   return [cardWithHeader("Coefficients", h("div", { class: "row" }, ofOne[0], select("beside", other, true, (value) => { other = value; draw(); })), place),
