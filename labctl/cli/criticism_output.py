@@ -59,7 +59,7 @@ def print_criticism(answer: CriticismResponse) -> None:
         for suspect in answer.suspects:
             others = [e for e in suspect["alias_group"] if e != suspect["effect"]]
             rows.add_row(
-                suspect["effect"], suspect["origin"], format_number(suspect["log_bayes_factor"], 3),
+                _name_of(suspect), suspect["origin"], format_number(suspect["log_bayes_factor"], 3),
                 format_number(suspect["rms_after_dps"]), format_number(suspect["heldout_rms_after_dps"]),
                 ", ".join(others[:3]),
             )  # fmt: skip
@@ -99,6 +99,10 @@ def _print_static(static: dict[str, Any]) -> None:
         instead = "; B stands for the data sheet" if noise["replaces_datasheet"] else ""
         text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {said or 'no slope shows'}{instead}"
         console.print(text, style="dim", markup=False)
+
+
+def _name_of(suspect: dict[str, Any]) -> str:
+    return str(suspect["effect"]) + ("" if suspect.get("physical", True) else " (not physical)")
 
 
 def _print_map(picture: dict[str, Any], columns: int = 21) -> None:

@@ -10,6 +10,11 @@ import plotly.graph_objects as go
 from labctl.plots.temperature_scale import temperature_colour, temperature_marker
 from labctl.plots.theme import grid_of, place
 
+#: Far enough that the names of the axes are inside of the picture.
+CAMERA = {"eye": {"x": 1.55, "y": 1.55, "z": 0.9}, "center": {"x": 0.0, "y": 0.0, "z": -0.18}}
+#: The same box for every panel.
+ASPECT = {"x": 1.0, "y": 1.0, "z": 0.8}
+
 
 def error_over_rate(comparison: Mapping[str, Any]) -> go.Figure | None:
     """Return a panel for each output and position: measured errors as dots, a line for each temperature level."""
@@ -72,7 +77,7 @@ def full_turn(comparison: Mapping[str, Any]) -> go.Figure | None:
             )  # fmt: skip
             figure.update_scenes(
                 xaxis_title="rate, deg/s", yaxis_title="deg C", zaxis_title="deg per turn",
-                zaxis_range=[least, most], row=row, col=col,
+                zaxis_range=[least, most], camera=CAMERA, aspectmode="manual", aspectratio=ASPECT, row=row, col=col,
             )  # fmt: skip
     figure.update_layout(height=420 * len(axes))
     return figure

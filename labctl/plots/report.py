@@ -90,9 +90,13 @@ def _errors(error: Mapping[str, Any]) -> str:
     return _table(("RMS error", "deg/s"), [(word, _number(error.get(key))) for key, word in ERRORS])
 
 
+def _name_of(suspect: Mapping[str, Any]) -> str:
+    return str(suspect["effect"]) + ("" if suspect.get("physical", True) else " (not physical)")
+
+
 def _suspects(suspects: Sequence[Mapping[str, Any]]) -> str:
     rows = [
-        (s["effect"], s["origin"], _number(s["log_bayes_factor"]), _number(s["rms_after_dps"]),
+        (_name_of(s), s["origin"], _number(s["log_bayes_factor"]), _number(s["rms_after_dps"]),
          _number(s["heldout_rms_after_dps"]), ", ".join(e for e in s["alias_group"] if e != s["effect"]))
         for s in suspects
     ]  # fmt: skip

@@ -31,6 +31,8 @@ from labctl.progress import report_stage
 
 #: At most this many suspects are reported.
 SHOWN = 6
+#: And at most this many that have the evidence, but at a size that the unit's technology cannot have.
+UNPHYSICAL_SHOWN = 2
 
 
 @dataclass(frozen=True)
@@ -54,16 +56,18 @@ def suspects_of(
     model: ErrorModel,
     shape_of: Callable[[Comparison, Candidate], Term],
 ) -> list[Suspect]:
-    """Return what may be missing, best first.
+    """Return what may be missing, best first; last what is of a size that the unit's technology cannot have.
 
     The ranking is that of `comparison`. Coefficients are those of a fit with the effect in its best shape (`shape_of`),
     the one that adding the effect makes; without that fit they are those of `seen`, with the noise that remains
     beside a fuller model.
     """
     probability = probabilities(comparison.candidates)
-    effects = [c for c in comparison.candidates if not c.smooth][:SHOWN]
+    effects = [c for c in comparison.candidates if not c.smooth]
+    shown = [c for c in effects if c.physical][:SHOWN]
+    shown += [c for c in effects if not c.physical and c.log_bf >= ENOUGH][:UNPHYSICAL_SHOWN]
     found = []
-    for candidate in effects:
+    for candidate in shown:
         after = _fit_with(comparison, candidate, data, model, shape_of)
         fitted = _fitted_coefficients(after, candidate) if after and candidate.id not in model.effect_ids else {}
         suspect = Suspect(

@@ -220,9 +220,12 @@ def channels_behind(comparison: Comparison) -> tuple[str, ...]:
 
 
 def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
-    """Return effect id -> probability that it is the one missing; prior: nothing as likely as all effects together."""
+    """Return effect id -> probability that it is the one missing; prior: nothing as likely as all effects together.
+
+    0 for an effect of a size that the unit's technology cannot have.
+    """
     effects = [c for c in candidates if not c.smooth]
-    log_bf = np.array([c.log_bf for c in effects]) - np.log(max(len(effects), 1))
+    log_bf = np.array([c.log_bf if c.physical else -np.inf for c in effects]) - np.log(max(len(effects), 1))
     top = max(float(log_bf.max(initial=0.0)), 0.0)
     weights = np.exp(log_bf - top)
     total = weights.sum() + np.exp(-top)

@@ -115,6 +115,7 @@ def _suspect(suspect: Suspect, found: Criticism) -> dict[str, Any]:
         "coefficients": {axis: dict(values) for axis, values in suspect.coefficients.items()},
         "coefficients_from": "fit" if suspect.is_fitted else "comparison",
         "parameters": _shape(suspect),
+        "physical": candidate.physical,
         "plausible": list(kind.ranges[technology]) if technology in kind.ranges else None,
         "rms_after_dps": after.rms_dps if after else None,
         "heldout_rms_after_dps": after.heldout_rms_dps if after else None,

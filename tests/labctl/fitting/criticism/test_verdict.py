@@ -134,3 +134,14 @@ def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
     )
     said = sentences(told, [{"do": "the rates in random order"}, {"do": "another"}])
     assert [line for line in said if line.startswith("To tell")] == ["To tell: the rates in random order."]
+
+
+def test_what_is_not_physical_is_suspected_last_with_probability_0() -> None:
+    """A MEMS unit has no open-loop interferometer: its sine is alike a cubic, and comes after what a MEMS can have."""
+    recording = three_axes(1, scale_factor_odd=3e-9)
+    found = held(recording, "yang2018", full=True)
+    assert found.verdict.named == ("scale_factor_odd",)
+    assert found.suspects[0].candidate.id == "scale_factor_odd"
+    last = found.suspects[-1]
+    assert (last.candidate.id, last.candidate.physical, last.probability) == ("sine_response", False, 0.0)
+    assert sum(suspect.probability for suspect in found.suspects) == pytest.approx(1.0, abs=1e-6)

@@ -50,7 +50,7 @@ export function suspectList(state, { onadd, explain }) {
   const list = h("ol", { class: "suspects", "aria-label": "Suspects" });
   const fillList = () => setChildren(list, speaking.map((s) => h("li", { class: "suspect" },
     h("div", { class: "stack", style: "gap: .3rem" },
-      h("div", { class: "row tight" }, h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, idText(s.effect)), named.has(s.effect) ? chip("named", "warn") : null),
+      h("div", { class: "row tight" }, h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, idText(s.effect)), named.has(s.effect) ? chip("named", "warn") : null, s.physical !== false ? null : chip("not physical here")),
       h("div", { class: "muted small" }, s.explanation),
       h("div", { class: "row tight" }, button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "primary" : ""}` }), draw(s))),
     evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
