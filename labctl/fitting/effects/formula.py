@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from instruments.toml_documents import read_toml
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Span, Term
@@ -155,7 +156,7 @@ def read_formula(line: str) -> Formula:
 
 def _from_file(path: Path) -> list[Formula]:
     try:
-        records = tomllib.loads(path.read_text(encoding="utf-8"))["effects"]
+        records = read_toml(path)["effects"]
         return [_made(str(r["id"]), str(r["formula"]), str(r.get("sentence", ""))) for r in records]
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise BadInput(f"formulas {path}: {error}") from error
