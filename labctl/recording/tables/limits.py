@@ -49,8 +49,8 @@ def refuse_too_large(path: Path, size: int) -> None:
     """Raise BadRecording where a file unpacks to more than so many values need: long words, padding."""
     if size > MOST_UNPACKED_BYTES:
         raise BadRecording(
-            f"{path}: unpacks to {size / 1e6:g} MB; at most {MOST_UNPACKED_BYTES / 1e6:g} MB are read from one file; {_ADVICE}, or "
-            "shorten its words"
+            f"{path}: unpacks to {size / 1e6:g} MB; at most {MOST_UNPACKED_BYTES / 1e6:g} MB are read from "
+            f"one file; {_ADVICE}, or shorten its words"
         )
 
 
