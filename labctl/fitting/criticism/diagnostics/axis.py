@@ -38,6 +38,12 @@ class AxisView:
         """Whether the recording says when each data set was measured."""
         return "t_s" in self.data.nodes
 
+    @property
+    def over_floor(self) -> Array:
+        """Residuals in units of the noise floor, (m,); not finite where readings without scatter leave none."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.residual_dps / self.floor_dps
+
     def u_dps(self, weights: NDArray[np.float64]) -> Array:
         """Return the standard uncertainty of weighted sums of means, weights (k, m), as (k,)."""
         return np.sqrt(np.maximum(np.einsum("km,km->k", weights @ self.covariance, weights), 0.0))
