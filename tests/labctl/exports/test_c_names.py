@@ -34,7 +34,8 @@ ALIKE = (
     "A--1",
     "1",
 )
-SUFFIXES = ["_AXES", "_NODES", "_b", "_c", "_correct", "_hash", "_held", "_held_c", "_inside_c", "_k", "_k_squared", "_node_c", "_output_dps", "_temperature_c"]  # fmt: skip
+SUFFIXES = ("_AXES", "_NODES", "_b", "_c", "_correct", "_hash", "_held", "_held_c", "_inside_c", "_k", "_k_squared")
+SUFFIXES += ("_node_c", "_output_dps", "_temperature_c")
 MAIN = """
 #include <stdio.h>
 {includes}
