@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -72,12 +73,8 @@ class ColumnValues:
 
     def _numbers(self, text: pa.Array) -> NDArray[Any]:
         """Return numbers written as text; raises ArrowInvalid where one is none."""
-        text = pc.utf8_trim_whitespace(text.cast(pa.string()))
-        if self.kind == "integer":
-            try:
-                return self._within(np.asarray(text.cast(pa.int64())))
-            except pa.ArrowInvalid:  # 1.0 and 1e3 are whole numbers too
-                pass
+        with contextlib.suppress(pa.ArrowInvalid):  # 1.0 and 1e3 are whole numbers too, and no number may be empty
+            return self._within(np.asarray(text.cast(pa.int64()))) if self.kind == "integer" else _floats(text)
         values = _floats(_nan_where_empty(text).cast(pa.float64()))
         return self._whole(values) if self.kind == "integer" else values
 
