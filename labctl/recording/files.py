@@ -32,7 +32,7 @@ def read_recording(folder: Path) -> Recording:
     Raises BadRecording, which names the file, the column, the row (1 is the first row below the header) and what was
     expected.
     """
-    from labctl.recording.tables import read_table  # noqa: PLC0415  0.2 s that only files need
+    from labctl.recording.data_files import read_table  # noqa: PLC0415  0.2 s that only files need
 
     info = _read_head(folder / HEAD)
     path = _data_file(folder, info.kind)
@@ -75,7 +75,7 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
 
     The folder appears whole or not at all. Raises BadRecording when it exists already.
     """
-    from labctl.recording.tables import write_table  # noqa: PLC0415  as above
+    from labctl.recording.data_files import write_table  # noqa: PLC0415  as above
 
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BadRecording(f"{folder}: exists already and is not empty; name a new folder")

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
-from labctl.recording.tables import read_table
+from labctl.recording.data_files import read_table
 
 
 def compensate_file(calibration: Path, source: Path, target: Path, outside: str) -> dict[str, Any]:

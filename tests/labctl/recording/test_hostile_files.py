@@ -13,7 +13,7 @@ import pytest
 
 from labctl.errors import BadRecording
 from labctl.recording import read_recording
-from labctl.recording.tables import limits, read_table
+from labctl.recording.data_files import limits, read_table
 from tests.helpers.hostile_parquet import write_constant_rows
 from tests.helpers.hostile_recordings import GOOD, HOSTILE, constant_rows, with_column, with_datasets
 
@@ -23,7 +23,7 @@ import resource, sys
 from pathlib import Path
 from labctl.errors import BadRecording
 from labctl.recording import read_recording
-import labctl.recording.tables
+import labctl.recording.data_files
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 try:
     read_recording(Path(sys.argv[1]))

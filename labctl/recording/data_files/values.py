@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
 from labctl.recording.columns import BY_NAME
-from labctl.recording.tables.limits import LARGEST_WHOLE, Space
+from labctl.recording.data_files.limits import LARGEST_WHOLE, Space
 
 #: A character of numpy's text takes this many bytes.
 CHARACTER_BYTES = 4

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
 from labctl.recording.columns import BY_NAME
-from labctl.recording.tables.limits import VALUE_BYTES, Space, checked_names, refuse_too_large, refuse_too_many
-from labctl.recording.tables.values import ColumnValues, holds_words
+from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names, refuse_too_large, refuse_too_many
+from labctl.recording.data_files.values import ColumnValues, holds_words
 
 #: Rows that are unpacked at a time.
 PIECE_ROWS = 1 << 16

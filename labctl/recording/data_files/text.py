@@ -11,8 +11,8 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
-from labctl.recording.tables.limits import VALUE_BYTES, Space, checked_names, refuse_too_many
-from labctl.recording.tables.values import ColumnValues
+from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names, refuse_too_many
+from labctl.recording.data_files.values import ColumnValues
 
 #: The longest header that is read.
 MOST_HEADER_BYTES = 1 << 16

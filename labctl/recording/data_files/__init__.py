@@ -14,9 +14,9 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
+from labctl.recording.data_files.parquet import read_parquet
+from labctl.recording.data_files.text import read_csv
 from labctl.recording.recording import Columns
-from labctl.recording.tables.parquet import read_parquet
-from labctl.recording.tables.text import read_csv
 
 
 def read_table(path: Path) -> dict[str, NDArray[Any]]:
