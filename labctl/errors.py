@@ -21,6 +21,9 @@ LabctlError              exit 2, HTTP 400
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 
 class LabctlError(Exception):
     """Anything that a person can be told in one line."""
@@ -28,6 +31,11 @@ class LabctlError(Exception):
     status = 400  #: HTTP
     exit_status = 2  #: command line; 1 where the answer to a fair question is no
     slug = "error"  #: last part of the problem document's `type`
+
+    @property
+    def members(self) -> Mapping[str, Any]:
+        """What the problem document has beside the members of every one, as JSON."""
+        return {}
 
 
 class BadInput(LabctlError):
@@ -43,10 +51,22 @@ class BadRecording(BadInput):
 
 
 class DataRefused(BadInput):
-    """What is asked for would be wrong with certainty, by the data's own evidence; it can be insisted on."""
+    """What is asked for would be wrong with certainty, by the data's own evidence; it can be insisted on.
+
+    `warnings`: everything that is wrong, as JSON; the text has the first.
+    """
 
     status = 422
     slug = "data-refused"
+
+    def __init__(self, text: str, warnings: Sequence[Mapping[str, Any]] = ()) -> None:
+        super().__init__(text)
+        self.warnings = list(warnings)
+
+    @property
+    def members(self) -> Mapping[str, Any]:
+        """The warnings."""
+        return {"warnings": self.warnings}
 
 
 class BadBench(BadInput):

@@ -23,15 +23,16 @@ UNREADABLE = "There was an error parsing the body"
 TYPE_PREFIX = "urn:labctl:problem:"
 
 
-def problem(status: int, slug: str, title: str, detail: str, instance: str) -> JSONResponse:
-    """Make a problem document."""
+def problem(status: int, slug: str, title: str, detail: str, instance: str, **members: Any) -> JSONResponse:
+    """Make a problem document; `members` are those beside the usual ones."""
     body = {"type": TYPE_PREFIX + slug, "title": title, "status": status, "detail": detail, "instance": instance}
+    body |= members
     return JSONResponse(body, status_code=status, media_type="application/problem+json")
 
 
 def as_problem(error: LabctlError, path: str) -> JSONResponse:
     """Make the problem document of a LabctlError."""
-    answer = problem(error.status, error.slug, _title(type(error)), str(error), path)
+    answer = problem(error.status, error.slug, _title(type(error)), str(error), path, **error.members)
     if isinstance(error, NotIdentified):
         answer.headers["WWW-Authenticate"] = 'Bearer realm="labctl"'
     return answer

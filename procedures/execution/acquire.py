@@ -11,6 +11,7 @@ from procedures.contracts.errors import BadData, GuardTripped, StepFailed
 from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
 from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
+from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.event_recorder import warning
@@ -114,7 +115,7 @@ def _gate(spin: Spin, step: Acquire) -> tuple[float, float]:
 
 def _wait_for_gate(context: ExecutionContext, from_s: float) -> None:
     """Let the table settle, then drop what the streams have buffered meanwhile, unless the gate is open already."""
-    context.pass_time(from_s - LEAD_S - context.clock.now_s(), pausing=False)
+    pass_time(context, from_s - LEAD_S - context.clock.now_s(), pausing=False)
     if context.clock.now_s() >= from_s:
         return
     for name, gyro in context.bench.gyros.items():
@@ -146,7 +147,7 @@ def _read_gate(
             context.poll(read_latest=False)
         else:
             raise_violation(context.monitor.check_guards())
-        context.checkpoint()
+        checkpoint(context)
     if len(gyros) > 1:  # the unit read first in the last round still has the end of the gate in its buffer
         _read_round(context, number, gate, counts, 0.0)
         raise_violation(context.monitor.check_guards())

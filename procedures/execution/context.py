@@ -10,8 +10,7 @@ from instruments.clock import Clock
 from instruments.errors import InstrumentError
 from procedures.contracts.bench import Bench
 from procedures.contracts.control import Control
-from procedures.contracts.errors import Aborted, Interrupted
-from procedures.contracts.journal import CampaignState, Event
+from procedures.contracts.journal import Event
 from procedures.contracts.operator import Operator
 from procedures.contracts.steps import Soak
 from procedures.execution.active_bench import ActiveBench
@@ -20,7 +19,6 @@ from procedures.monitoring.guards import GuardViolation
 from procedures.monitoring.monitor import BenchMonitor
 from procedures.recipe.recipe import Recipe
 
-CHECK_S = 1.0  #: how long the clock runs at most between two looks at the control
 #: From poll to poll. With a second of reading and a unit's reply in between, rows of the environment are never more
 #: than 10 s apart, which is what effects with a memory need.
 POLL_S = 8.5
@@ -44,40 +42,6 @@ class ExecutionContext:
     soaked: Soak | None = None  #: the soak that still holds: its temperature has not been left since
     owed_soak: Soak | None = None  #: the soak to be done again before the next data set
     _prompts: int = field(default=0, repr=False)
-
-    def checkpoint(self) -> None:
-        """Obey a request to end. Raises Interrupted for a campaign that is to be resumed, else Aborted."""
-        request = self.control.poll()
-        if request.abort:
-            raise Interrupted(request.reason) if request.resumable else Aborted(request.reason)
-
-    def pass_time(self, duration_s: float, *, pausing: bool = True) -> None:
-        """Let the clock run, with a checkpoint at least once a second. Raises Aborted."""
-        until_s = self.clock.now_s() + duration_s
-        self.checkpoint()
-        while (left_s := until_s - self.clock.now_s()) > 0:
-            self.clock.sleep(min(CHECK_S, left_s))
-            self.checkpoint()
-            if pausing and self.control.request.pause:
-                self.hold()
-
-    def polls(self, *, pausing: bool = True) -> Iterator[None]:
-        """Poll the bench now and then every `POLL_S` for as long as the caller iterates.
-
-        Raises Aborted, GuardTripped, InstrumentError.
-        """
-        while True:
-            self.poll()
-            yield
-            self.pass_time(POLL_S, pausing=pausing)
-
-    def record_for(self, duration_s: float) -> None:
-        """Let time pass with the environment recorded. Raises what `polls` raises."""
-        until_s = self.clock.now_s() + duration_s
-        self.poll()
-        while (left_s := until_s - self.clock.now_s()) > 0:
-            self.pass_time(min(POLL_S, left_s))
-            self.poll()
 
     def poll(self, *, read_latest: bool = True) -> None:
         """Poll the bench once. Raises GuardTripped for a limit that does more than warn, and InstrumentError."""
@@ -108,23 +72,6 @@ class ExecutionContext:
         self.recorder.tracker.update(dropped=dict(self.bench.dropped))
         text = f"{gyro} takes no further part: {reason}"
         self.recorder.event(Event("unit_dropped", text, level="error", device=gyro))
-
-    def hold(self) -> None:
-        """Stay as things are while a pause is requested; the environment is recorded and guards stay armed."""
-        if not self.control.request.pause:
-            return
-        before, began_s = self.recorder.state, self.clock.now_s()
-        self.recorder.change_state(CampaignState.PAUSED, self.control.request.reason)
-        next_poll_s = began_s
-        with self.monitor.listening(self.notice_leaving):
-            while self.control.request.pause:
-                if self.clock.now_s() >= next_poll_s:
-                    self.poll()
-                    next_poll_s = self.clock.now_s() + POLL_S
-                self.clock.sleep(CHECK_S)
-                self.checkpoint()
-        self.paused_s += self.clock.now_s() - began_s
-        self.recorder.change_state(before, self.control.request.reason)
 
     def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
         """Take in that a soaked temperature no longer holds, once the air has left its band."""

@@ -7,7 +7,8 @@ import math
 from procedures.contracts.errors import StepFailed, Unanswered
 from procedures.contracts.journal import CampaignState, Event
 from procedures.contracts.operator import Answer, Prompt
-from procedures.execution.context import CHECK_S, POLL_S, ExecutionContext
+from procedures.execution.context import POLL_S, ExecutionContext
+from procedures.execution.waiting import CHECK_S, pass_time
 from procedures.monitoring.event_recorder import warning
 
 
@@ -57,5 +58,5 @@ def _poll_until_answered(context: ExecutionContext, prompt: Prompt) -> Answer:
         if clock.now_s() >= next_poll_s:
             context.poll()
             next_poll_s = clock.now_s() + POLL_S
-        context.pass_time(CHECK_S, pausing=False)
+        pass_time(context, CHECK_S, pausing=False)
     return answer

@@ -5,6 +5,7 @@ from __future__ import annotations
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply
 from procedures.contracts.steps import Acquire, Home, MoveChamber, Rest, Soak, Step
 from procedures.execution.context import POLL_S, ExecutionContext, raise_violation
+from procedures.execution.waiting import pass_time
 
 PAUSES_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 STANDSTILL_S = 60.0
@@ -28,7 +29,7 @@ def reconnect(context: ExecutionContext, error: LinkError) -> None:
     device = error.device
     context.monitor.links.change(device, "degraded", f"{error}; it is tried again, {len(PAUSES_S)} times")
     for pause_s in PAUSES_S:
-        context.pass_time(pause_s, pausing=False)
+        pass_time(context, pause_s, pausing=False)
         violations = context.without_dropouts(context.monitor.poll(POLL_S))
         # a violation that suspends is found again when the step begins
         raise_violation([each for each in violations if each.action == "fail"])
@@ -48,7 +49,7 @@ def _reach(context: ExecutionContext, device: str) -> None:
         bench.table.stop()
         until_s = context.clock.now_s() + STANDSTILL_S
         while bench.table.is_moving() and context.clock.now_s() < until_s:
-            context.pass_time(1.0, pausing=False)
+            pass_time(context, 1.0, pausing=False)
         bench.table.home()
     elif device == bench.chamber.name:
         bench.chamber.read()

@@ -14,6 +14,7 @@ from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
 from procedures.execution.step_handlers import open_streams
+from procedures.execution.waiting import pass_time, record_for
 from procedures.planning.plan import Plan
 from procedures.recipe.rules import ResumeRules
 
@@ -72,7 +73,7 @@ def _make_safe_first(context: ExecutionContext) -> None:
     while complaints := make_safe(context.full_bench, context.clock):
         if context.clock.now_s() >= until_s:
             raise StepFailed("taken up, but the bench could not be made safe first: " + "; ".join(complaints))
-        context.pass_time(pause_s, pausing=False)
+        pass_time(context, pause_s, pausing=False)
         pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
     context.recorder.event(Event("safe_state", "the bench is in its safe state before anything else"))
 
@@ -107,7 +108,7 @@ def _switch_on(context: ExecutionContext, run: int, restart: Restart) -> None:
             ask(context, prompt)
             open_streams(context, run)
     context.recorder.journal.session_began(run, context.recorder.t_s())
-    context.record_for(context.recipe.warm_up_s)
+    record_for(context, context.recipe.warm_up_s)
 
 
 def _repeat(context: ExecutionContext, step: Step, start_at: int, carry_out: Callable[[Step], object]) -> None:

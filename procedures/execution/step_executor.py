@@ -8,9 +8,9 @@ from procedures.contracts.journal import Event
 from procedures.contracts.steps import Acquire, SafeState, Step, StepResult
 from procedures.execution.context import ExecutionContext
 from procedures.execution.reconnect import reconnect
-from procedures.execution.recovery import Recovery
 from procedures.execution.step_handlers import HANDLERS, Figures
-from procedures.execution.suspension import suspend
+from procedures.execution.step_recovery import Recovery
+from procedures.execution.waiting import checkpoint, hold, suspend
 from procedures.monitoring.event_recorder import warning
 from procedures.planning.plan import Plan
 
@@ -67,9 +67,9 @@ class StepExecutor:
     def _prepare(self, step: Step) -> None:
         """Obey a request to pause or abort; before a data set, repeat a soak that is owed."""
         context = self._context
-        context.checkpoint()
+        checkpoint(context)
         with context.owing_soak():
-            context.hold()
+            hold(context)
         owed = context.owed_soak
         if owed is not None and isinstance(step, Acquire):
             self._recorder.event(

@@ -16,6 +16,7 @@ from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
 from procedures.execution.soak_criterion import SoakCriterion
+from procedures.execution.waiting import pass_time, polls, record_for
 
 Figures = dict[str, float]
 #: A unit that is silent when its stream is opened is asked again after these.
@@ -37,7 +38,7 @@ def power_on(context: ExecutionContext, step: PowerOn) -> Figures:
     ask(context, Prompt(context.new_prompt_id(), "power_on", f"switch the units on (session {run})"))
     context.recorder.journal.session_began(run, context.recorder.t_s())
     open_streams(context, run)
-    context.record_for(step.wait_s)
+    record_for(context, step.wait_s)
     return {"run": float(run)}
 
 
@@ -64,7 +65,7 @@ def _open_stream(context: ExecutionContext, gyro: Gyro) -> None:
         except LinkError:
             if pause_s is None:
                 raise
-            context.pass_time(pause_s, pausing=False)
+            pass_time(context, pause_s, pausing=False)
         else:
             return
 
@@ -79,7 +80,7 @@ def power_off(context: ExecutionContext, step: PowerOff) -> Figures:
     context.monitor.units_powered(0)
     run = step.run + context.added_runs
     ask(context, Prompt(context.new_prompt_id(), "power_off", f"switch the units off (session {run})"))
-    context.record_for(step.off_s)
+    record_for(context, step.off_s)
     return {"run": float(run)}
 
 
@@ -101,7 +102,7 @@ def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
             f"{context.bench.chamber.name}: set point {set_c:g} deg C was read back, not {step.temperature_c:g}"
         )
     began_s = context.clock.now_s() - context.paused_s
-    for _ in context.polls():
+    for _ in polls(context):
         off_c = abs(context.monitor.chamber_c - step.temperature_c)
         took_s = context.clock.now_s() - context.paused_s - began_s
         if off_c <= step.band_c and context.monitor.setpoint_c == set_c:
@@ -120,7 +121,7 @@ def soak(context: ExecutionContext, step: Soak) -> Figures:
     judge = SoakCriterion(step)
     began_s = context.clock.now_s() - context.paused_s
     with context.monitor.listening(judge.add):
-        for _ in context.polls():
+        for _ in polls(context):
             if judge.settled():
                 break
             took_s = context.clock.now_s() - context.paused_s - began_s
@@ -146,7 +147,7 @@ def _unsettled(context: ExecutionContext, step: Soak, judge: SoakCriterion, took
 def rest(context: ExecutionContext, step: Rest) -> Figures:
     """Let nothing move for a while."""
     with context.monitor.taking_readings():
-        context.record_for(step.duration_s)
+        record_for(context, step.duration_s)
     return {}
 
 

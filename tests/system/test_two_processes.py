@@ -83,8 +83,9 @@ def test_the_same_data_sets_within_noise(far_bench: Path, tmp_path: Path) -> Non
     assert (one.state, two.state) == ("done", "done")
     near, far = data_sets(here, one.id), data_sets(there, two.id)
     assert len(near["n"]) == len(far["n"]) == 6
-    for name in ("dataset", "position", "run", "mounting"):
+    for name in ("position", "run", "mounting"):
         assert np.array_equal(near[name], far[name]), name
+    assert np.all(np.diff(far["dataset"]) > 0)  # one that a stall of a busy machine ended is taken again, as the next
     assert far["table_rate_dps"] == pytest.approx(near["table_rate_dps"], rel=1e-12)
     # a reading counts by when it came: on a busy machine some come too late for the gate
     assert np.abs(np.asarray(far["n"]) - 200).max() <= 20

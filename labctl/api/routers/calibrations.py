@@ -34,7 +34,6 @@ from labctl.services.schemas.calibrations import (
     LadderResponse,
     PreviewResponse,
     SurfaceResponse,
-    UncertaintyResponse,
     VersionResponse,
 )
 from labctl.services.schemas.certification import (
@@ -50,6 +49,7 @@ from labctl.services.schemas.criticism import (
     ResidualsResponse,
     VerificationResponse,
 )
+from labctl.services.schemas.uncertainty import UncertaintyResponse
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 OtherUnit = Annotated[bool, Query(description="The recording may be of another unit.")]
@@ -220,9 +220,10 @@ def uncertainty(
     service: ServiceDep,
     rate_dps: Annotated[float, Query(description="True rate about each axis in turn, deg/s.")],
     temperature_c: Annotated[float, Query(description="The gyro's thermometer, deg C.")],
+    grid: Annotated[bool, Query(description="Also on a small grid over what was calibrated.")] = False,
 ) -> UncertaintyResponse:
     """GUM components of a corrected rate at one rate and temperature, and whether that was calibrated at all."""
-    return uncertainty_at(service.store, serial, version, rate_dps, temperature_c)
+    return uncertainty_at(service.store, serial, version, rate_dps, temperature_c, grid=grid)
 
 
 @router.head("/ladder", include_in_schema=False)

@@ -29,21 +29,37 @@ class LocalModelError:
 
     def at(self, rate_dps: float, temperature_c: float) -> float | None:
         """Return the standard error of the model there, deg/s, drift of the campaign included; None if unknown."""
+        if self.unknown_at(rate_dps, temperature_c) is not None:
+            return None
         known = np.isfinite(self.left_var)
-        if not known.any():
-            return None
-        away = np.hypot(_scaled(self.rate_dps, rate_dps), _scaled(self.temperature_c, temperature_c))[known]
-        if away.min() > FARTHEST:
-            return None
-        weight = np.exp(-0.5 * away**2)
-        near = float(weight.sum() ** 2 / (weight**2).sum())
-        if near < LEAST_NEAR:
-            return None
+        weight = np.exp(-0.5 * self._away(rate_dps, temperature_c) ** 2)
+        near = _effective_number(weight)
         weight /= weight.sum()
         left = float(weight @ self.left_var[known])
         noise = float(weight @ self.white_var[known])
         unseen = LEAST_SHARE * np.sqrt(2 / near) * max(left, noise)
         return float(np.sqrt(max(left - noise, unseen)))
+
+    def unknown_at(self, rate_dps: float, temperature_c: float) -> str | None:
+        """Return why the error there is unknown, in words; None where it is known."""
+        away = self._away(rate_dps, temperature_c)
+        if len(away) == 0:
+            return "no data set could be left out of the fit: the model needs them all"
+        if away.min() > FARTHEST:
+            return "no data set was measured near there"
+        if _effective_number(np.exp(-0.5 * away**2)) < LEAST_NEAR:
+            return f"fewer than {LEAST_NEAR:g} data sets were measured near there"
+        return None
+
+    def _away(self, rate_dps: float, temperature_c: float) -> Array:
+        """Return how far a place is from each data set whose variance is known, in widths of the neighbourhood."""
+        away = np.hypot(_scaled(self.rate_dps, rate_dps), _scaled(self.temperature_c, temperature_c))
+        return np.asarray(away[np.isfinite(self.left_var)])
+
+
+def _effective_number(weight: Array) -> float:
+    """Return how many data sets of equal weight say as much."""
+    return float(weight.sum() ** 2 / (weight**2).sum())
 
 
 def _scaled(values: Array, at: float) -> Array:

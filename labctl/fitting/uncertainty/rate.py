@@ -18,6 +18,11 @@ from labctl.fitting.uncertainty.use import AxisEvidence, combined_dps
 COVERAGE = 2.0
 #: Largest rate, deg/s, and temperature, deg C, that are taken for a gyro's.
 LARGEST = 1e5
+#: Why a part is unknown.
+PUBLISHED = "published coefficients state none"
+NO_DATA_SETS = "published coefficients have no data sets that could show it"
+NOT_KEPT = "the version was made before this was kept with it: fit it again"
+NO_POWER_ON = "one power-on was recorded, and neither a data sheet nor a static record tells how far the next is off"
 #: Step of the numerical derivative of the error along the rate, deg/s.
 STEP_DPS = 0.01
 
@@ -33,6 +38,7 @@ class RateUncertainty:
     same_run_dps: float | None  #: of coefficients and model alone: without another power-on
     combined_dps: float | None  #: root of the sum of squares, wider where few runs say it; None where one is unknown
     expanded_dps: float | None  #: combined, times the coverage factor
+    unknown: Mapping[str, str]  #: "coefficients", "model" and "repeatability", those that are unknown -> why
 
 
 def rate_uncertainty(
@@ -83,7 +89,23 @@ def _of_axis(
         same_run,
         combined,
         None if combined is None else COVERAGE * combined,
+        {part: why for part, why in _unknown(coefficients, evidence, rate_dps, temperature_c).items() if why},
     )
+
+
+def _unknown(
+    coefficients_dps: float | None, evidence: AxisEvidence | None, rate_dps: float, temperature_c: float
+) -> dict[str, str | None]:
+    """Return part -> why it is unknown, in words; None for a part that is known."""
+    published = coefficients_dps is None
+    if evidence is None:
+        lacking = NO_DATA_SETS if published else NOT_KEPT
+        return {"coefficients": PUBLISHED if published else None, "model": lacking, "repeatability": lacking}
+    return {
+        "coefficients": PUBLISHED if published else None,
+        "model": evidence.model_error.unknown_at(rate_dps, temperature_c),
+        "repeatability": None if evidence.repeatability else NO_POWER_ON,
+    }
 
 
 def _of_coefficients(fitted: FittedModel, axis: str, rate_dps: float, temperature_c: float) -> float | None:

@@ -22,7 +22,7 @@ from uuid import uuid4
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock, WallClock
 from labctl.errors import BenchBusy, Conflict, LabctlError
-from labctl.services.benches.host import boot_id
+from labctl.services.benches.power_failure import boot_id
 from labctl.store import LeaseRow, Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control

@@ -31,7 +31,6 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
         verdict=criticism.verdict if criticism else None,
         verdict_reason=reason,
         verdict_recording=criticism.recording if criticism else None,
-        verdict_at=criticism.made_at if criticism else None,
         verdict_text=_sentence(criticism) if criticism else "",
         error=_errors(row),
         objections=objections,

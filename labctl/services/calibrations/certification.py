@@ -57,7 +57,7 @@ def certify(store: Store, serial: str, version: int, request: CertifyRequest, at
     if known.objections and not request.override:
         raise CertificationRefused(refusal(known))
     judgement = Judgement(
-        known.verdict, known.verdict_recording, known.verdict_at, bool(known.objections),
+        known.verdict, known.verdict_recording, at if known.verdict else None, bool(known.objections),
         known.model_dump(mode="json", include=set(KEPT)),
     )  # fmt: skip
     due = at + timedelta(days=request.due_days) if request.due_days else None

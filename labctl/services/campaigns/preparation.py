@@ -12,7 +12,7 @@ from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
 from labctl.errors import BadInput, Conflict
 from labctl.recording import OutputUnit, RecordingInfo
-from labctl.services.benches.host import boot_id
+from labctl.services.benches.power_failure import boot_id
 from labctl.services.planning.loading import load_recipe
 from labctl.store import NewCampaign, NewUnit, Store
 from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator

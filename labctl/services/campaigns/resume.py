@@ -11,8 +11,8 @@ from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, VirtualClock
 from labctl.config import default_database
 from labctl.errors import Conflict
-from labctl.services.benches.host import boot_id, power_failed
 from labctl.services.benches.lease import holding, open_for
+from labctl.services.benches.power_failure import boot_id, power_failed
 from labctl.services.campaigns.execution import Attend, Observe, run_attended
 from labctl.services.campaigns.preparation import Prepared, clock_for, operator_of, refuse_unconfirmed
 from labctl.services.planning.loading import load_bench

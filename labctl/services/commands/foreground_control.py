@@ -7,9 +7,9 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from labctl.errors import BadInput
-from labctl.services.campaigns.abandoned import abort_abandoned, not_running
 from labctl.services.campaigns.execution import Attend, Observe, run_here
 from labctl.services.campaigns.resume import resume_here
+from labctl.services.campaigns.unattended import abort_abandoned, not_running
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from labctl.errors import Conflict
-from labctl.services.campaigns.abandoned import abort_abandoned, not_running, record_action
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.unattended import abort_abandoned, not_running, record_action
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
 from labctl.services.schedule import queue

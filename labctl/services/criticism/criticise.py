@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from instruments.clock import SystemClock
 from labctl.errors import BadInput
 from labctl.services.cache import cached_group
 from labctl.services.criticism.versions import version_of
@@ -59,8 +58,7 @@ def _cached_criticism(
     def work() -> Sequence[ResponseModel]:
         from labctl.services.criticism.evaluation import evaluate  # noqa: PLC0415  slow to import
 
-        criticism, residuals = evaluate(store, row, measured, competing)
-        return criticism.model_copy(update={"made_at": SystemClock().utc()}), residuals
+        return evaluate(store, row, measured, competing)
 
     question = {
         "serial": serial, "version": row.version, "calibration": row.hash, "model": row.answer["model"],

@@ -72,4 +72,5 @@ def refuse_wrong(warnings: list[DataWarning], what: str, *, accepted: bool, insi
     sure = [warning for warning in warnings if warning.severity == "certain"]
     if sure and not accepted:
         more = f" (and {len(sure) - 1} more)" if len(sure) > 1 else ""
-        raise DataRefused(f"{what} is refused: {sure[0].text}{more}{insist}")
+        text = f"{what} is refused: {sure[0].text}{more}{insist}"
+        raise DataRefused(text, [warning.model_dump() for warning in warnings])

@@ -171,33 +171,3 @@ class SurfaceResponse(ResponseModel):
     held: dict[str, float] = Field(description="Channels that the model needs besides: their means in its recording.")
     left_out: list[dict[str, Any]] = Field(description="Effects of the fit that do not leave with the calibration.")
     axes: dict[str, Surface]
-
-
-class AxisUncertainty(ResponseModel):
-    """One axis, deg/s."""
-
-    coefficients_dps: float | None = Field(
-        description="Standard uncertainty from the coefficients' covariance; null: they state none."
-    )
-    model_dps: float | None = Field(
-        description="Error of the model and drift near this rate and temperature, by held-out data sets; null: unknown."
-    )
-    repeatability_dps: float | None = Field(description="From one power-on to the next; null: unknown.")
-    repeatability_source: str = Field(description="Between runs, data sheet, static record, or none.")
-    same_run_dps: float | None = Field(
-        description="Coefficients and model combined: without another power-on; null where one is unknown."
-    )
-    combined_dps: float | None = Field(description="All three combined; null where one of them is unknown.")
-    expanded_dps: float | None = Field(description="Combined, times the coverage factor.")
-
-
-class UncertaintyResponse(ResponseModel):
-    """The uncertainty of a corrected rate on later days; the noise of a single reading comes on top."""
-
-    serial: str
-    version: int
-    rate_dps: float
-    temperature_c: float
-    coverage_factor: float
-    inside: bool = Field(description="Whether rate and temperature are within what was calibrated.")
-    axes: dict[str, AxisUncertainty]

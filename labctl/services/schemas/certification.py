@@ -9,7 +9,7 @@ from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 
-WHEN = "When the criticism that gave the verdict was made."
+WHEN = "When the verdict was taken: at the certification."
 NO_VERDICT = (
     "Verdict of the newest criticism on the version's own recording; null: there is none, `verdict_reason` says why."
 )
@@ -54,7 +54,6 @@ class AssessmentResponse(ResponseModel):
     verdict: str | None = Field(description=NO_VERDICT)
     verdict_reason: str = Field(description="Why there is no verdict; empty where there is one.")
     verdict_recording: int | None
-    verdict_at: datetime | None = Field(description=WHEN)
     verdict_text: str = Field(description="The verdict in words; empty without one.")
     error: CertifiedErrors
     objections: list[Objection]

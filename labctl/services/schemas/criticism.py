@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import Any, Literal
 
 from pydantic import Field
@@ -59,9 +58,6 @@ class CriticismResponse(ResponseModel):
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     applied: VerificationResponse | None = Field(
         default=None, description="The version as it is on this recording; everything else is of a refit to it."
-    )
-    made_at: datetime | None = Field(
-        default=None, description="When it was computed; the answer to the same question is kept."
     )
     views: dict[str, Any] = Field(
         default_factory=dict, description="Where and how the model fails, as numbers for pictures, by view."

@@ -18,7 +18,7 @@ from labctl.store.connection.database import Database
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.points import points_columns
-from labctl.store.repositories.recording_import import write_recording
+from labctl.store.repositories.recording_writer import write_recording
 from labctl.store.repositories.sample_blocks import WHOLE_TABLE, blocks_of, channels_of, readings_in_units
 from labctl.store.schema import tables
 

@@ -66,6 +66,39 @@ def test_uncertainty_criticism_improve_and_ladder(fog: TestClient) -> None:
     assert formula.headers["content-type"] == "application/problem+json"
 
 
+def test_the_uncertainty_over_what_was_calibrated_is_that_of_each_place(fog: TestClient) -> None:
+    path = "/api/units/OSU-FOG-2024/calibrations/1"
+    place = {"rate_dps": 50, "temperature_c": 40}
+    assert fog.get(f"{path}/uncertainty", params=place).json()["grid"] is None
+    answer = fog.get(f"{path}/uncertainty", params={**place, "grid": True}).json()
+    grid, valid = answer["grid"], fog.get(path).json()["validity"]
+    low, high = valid["rate_dps"]
+    cold, warm = valid["temperature_c"]
+    assert grid["rate_dps"] == [low, low / 2, 0, high / 2, high]
+    assert grid["temperature_c"] == [cold, (cold + warm) / 2, warm]
+    for temperature, row in zip(grid["temperature_c"], grid["axes"]["z"], strict=True):
+        for rate, cell in zip(grid["rate_dps"], row, strict=True):
+            there = {"rate_dps": rate, "temperature_c": temperature}
+            assert fog.get(f"{path}/uncertainty", params=there).json()["axes"]["z"] == cell
+            assert cell["expanded_dps"] is None
+            assert list(cell["unknown"]) == ["repeatability"]
+            assert "one power-on was recorded" in cell["unknown"]["repeatability"]
+    assert grid["axes"]["z"][0][0]["same_run_dps"] > grid["axes"]["z"][1][2]["same_run_dps"]
+
+
+def test_an_unknown_uncertainty_has_its_reason(client: TestClient) -> None:
+    assert upload(client, EXAMPLES / "weiss-gyrostar").status_code == 201
+    units = "/api/units/WEISS-ENV05S/calibrations"
+    assert client.post(units, json={"model": "weiss1995"}).status_code == 201
+    place = {"rate_dps": 10, "temperature_c": 25, "grid": True}
+    answer = client.get(f"{units}/1/uncertainty", params=place).json()
+    cells = [answer["axes"]["z"], *(cell for row in answer["grid"]["axes"]["z"] for cell in row)]
+    for cell in cells:
+        assert {cell[name] for name in cell if name.endswith("_dps")} == {None}
+        assert cell["unknown"]["coefficients"] == "published coefficients state none"
+        assert set(cell["unknown"]) == {"coefficients", "model", "repeatability"}
+
+
 def test_a_unit_names_every_format_of_the_registry(fog: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(FORMATS, "text", Format("Plain text", "text/plain", "txt", Calibration.to_bytes))
     assert fog.get("/api/units/OSU-FOG-2024").json()["formats"] == [

@@ -16,8 +16,15 @@ from labctl.errors import BadInput
 from labctl.fitting import FittedModel, fit
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.uncertainty import AxisEvidence, RateUncertainty, evidence_of, rate_uncertainty
+from labctl.fitting.uncertainty.local_model_error import LocalModelError
 from labctl.recording import Recording, read_recording
-from labctl.services.calibrations.uncertainty import is_inside, uncertainty_of
+from labctl.services.calibrations.uncertainty import (
+    grid_rates,
+    grid_temperatures,
+    is_inside,
+    uncertainty_grid,
+    uncertainty_of,
+)
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.recordings import points
 
@@ -146,11 +153,70 @@ def test_what_is_not_known_is_none_and_never_zero() -> None:
     one_run = of_use(campaign(), 0.0, 20.0)
     assert one_run.same_run_dps is not None
     assert one_run.repeatability_dps is one_run.combined_dps is one_run.expanded_dps is None
+    assert list(one_run.unknown) == ["repeatability"]
     by_sheet = of_use(campaign(datasheet={"bias_stability_dps": 0.01}), 0.0, 20.0)
     assert by_sheet.repeatability_dps == pytest.approx(0.005 * np.sqrt(2))
     assert by_sheet.expanded_dps is not None
+    assert by_sheet.unknown == {}
     far = of_use(campaign(datasheet={"bias_stability_dps": 0.01}), 0.0, 90.0)
     assert far.model_dps is far.expanded_dps is None
+    assert far.unknown == {"model": "no data set was measured near there"}
+
+
+def test_too_few_data_sets_near_a_place_are_said() -> None:
+    rate, warm, nothing = np.array([0.0, 100.0, 100.0]), np.array([0.0, 40.0, 40.0]), np.full(3, np.nan)
+    error = LocalModelError(rate, warm, np.full(3, 1e-4), np.zeros(3))
+    assert error.at(0.0, 0.0) is None
+    assert error.unknown_at(0.0, 0.0) == "fewer than 3 data sets were measured near there"
+    everywhere = LocalModelError(rate, warm, nothing, np.zeros(3))
+    assert everywhere.at(0.0, 0.0) is None
+    assert "no data set could be left out" in str(everywhere.unknown_at(0.0, 0.0))
+
+
+def test_a_version_that_kept_no_evidence_says_to_fit_again(
+    make_points: Callable[..., Recording], grid_11_by_11: Any
+) -> None:
+    calibration = calibrated(make_points, grid_11_by_11, "bias_scale")
+    found = rate_uncertainty(calibration.fitted, 0.0, 35.0, evidence={}, name="unit")["z"]
+    assert found.coefficients_dps is not None
+    assert found.same_run_dps is found.expanded_dps is None
+    assert set(found.unknown) == {"model", "repeatability"}
+    assert "fit it again" in found.unknown["model"]
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        ((-400.0, 400.0), [-400, -200, 0, 200, 400]),
+        ((-399.9, 400.1), [-399.9, -199.95, 0, 200.05, 400.1]),
+        ((-0.003, 400.0), [0, 200, 400]),
+        ((10.0, 100.0), [10, 50, 100]),
+        ((80.0, 100.0), [80, 100]),
+        ((0.0028, 0.0028), [0.0028]),
+        ((0.0, 0.0), [0]),
+    ],
+)
+def test_a_grid_has_the_limits_half_of_them_and_rest(limits: tuple[float, float], expected: list[float]) -> None:
+    assert grid_rates(*limits) == pytest.approx(expected)
+
+
+def test_a_calibration_at_one_temperature_has_one_row() -> None:
+    assert grid_temperatures(24.9, 25.1) == pytest.approx([25])
+    assert grid_temperatures(-40, 60) == [-40, 10, 60]
+
+
+def test_a_model_without_a_rate_is_shown_at_the_rates_that_were_measured(
+    make_points: Callable[..., Recording], grid_11_by_11: Any
+) -> None:
+    rate, warm = grid_11_by_11
+    recording = make_points(rate, warm, rate + 0.3 + 1e-3 * np.random.default_rng(5).normal(size=len(rate)))
+    calibration = build_calibration(
+        recording.info, fit(recording, effects=["bias"]), version=1, parent=None, issued_at=AT, provenance={},
+        evidence=evidence_of(recording, None, ["bias"]),
+    )  # fmt: skip
+    assert calibration.rate_dps == (-np.inf, np.inf)
+    grid = uncertainty_grid(calibration)
+    assert (grid.rate_dps[0], grid.rate_dps[-1]) == (rate.min(), rate.max())
 
 
 def test_a_table_of_coefficients_is_uncertain_by_an_unknown_amount() -> None:

@@ -114,6 +114,9 @@ def test_over_http_the_refusal_is_a_problem_document(tmp_path: Path) -> None:
         assert refused.status_code == 422
         assert refused.json()["type"].endswith("data-refused")
         assert "near pi/180" in refused.json()["detail"]
+        (warning,) = refused.json()["warnings"]
+        assert (warning["what"], warning["severity"]) == ("unit", "certain")
+        assert warning["text"] in refused.json()["detail"]
         made = client.post(path, json={"model": "ojeda2000", "accept_warnings": True})
         assert made.status_code == 201
         assert made.json()["warnings"][0]["do"].startswith("correct the unit")

@@ -150,7 +150,7 @@ def test_an_import_comes_back_exactly(location: str) -> None:
 
 def test_nothing_is_left_of_an_import_that_fails(location: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_store(location, write=True) as store:
-        monkeypatch.setattr("labctl.store.repositories.recording_import._add_environment", lambda *_: 1 / 0)
+        monkeypatch.setattr("labctl.store.repositories.recording_writer._add_environment", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             store.recordings.add_import(samples(), AT)
         assert store.units.all() == []

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.reduction.decimation import FASTEST_HZ
-from labctl.fitting.criticism.reduction.padding import Padded
+from labctl.fitting.criticism.reduction.rectangular import Padded
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.temperature_history import history_of

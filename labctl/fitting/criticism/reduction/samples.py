@@ -10,7 +10,7 @@ from labctl.fitting.criticism.reduction.basis import WAVES, orthonormal_basis
 from labctl.fitting.criticism.reduction.decimation import FASTEST_HZ, decimated_columns
 from labctl.fitting.criticism.reduction.nodes import nodes_of
 from labctl.fitting.criticism.reduction.outliers import inlier_mask, white_level_dps
-from labctl.fitting.criticism.reduction.padding import pad, piece_labels
+from labctl.fitting.criticism.reduction.rectangular import pad, piece_labels
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording

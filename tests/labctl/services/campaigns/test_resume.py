@@ -15,7 +15,7 @@ from instruments.clock import VirtualClock
 from instruments.errors import NoReply
 from labctl.cli.app import app
 from labctl.errors import Conflict
-from labctl.services.benches.host import power_failed
+from labctl.services.benches.power_failure import power_failed
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.recovery import MAX_RESUMES, retries_exhausted

@@ -6,6 +6,7 @@ import { axisColour, colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";
 import { button, fitWarnings, selectField, labelledField, cardWithHeader, notice, table, toast } from "../core/components.js";
 import { navigate } from "../core/router.js";
+import { postFit } from "./accept_warnings.js";
 import { selectedRows } from "./residual_map.js";
 import { shownText } from "./dataset_rows.js";
 
@@ -53,7 +54,8 @@ export function extendModel(state, path, effects) {
   }
 
   async function make() {
-    const made = await post(`${path}/improve`, body());
+    const made = await postFit(`${path}/improve`, body(), "Make version anyway");
+    if (!made) return;
     toast("good", `Version ${made.version} of ${state.serial} is made.`);
     await navigate(`/explore?unit=${encodeURIComponent(state.serial)}&version=${made.version}&recording=${state.recording}&axis=${state.axis}#watch`);
   }

@@ -5,6 +5,7 @@ import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
 import { busyIndicator, button, card, selectField, emptyState, pageHeader, notice, toggleGroup, errorPage } from "../core/components.js";
 import { navigate, query } from "../core/router.js";
+import { postFit } from "../explore/accept_warnings.js";
 import { extendModel, inDatasetOrder } from "../explore/extend_model.js";
 import { errorComparison } from "../explore/compare/error_comparison.js";
 import { residualDiagnostics } from "../explore/residual_diagnostics.js";
@@ -68,7 +69,8 @@ function firstFitCard(unit, recording) {
   return card("Fit a first model", h("p", { class: "muted" }, `Recording ${recording} of ${unit.serial} has not been fitted. Start simple: what the model leaves will say what is missing.`),
     h("div", { class: "row" }, selectField("Model", MODELS, model, (value) => { model = value; })),
     h("div", { class: "row" }, button("Fit", async () => {
-      const made = await post(`/api/units/${encodeURIComponent(unit.serial)}/calibrations`, { recording, model });
+      const made = await postFit(`/api/units/${encodeURIComponent(unit.serial)}/calibrations`, { recording, model }, "Fit anyway");
+      if (!made) return;
       await navigate(`/explore?unit=${encodeURIComponent(unit.serial)}&version=${made.version}&recording=${recording}`);
     }, { kind: "primary" })));
 }

@@ -1,13 +1,14 @@
-// The page of one unit: its calibrations, certifications, error ladder and coefficients.
+// The page of one unit: its calibrations, certifications, error ladder, coefficients and uncertainty in use.
 
 import { download, get } from "../core/api.js";
-import { h } from "../core/elements.js";
+import { h, setChildren } from "../core/elements.js";
 import { day, instant, number } from "../core/format.js";
 import { button, card, chip, emptyState, factList, pageHeader, cardWithHeader, loadInto, modelName, notice, table } from "../core/components.js";
 import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
 import { askCertification, askRevocation, certificationTable, overridden, verdictChip } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
+import { uncertaintyInUse } from "../unit/uncertainty.js";
 
 export async function page({ params, signal }) {
   const base = `/api/units/${encodeURIComponent(params.serial)}`;
@@ -17,7 +18,7 @@ export async function page({ params, signal }) {
   return h("div", { class: "page" },
     pageHeader(unit.serial, [unit.model, unit.technology?.toUpperCase()].filter(Boolean).join(" · "), h("a", { class: "button primary", href: explore }, "Explore")),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force, base)),
-    rows.length ? [versions(unit, rows, base, explore), ladder(base, signal), coefficientCard(base, rows, signal)] : emptyState(h("p", {}, "No calibration yet."), h("p", {}, h("a", { class: "button primary", href: explore }, "Fit a model"))),
+    rows.length ? [versions(unit, rows, base, explore), ladder(base, signal), versionCards(base, rows, signal)] : emptyState(h("p", {}, "No calibration yet."), h("p", {}, h("a", { class: "button primary", href: explore }, "Fit a model"))),
     h("div", { class: "columns" },
       card("Recordings", h("ul", { class: "plain" }, unit.recordings.map((id) => h("li", {}, h("a", { href: `/recordings/${id}` }, `Recording ${id}`))))),
       card("Certifications", history.length ? certificationTable(history) : h("p", { class: "muted" }, "Nothing has been certified yet."))));
@@ -60,20 +61,26 @@ function ladder(base, signal) {
   return cardWithHeader("How the error fell", null, place);
 }
 
-/** Coefficients of one version, or of two side by side. */
-function coefficientCard(base, rows, signal) {
+/** Coefficients of one version, or of two side by side, and the uncertainty in use of the first. */
+function versionCards(base, rows, signal) {
   const newest = rows[0].version;
   let [one, other] = [Number(query().version) || newest, Number(query().beside) || null];
   const place = h("div");
+  const uncertainty = uncertaintyInUse(base, signal);
   const select = (label, value, none, onchange) => h("label", { class: "row small" }, label, h("select", { onchange: (event) => onchange(Number(event.target.value) || null) },
     none ? h("option", { value: "" }, "none") : null, rows.map((row) => h("option", { value: row.version, selected: row.version === value }, `version ${row.version}`))));
+  const ofOne = [0, 1].map(() => select("of", one, false, (value) => { one = value; draw(); }));
   const draw = () => {
     updateQuery({ version: one === newest ? null : one, beside: other });
+    for (const label of ofOne) label.querySelector("select").value = one;
+    const asked = Promise.all([one, other].map((version) => (version ? get(`${base}/calibrations/${version}`, { signal }) : null)));
     loadInto(place, "Reading the coefficients", async () => {
-      const [first, second] = await Promise.all([one, other].map((version) => (version ? get(`${base}/calibrations/${version}`, { signal }) : null)));
+      const [first, second] = await asked;
       return h("div", { class: "stack" }, second ? comparison(first, second) : null, coefficients(first, second));
     });
+    asked.then(([first]) => first.version === one && uncertainty.show(first), () => setChildren(uncertainty.element));
   };
   draw();
-  return cardWithHeader("Coefficients", h("div", { class: "row" }, select("of", one, false, (value) => { one = value; draw(); }), select("beside", other, true, (value) => { other = value; draw(); })), place);
+  return [cardWithHeader("Coefficients", h("div", { class: "row" }, ofOne[0], select("beside", other, true, (value) => { other = value; draw(); })), place),
+    cardWithHeader("Uncertainty in use (k = 2)", ofOne[1], uncertainty.element)];
 }

@@ -1,0 +1,128 @@
+"""Uncertainty in use on the page of a unit: its figures are those of the service, and what is unknown is said so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.helpers.browser import NARROW, Faults, Service
+from tests.helpers.simulated_recordings import single_axis
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Locator, Page
+
+pytestmark = pytest.mark.timeout(400)
+FOG, PUBLISHED = "FOG-0001", "WEISS-ENV05S"
+CARD = "Uncertainty in use (k = 2)"
+
+
+@pytest.fixture
+def fog(service: Service) -> str:
+    """Return a unit with a calibration of 121 data sets and a data sheet."""
+    recording = single_axis(1)
+    service.lab_service.store.recordings.add_import(recording, recording.info.started_at)
+    service.post(f"/api/units/{FOG}/calibrations", {"model": "ojeda2000"})
+    return FOG
+
+
+@pytest.fixture
+def published(service: Service) -> str:
+    """Return a unit whose calibration is a published table."""
+    service.post("/api/recordings/example", {"name": "weiss-gyrostar"})
+    service.post(f"/api/units/{PUBLISHED}/calibrations", {"model": "weiss1995"})
+    return PUBLISHED
+
+
+def two_digits(value: float) -> float:
+    return float(f"{value:.1e}")
+
+
+def cells(region: Locator) -> list[list[str]]:
+    """Return the texts of a table's body, row by row, without the headings that a narrow screen shows."""
+    return [
+        [cell.strip() for cell in row.locator("td > div").all_inner_texts()] for row in region.locator("tbody tr").all()
+    ]
+
+
+def card_of(page: Page) -> tuple[Locator, Locator, Locator]:
+    """Return the card, its table over what was calibrated, and the parts at a place."""
+    card = page.get_by_role("region", name=CARD, exact=True)
+    parts = card.get_by_role("region", name="Parts of the uncertainty")
+    parts.wait_for()
+    return card, card.get_by_role("region", name="Uncertainty in use", exact=True), parts
+
+
+def asked(service: Service, serial: str, rate_dps: float, temperature_c: float, version: int = 1) -> Any:
+    place = f"rate_dps={rate_dps}&temperature_c={temperature_c}&grid=true"
+    return service.get(f"/api/units/{serial}/calibrations/{version}/uncertainty?{place}")
+
+
+def test_the_figures_of_the_page_are_those_of_the_service(
+    service: Service, visit: Callable[..., Page], fog: str
+) -> None:
+    from playwright.sync_api import expect
+
+    page = visit(f"/units/{fog}")
+    card, over, parts = card_of(page)
+    here = asked(service, fog, 50, 40)
+    grid = here["grid"]["axes"]["z"]
+    drawn = cells(over)
+    assert [float(row[0]) for row in drawn] == pytest.approx(here["grid"]["temperature_c"], abs=0.051)
+    assert len(drawn) == 3
+    for row, line in zip(drawn, grid, strict=True):
+        assert [float(text) for text in row[1:]] == [two_digits(one["expanded_dps"]) for one in line]
+    heads = [float(text.split()[0]) for text in over.locator("th").all_inner_texts()[1:]]
+    assert heads == pytest.approx(here["grid"]["rate_dps"], rel=5e-3)
+
+    card.get_by_label("Rate").fill("50")
+    card.get_by_label("Temperature").fill("40")
+    card.get_by_label("Temperature").press("Enter")
+    page.wait_for_url("**rate=50&temperature=40")
+    one = here["axes"]["z"]
+    names = ("coefficients_dps", "model_dps", "repeatability_dps", "combined_dps", "expanded_dps")
+    expect(parts.locator("tbody tr").last.locator("td").nth(1)).to_have_text(f"{two_digits(one['expanded_dps'])}")
+    assert [float(row[1]) for row in cells(parts)] == [two_digits(one[name]) for name in names]
+    assert cells(parts)[2][2] == one["repeatability_source"] == "data sheet"
+    expect(card).not_to_contain_text("nknown")
+    expect(card).not_to_contain_text("outside")
+
+    page.reload()  # the place is in the address
+    card, _, parts = card_of(page)
+    assert [float(row[1]) for row in cells(parts)] == [two_digits(one[name]) for name in names]
+    card.get_by_label("Temperature").fill("90")
+    card.get_by_label("Temperature").press("Enter")
+    expect(card).to_contain_text("was not calibrated")
+    expect(parts).to_contain_text("no data set was measured near there")
+    assert [row[1] for row in cells(parts)][1:] == ["unknown", cells(parts)[2][1], "unknown", "unknown"]
+
+
+@pytest.mark.parametrize("size", [None, NARROW])
+def test_published_coefficients_are_unknown_and_never_zero(
+    visit: Callable[..., Page], published: str, size: dict[str, int] | None
+) -> None:
+    from playwright.sync_api import expect
+
+    card, over, parts = card_of(visit(f"/units/{published}", **({"size": size} if size else {})))
+    drawn = cells(over)
+    assert {text for row in drawn for text in row[1:]} == {"unknown"}
+    assert all(len(row) == 6 for row in drawn)
+    assert [row[1] for row in cells(parts)] == ["unknown"] * 5
+    assert cells(parts)[0][2] == "published coefficients state none"
+    expect(card).to_contain_text("Coefficients: published coefficients state none.")
+
+
+def test_a_model_that_asks_for_more_is_unknown_with_its_reason(
+    service: Service, visit: Callable[..., Page], faults: Faults, fog: str
+) -> None:
+    from playwright.sync_api import expect
+
+    service.post(f"/api/units/{fog}/calibrations/1/improve", {"formula": ["wet: humidity_pct - 40"]})
+    page = visit(f"/units/{fog}")
+    card = page.get_by_role("region", name=CARD, exact=True)
+    expect(card).to_contain_text("Unknown: FOG-0001 version 2: its model also needs humidity_pct")
+    card.get_by_label("of").select_option("1")
+    expect(card.get_by_role("region", name="Parts of the uncertainty")).to_contain_text("data sheet")
+    expect(page.get_by_role("region", name="Coefficients").first.get_by_label("of")).to_have_value("1")
+    faults.clear()  # the browser itself logs the refusal
