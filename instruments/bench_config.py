@@ -6,12 +6,13 @@ A `driver` is a name in the registry of drivers. `instruments.bench` checks it: 
 
 from __future__ import annotations
 
-import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from instruments.toml_documents import read_toml
 
 #: A serial number becomes part of file names, addresses and C comments.
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
@@ -157,4 +158,4 @@ def read_bench(source: str | Path) -> BenchFile:
     Raises FileNotFoundError, tomllib.TOMLDecodeError, pydantic.ValidationError.
     """
     path = shipped_benches().get(str(source), Path(source))
-    return BenchFile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    return BenchFile.model_validate(read_toml(path))

@@ -5,21 +5,25 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
 from importlib.metadata import version as package_version
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
 from labctl.fitting.models.paper_units import in_paper_units
 from labctl.fitting.uncertainty import AxisEvidence
 from labctl.recording import OutputUnit, RecordingInfo
+from labctl.recording.info import Axis
 
 SCHEMA = "labctl-calibration/1"
+#: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
+MOST_BYTES = 64 << 20
 
 
 def canonical(document: Mapping[str, Any]) -> bytes:
@@ -41,12 +45,14 @@ class Calibration:
     @property
     def serial(self) -> str:
         """Serial number of the unit."""
-        return str(self.document["serial"])
+        with _reading("serial"):
+            return str(self.document["serial"])
 
     @property
     def version(self) -> int:
         """Version, counted per unit."""
-        return int(self.document["version"])
+        with _reading("version"):
+            return int(self.document["version"])
 
     @property
     def hash(self) -> str:
@@ -56,29 +62,38 @@ class Calibration:
     @property
     def axes(self) -> tuple[str, ...]:
         """The axes that are corrected, in order."""
-        return tuple(self.document["axes"])
+        with _reading("axes"):
+            axes = self.document["axes"]
+            if not (isinstance(axes, list) and axes and set(axes) <= set(get_args(Axis))):
+                raise ValueError(f"{str(axes)[:80]} instead of some of x, y and z")
+            return tuple(axes)
 
     @cached_property
     def fitted(self) -> FittedModel:
         """The fitted model that the document holds: sensor and package effects only."""
-        return FittedModel.from_dict(self.document["model"])
+        with _reading("model"):
+            return FittedModel.from_dict(self.document["model"])
 
     @property
     def output(self) -> dict[str, OutputUnit]:
         """How each axis's output becomes a rate before it is corrected."""
-        return {axis: OutputUnit.model_validate(unit) for axis, unit in self.document["output"].items()}
+        with _reading("output"):
+            units = {axis: OutputUnit.model_validate(unit) for axis, unit in self.document["output"].items()}
+            return units | {axis: units[axis] for axis in self.axes}  # each axis has one
 
     @property
     def temperature_c(self) -> tuple[float, float]:
         """The calibrated temperatures."""
-        low, high = self.document["validity"]["temperature_c"]
-        return float(low), float(high)
+        with _reading("validity"):
+            low, high = self.document["validity"]["temperature_c"]
+            return float(low), float(high)
 
     @property
     def rate_dps(self) -> tuple[float, float]:
         """The calibrated rates; infinite where the document has null: nothing of the model depends on the rate."""
-        low, high = self.document["validity"]["rate_dps"]
-        return -math.inf if low is None else float(low), math.inf if high is None else float(high)
+        with _reading("validity"):
+            low, high = self.document["validity"]["rate_dps"]
+            return -math.inf if low is None else float(low), math.inf if high is None else float(high)
 
     def to_bytes(self) -> bytes:
         """Return the bytes that are stored and served, always the same."""
@@ -130,23 +145,68 @@ def build_calibration(
 
 
 def read_calibration(source: Path | bytes) -> Calibration:
-    """Read a calibration file; raises BadCalibrationFile when it is not whole, not ours, or was edited."""
+    """Read a calibration file; raises BadCalibrationFile when it is not whole, not ours, or was edited.
+
+    A file that another parser could read otherwise, such as one with a key that stands twice, is refused.
+    """
     name = "calibration" if isinstance(source, bytes) else str(source)
     try:
-        document = json.loads(source if isinstance(source, bytes) else source.read_bytes())
+        content = source if isinstance(source, bytes) else _content(source)
+        document = json.loads(content)
+        schema = document.get("schema") if isinstance(document, dict) else None
+        if schema != SCHEMA:
+            raise BadCalibrationFile(
+                f"{name}: schema {repr(schema)[:80]}, this labctl reads {SCHEMA!r}; use the labctl that wrote it"
+            )
+        whole, found = _canonical_and_hash(document)
+        if whole != content.strip():
+            json.loads(content, object_pairs_hook=_object)
     except OSError as error:
         raise BadCalibrationFile(f"{name}: cannot be read ({error.strerror})") from error
+    except RecursionError:
+        raise BadCalibrationFile(f"{name}: nested deeper than any calibration is; fetch it again") from None
     except ValueError as error:
         raise BadCalibrationFile(f"{name}: not JSON, or cut short ({error}); fetch it again") from error
-    schema = document.get("schema") if isinstance(document, dict) else None
-    if schema != SCHEMA:
-        raise BadCalibrationFile(
-            f"{name}: schema {schema!r}, this labctl reads {SCHEMA!r}; use the labctl that wrote it"
-        )
-    found, written = hash_of(document), document.get("hash")
+    written = document.get("hash")
     if found != written:
         raise BadCalibrationFile(
             f"{name}: was edited or damaged: its hash is {found[:16]}…, it says {str(written)[:16]}…; fetch it again "
             "with `labctl calibration`"
         )
     return Calibration(document)
+
+
+def _content(path: Path) -> bytes:
+    with path.open("rb") as file:
+        content = file.read(MOST_BYTES + 1)
+    if len(content) > MOST_BYTES:
+        raise ValueError(f"larger than {MOST_BYTES} bytes, which is all that is read")
+    return content
+
+
+def _canonical_and_hash(document: Mapping[str, Any]) -> tuple[bytes, str]:
+    """Return `canonical` and `hash_of` of a document, written once for both."""
+    parts = [(key, canonical({key: document[key]})[1:-1]) for key in sorted(document)]
+    hashed = b"{" + b",".join(part for key, part in parts if key != "hash") + b"}"
+    return b"{" + b",".join(part for _, part in parts) + b"}", hashlib.sha256(hashed).hexdigest()
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    made = dict(pairs)
+    if len(made) != len(pairs):
+        keys = [key for key, _ in pairs]
+        double = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"key {double[:80]!r} stands twice in one object, and parsers differ in which of them counts")
+    return made
+
+
+@contextmanager
+def _reading(part: str) -> Iterator[None]:
+    """Turn what goes wrong with a part of a document whose hash is right into BadCalibrationFile."""
+    try:
+        yield
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        first = str(error).partition("\n")[0][:200]
+        raise BadCalibrationFile(
+            f"calibration: its {part} cannot be read ({type(error).__name__}: {first}); labctl did not write it so"
+        ) from error

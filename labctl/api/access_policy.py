@@ -12,6 +12,8 @@ from labctl.services.schemas.admin import Role
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
+#: Where computing begins; everything else that is read is a file or a few figures.
+API = "/api/"
 #: Answered without a key: a load balancer asks it.
 OPEN = frozenset({"/health"})
 #: Queries that are sent by POST because of what they carry: nothing changes, so a viewer may.

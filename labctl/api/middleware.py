@@ -9,7 +9,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from labctl.acting_user import Actor, acting
-from labctl.api.access_policy import OPEN, READING, AccessPolicy, role_needed
+from labctl.api.access_policy import API, OPEN, READING, AccessPolicy, role_needed
 from labctl.api.problems import as_problem
 from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, TooLarge
 from labctl.services.admin.api_keys import identify, require_role
@@ -64,12 +64,16 @@ class AccessMiddleware:
             return identify(self._service.store, authorization)
         if self._access.keys:
             raise NotIdentified("this service asks for a key: send `Authorization: Bearer KEY`")
-        self._refuse_foreign(scope["method"], headers)
+        self._refuse_foreign(scope, headers)
         claimed = unquote(headers.get(USER_HEADER, ""))[:100]
         return Caller(claimed if claimed.isprintable() and claimed else "local", Role.APPROVER, "loopback")
 
-    def _refuse_foreign(self, method: str, headers: Headers) -> None:
-        """Raise NotAllowed for a request that another site or machine sent through this one."""
+    def _refuse_foreign(self, scope: Scope, headers: Headers) -> None:
+        """Raise NotAllowed for a request that another site or machine sent through this one.
+
+        Reading the API is refused to another site too: it cannot see the answer, but what computes it is kept busy.
+        Pages and `/health` answer a link from anywhere.
+        """
         if self._access.hosts is None:
             return
         host = headers.get("host", "")
@@ -79,13 +83,14 @@ class AccessMiddleware:
             )
         if "forwarded" in headers or "x-forwarded-for" in headers:
             raise NotAllowed("the request came through a proxy; start the service with --require-keys behind one")
-        if method in READING:
+        reads = scope["method"] in READING
+        if reads and not scope["path"].startswith(API):
             return
-        origin = headers.get("origin")
-        if origin is not None and origin.partition("://")[2] != host:
-            raise NotAllowed(f"a page of {origin} may not act here")
         if headers.get("sec-fetch-site", "none") not in {"none", "same-origin"}:
-            raise NotAllowed("a page of another site may not act here")
+            raise NotAllowed("a page of another site may neither ask nor act here; open the address itself")
+        origin = headers.get("origin")
+        if not reads and origin is not None and origin.partition("://")[2] != host:
+            raise NotAllowed(f"a page of {origin[:80]} may not act here")
 
 
 def _name_of(host: str) -> str:

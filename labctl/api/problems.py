@@ -12,9 +12,14 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from instruments.errors import InstrumentError
+from instruments.toml_documents import listed
 from labctl.errors import DiskFull, LabctlError, NotIdentified, TooLarge
 from procedures.contracts.errors import PlanRefused, ProcedureError, StalePrompt
 
+#: A key that is not known is shown up to here.
+LONGEST_KEY = 80
+#: How the framework says that the JSON reader gave up for another reason than a wrong character.
+UNREADABLE = "There was an error parsing the body"
 TYPE_PREFIX = "urn:labctl:problem:"
 
 
@@ -53,7 +58,7 @@ def _of_a_procedure(request: Request, error: ProcedureError) -> JSONResponse:
 
 
 def _of_the_request(request: Request, error: RequestValidationError) -> JSONResponse:
-    places = "; ".join(f"{'.'.join(str(p) for p in e['loc'])}: {e['msg']}" for e in error.errors())
+    places = listed(f"{'.'.join(str(p)[:LONGEST_KEY] for p in e['loc'])}: {e['msg']}" for e in error.errors())
     return problem(422, "bad-request", "The request does not fit its description", places, request.url.path)
 
 
@@ -79,6 +84,9 @@ def _of_http(request: Request, error: HTTPException) -> JSONResponse:
     too_many = error.status_code == 400 and text.startswith("Too many")  # parts of a form: the parser's own bound
     if error.status_code == TooLarge.status or too_many:
         return as_problem(TooLarge(text), request.url.path)
+    if error.status_code == 400 and text == UNREADABLE:
+        nested = "the request's body cannot be read as JSON: nested too deeply, or a number of too many digits"
+        return problem(400, "bad-input", "The body cannot be read", nested, request.url.path)
     answer = problem(error.status_code, f"http-{error.status_code}", text, text, request.url.path)
     answer.headers.update(error.headers or {})
     return answer

@@ -162,8 +162,9 @@ def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:
     known = [e for s in answer.steps for e in (s.rms_dps, s.heldout_rms_dps) if e]
     if not known:
         return [f"{answer.serial}: no version has an error figure"]
-    lowest = 0.7 * min([*known, answer.noise_floor_dps or known[0]])
-    span = max(log10(max(known) / lowest), 1e-9)
+    drawn = [*known, answer.noise_floor_dps or known[0]]  # readings without scatter leave an error below the floor
+    lowest = 0.7 * min(drawn)
+    span = log10(max(drawn) / lowest)
 
     def place(value: float) -> int:
         return max(round(log10(value / lowest) / span * width), 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
+import string
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from labctl.fitting.numeric.arrays import Array
 
 HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * Hash of the calibration: {hash}
+ * Names begin with {name}: letters and digits of the serial number as they are, anything else as _ and its code in
+ * hexadecimal, so that headers of several units go into one program.
  * Valid from {low:g} to {high:g} deg C and {rates}; outside, the error at the edge of the range is
  * taken off and the function returns 1, else 0. What is at most {margin_c:g} K or {margin:g} deg/s beyond counts as
  * inside: a thermometer's last digits, corrected at the edge, and rates in the output's, as the range is of true rates.
@@ -139,11 +141,25 @@ static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c
 
 #: Polynomials in temperature are exact on this many nodes with as many points.
 POLYNOMIAL_NODES = 6
+#: What may stand in a C name, the underscore set apart for codes.
+PLAIN = frozenset(string.ascii_letters + string.digits)
+#: Hexadecimal digits of the calibration's hash that the include guard carries.
+GUARD_DIGITS = 16
+
+
+def c_name(serial: str) -> str:
+    """Return the beginning of every name in the header of a unit: no two serial numbers have the same.
+
+    Letters, in their case, and digits stay; anything else, the underscore too, becomes `_` and its code in two
+    hexadecimal digits: `A-1` is `gyro_A_2d1`. No suffix of a name below begins with two such digits, so no name of one
+    unit is another's either.
+    """
+    return "gyro_" + "".join(f"_{byte:02x}" if chr(byte) not in PLAIN else chr(byte) for byte in serial.encode())
 
 
 def c_header(calibration: Calibration) -> bytes:
     """Return a calibration as a C header; raises BadInput for a model that has no closed form in C yet."""
-    name = "gyro_" + re.sub(r"[^0-9A-Za-z]+", "_", calibration.serial).lower()
+    name = c_name(calibration.serial)
     surface = surface_of(calibration.fitted, calibration.axes)
     linear = linear_of(calibration.fitted, calibration.axes)
     sine = sine_form_of(calibration.fitted, calibration.axes)
@@ -172,9 +188,9 @@ def _head(name: str, calibration: Calibration) -> str:
         for axis, unit in calibration.output.items()
     )
     return HEAD.format(
-        serial=calibration.serial.replace("*/", ""),
+        serial=_in_comment(calibration.serial),
         version=calibration.version,
-        model=calibration.fitted.model.name,
+        model=_in_comment(calibration.fitted.model.name),
         hash=calibration.hash,
         low=low,
         high=high,
@@ -186,10 +202,15 @@ def _head(name: str, calibration: Calibration) -> str:
         slowest=f"{slowest:.17g}" if is_limited else "-INFINITY",
         fastest=f"{fastest:.17g}" if is_limited else "INFINITY",
         nominal=nominal,
-        guard=f"LABCTL_{name.upper()}_V{calibration.version}_H",
+        guard=f"LABCTL_{name}_V{calibration.version}_{calibration.hash[:GUARD_DIGITS]}_H",
         name=name,
         axes=len(calibration.axes),
     )
+
+
+def _in_comment(text: str) -> str:
+    """Return text that ends no comment and no line."""
+    return "".join(char if char.isprintable() else "?" for char in text).replace("*/", "* /").replace("\\", "/")
 
 
 def _surface(name: str, surface: Surface) -> str:

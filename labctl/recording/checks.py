@@ -15,6 +15,8 @@ from labctl.recording.info import RecordingInfo
 
 #: What no gyro, table or chamber has ever been at: another unit, or a slip.
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
+#: A spread is a root of squares: beyond this a square is no number, and so is what is made of it.
+LARGEST = 1e100
 POSITIONS = frozenset(sign + axis for sign in ("", "-") for axis in "xyz")
 
 
@@ -29,6 +31,8 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -
     for name, (low, high) in POSSIBLE.items():
         if name in columns:
             _possible(path, name, columns[name], low, high)
+    for name, values in columns.items():
+        _squarable(path, name, values, columns.get("valid"))
     if info.kind == "coefficients":
         return columns
     if "t_s" in columns:
@@ -49,12 +53,30 @@ def _possible(path: Path, name: str, values: NDArray[Any], low: float, high: flo
         )
 
 
+def _squarable(path: Path, name: str, values: NDArray[Any], valid: NDArray[Any] | None) -> None:
+    if values.dtype.kind != "f" or not values.size:
+        return
+    if max(np.nanmax(values, initial=0.0), -np.nanmin(values, initial=0.0)) <= LARGEST:
+        return
+    wrong = np.abs(values) > LARGEST
+    if valid is not None and name.startswith("gyro_"):
+        wrong &= valid != 0
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise BadRecording(
+            f"{path}: column {name[:80]!r}, row {row + 1}: {values[row]:g} is beyond {LARGEST:g}, up to which means "
+            "and spreads are numbers; check the column's unit"
+        )
+
+
 def checked_environment(path: Path, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Return the environment's columns; raises BadRecording when time or temperature is missing or not in order."""
     for name in ENVIRONMENT_NEEDED:
         if name not in columns:
             raise BadRecording(f"{path}: column {name!r} is missing")
         _finite(path, name, columns[name], None)
+    for name, values in columns.items():
+        _squarable(path, name, values, None)
     _time(path, columns["t_s"], strict=False)
     columns.setdefault("run", np.ones(len(columns["t_s"]), dtype=np.int64))
     return columns

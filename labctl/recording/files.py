@@ -12,6 +12,7 @@ from typing import Literal
 import tomli_w
 from pydantic import ValidationError
 
+from instruments.toml_documents import read_toml, shown
 from labctl.errors import BadRecording
 from labctl.recording.checks import checked, checked_environment
 from labctl.recording.info import RecordingInfo
@@ -20,6 +21,8 @@ from labctl.recording.recording import Recording
 HEAD = "recording.toml"
 ENVIRONMENT = "environment"
 FORMATS = ("parquet", "csv")
+#: A key that is not known is shown up to here.
+LONGEST_PLACE = 80
 FileFormat = Literal["parquet", "csv"]
 
 
@@ -47,14 +50,14 @@ def _read_head(path: Path) -> RecordingInfo:
     if not path.is_file():
         raise BadRecording(f"{path}: not found; a recording is a folder with {HEAD} and a data file")
     try:
-        return RecordingInfo.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        return RecordingInfo.model_validate(read_toml(path))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise BadRecording(f"{path}: not TOML: {error}") from error
     except ValidationError as error:
         # a misspelt key is both unknown and missing: the unknown one is what a person looks for
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-        place = ".".join(str(part) for part in first["loc"])
-        given = "" if first["type"] == "missing" else f" (is {first['input']!r})"
+        place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
+        given = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
         raise BadRecording(f"{path}: {place}: {first['msg']}{given}") from error
 
 

@@ -12,7 +12,7 @@ from labctl.errors import BadInput
 from labctl.fitting import describe_effects, describe_presets
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.data.temperature_history import TemperatureHistory
-from labctl.fitting.effects import CATALOGUE, Effect, Formula, Reference, Term, formulas
+from labctl.fitting.effects import CATALOGUE, Effect, Formula, Reference, Term, checked_formulas, formulas
 from labctl.fitting.models.error_model import is_exported
 
 #: Sizes that are not told as a coefficient: how far the thermometer is off.
@@ -61,7 +61,7 @@ def catalogue_with(written: Sequence[Formula]) -> dict[str, Effect]:
 
 def with_files(sources: list[str]) -> list[Formula]:
     """Return formulas from lines `name: expression` and from files of this machine; raises BadInput."""
-    return [each for source in sources for each in formulas(source)]
+    return checked_formulas([each for source in sources for each in formulas(source)])
 
 
 def as_lines(sources: list[str]) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
+from instruments.toml_documents import listed, parse_toml, read_toml_text, shown
 from procedures.contracts.errors import RecipeError
 from procedures.recipe.rules import (
     AcquireRules,
@@ -26,6 +27,9 @@ from procedures.recipe.rules import (
     Table,
     Whole,
 )
+
+#: A key that is not known is shown up to here.
+LONGEST_KEY = 80
 
 
 class Recipe(Table):
@@ -68,7 +72,9 @@ def read_recipe(source: str | Path) -> Recipe:
     """
     path = shipped_recipes().get(str(source), Path(source))
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_toml_text(path)
+    except tomllib.TOMLDecodeError as error:
+        raise RecipeError(f"recipe {path}: not TOML: {error}") from error
     except FileNotFoundError:
         known = ", ".join(shipped_recipes())
         raise RecipeError(f"no recipe {str(source)!r}: give a file, or one of {known}") from None
@@ -80,7 +86,7 @@ def read_recipe(source: str | Path) -> Recipe:
 def parse_recipe(text: str, *, where: str = "recipe") -> Recipe:
     """Read a recipe from TOML text; `where` names it in errors. Raises RecipeError."""
     try:
-        return Recipe.model_validate(tomllib.loads(text))
+        return Recipe.model_validate(parse_toml(text))
     except tomllib.TOMLDecodeError as error:
         raise RecipeError(f"{where}: not TOML: {error}") from error
     except ValidationError as error:
@@ -91,12 +97,12 @@ def _complaints(error: ValidationError) -> str:
     """Return everything that is wrong in one line; a list that is empty only because of its items is not said twice."""
     found: list[dict[str, Any]] = [dict(each) for each in error.errors()]
     blamed = [each["loc"][:-1] for each in found]
-    return "; ".join(_complaint(each) for each in found if not (each["type"] == "too_short" and each["loc"] in blamed))
+    return listed(_complaint(each) for each in found if not (each["type"] == "too_short" and each["loc"] in blamed))
 
 
 def _complaint(error: dict[str, Any]) -> str:
     """Return one line of what pydantic found: the key, what was expected and what was given."""
-    location = [str(part) for part in error["loc"]]
+    location = [str(part)[:LONGEST_KEY] for part in error["loc"]]
     key = ".".join(location)
     if error["type"] == "extra_forbidden":
         near = difflib.get_close_matches(location[-1], _keys(location[:-1]), n=1)
@@ -104,7 +110,7 @@ def _complaint(error: dict[str, Any]) -> str:
         return f"unknown key {key!r}{hint}"
     if error["type"] == "missing":
         return f"{key!r} is missing"
-    return f"{key!r}: {str(error['msg']).lower()}, not {error['input']!r}"
+    return f"{key!r}: {str(error['msg']).lower()}, not {shown(error['input'])}"
 
 
 def _keys(location: list[str]) -> list[str]:

@@ -11,7 +11,7 @@ from fastapi.responses import StreamingResponse
 from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.computation import follow, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
-from labctl.fitting.effects import read_formula
+from labctl.fitting.effects import read_formulas
 from labctl.services.calibrations import fitting as services
 from labctl.services.calibrations.assessment import assess
 from labctl.services.calibrations.certification import list_certifications
@@ -163,7 +163,7 @@ async def criticism_events(
 def _criticism(
     service: LabService, serial: str, version: int, recording: int | None, other_unit: bool, formula: list[str] | None
 ) -> Callable[[], CriticismResponse]:
-    competing = [read_formula(line) for line in formula or []]
+    competing = read_formulas(formula or [])
     return lambda: criticism_services.criticise_unit(
         service.store, serial, version, recording, competing, other_unit=other_unit
     )

@@ -17,7 +17,7 @@ from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.noise_floor import NoiseFloor
 from labctl.fitting.data.temperature_levels import ONE_LEVEL_SPAN_C
-from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.arrays import Array, over
 
 #: Bins of a channel over which residuals are averaged.
 BINS = 8
@@ -40,7 +40,7 @@ class Residuals:
     @property
     def score(self) -> Array:
         """Residual over floor, (m,)."""
-        return self.means / self.floor_dps
+        return over(self.means, self.floor_dps)
 
 
 def residuals_of(

@@ -8,13 +8,15 @@ from __future__ import annotations
 import ast
 import operator
 import re
-import tomllib
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from tomllib import TOMLDecodeError
 from typing import Any, ClassVar
 
 import numpy as np
 
+from instruments.toml_documents import read_toml
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Span, Term
@@ -37,6 +39,12 @@ OWN_RATE = "rate_dps"
 #: Names of rates: a formula without any of them is an error of the bias.
 RATES = frozenset({OWN_RATE, "table_rate_dps", "previous_rate_dps"})
 LONGEST = 500
+#: Operations inside each other; a sum of as many terms, too.
+DEEPEST = 100
+#: At most so many formulas of a request or a command; each is fitted beside every other.
+MOST_FORMULAS = 20
+#: CPython 3.11 counts how deep a tree is in one place for all threads: two that parse at once fail with a SystemError.
+_PARSER = threading.Lock()
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 
@@ -109,12 +117,20 @@ def _parsed(name: str, text: str) -> ast.Expression:
     if len(text) > LONGEST:
         raise BadInput(f"formula {name!r}: {len(text)} characters; at most {LONGEST}")
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        with _PARSER:
+            tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         said = error.args[0] if error.args else type(error).__name__
         raise BadInput(f"formula {name!r}: {text!r} cannot be read ({said})") from None
-    for node in ast.walk(tree):
-        _check(name, node)
+    level: list[ast.AST] = [tree.body]
+    depth = 0
+    while level:
+        depth += 1
+        if depth > DEEPEST:
+            raise BadInput(f"formula {name!r}: operations stand more than {DEEPEST} deep in each other; shorten it")
+        for node in level:
+            _check(name, node)
+        level = [below for node in level for below in ast.iter_child_nodes(node)]
     return tree
 
 
@@ -140,6 +156,22 @@ def _names(tree: ast.Expression) -> set[str]:
     return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in called}
 
 
+def read_formulas(lines: Sequence[str]) -> list[Formula]:
+    """Read lines `name: formula`; raises BadInput for one that cannot be read, for too many, and for a name twice."""
+    return checked_formulas([read_formula(line) for line in lines[: MOST_FORMULAS + 1]])
+
+
+def checked_formulas(written: list[Formula]) -> list[Formula]:
+    """Return the formulas of one request; raises BadInput for too many, and for two of one name."""
+    if len(written) > MOST_FORMULAS:
+        raise BadInput(f"more than {MOST_FORMULAS} formulas, which is all that is compared at once; leave some out")
+    names = [each.id for each in written]
+    for name in names:
+        if names.count(name) > 1:
+            raise BadInput(f"formula {name!r} is given twice; give each a name of its own")
+    return written
+
+
 def formulas(source: str) -> list[Formula]:
     """Read `name: formula`, or a TOML file with [[effects]] of `id`, `formula`, perhaps `sentence`. Raises BadInput."""
     return _from_file(Path(source)) if source.endswith(".toml") else [read_formula(source)]
@@ -155,9 +187,9 @@ def read_formula(line: str) -> Formula:
 
 def _from_file(path: Path) -> list[Formula]:
     try:
-        records = tomllib.loads(path.read_text(encoding="utf-8"))["effects"]
+        records = read_toml(path)["effects"]
         return [_made(str(r["id"]), str(r["formula"]), str(r.get("sentence", ""))) for r in records]
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, UnicodeDecodeError, TOMLDecodeError) as error:
         raise BadInput(f"formulas {path}: {error}") from error
     except (KeyError, TypeError) as error:
         raise BadInput(f"formulas {path}: each [[effects]] needs id and formula ({error} is missing)") from error

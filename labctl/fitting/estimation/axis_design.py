@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from labctl.errors import NotEnoughData
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.earth import turning_columns
 from labctl.fitting.data.fit_data import FitData
@@ -48,6 +49,7 @@ def axis_design(
     nodes = basis.shape[1]
     columns, spread, names, laws = [np.zeros((len(data), 0))], [], [], []
     offset = np.zeros(len(data))
+    unknowns = 0
     for owner, column in found:
         values = column.values
         if column.law is not None:
@@ -59,6 +61,12 @@ def axis_design(
         if owner in steady and _is_dependent(np.concatenate(columns, axis=1), added):
             continue  # an added polynomial repeats the powers that the model has already
         columns.append(added)
+        unknowns += added.shape[1]
+        if unknowns > len(data):  # before each further column is compared with all of them
+            raise NotEnoughData(
+                f"{data.info.serial}, axis {axis}: model {model.name[:80]} has more coefficients than the recording's "
+                f"{len(data)} data sets can tell; leave effects out, or measure more"
+            )
         spread.append(np.ones((nodes, 1)) if owner in steady else np.eye(nodes))
         names.append((owner, column.name, column.unit))
     return AxisDesign(

@@ -15,7 +15,7 @@ from labctl.errors import BadInput
 from labctl.fitting import FitResult
 from labctl.fitting.criticism import best_shapes, criticise
 from labctl.fitting.data.fit_data import fit_data_of
-from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formula
+from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formulas
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
@@ -145,7 +145,9 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     for effect_id in request.remove:
         if effect_id not in model.effect_ids:
             raise BadInput(f"effect {effect_id!r} is not in version {row.version} ({', '.join(model.effect_ids)})")
-    written = [read_formula(line) for line in request.formula]
+    written = read_formulas(request.formula)
+    if len(request.add) > len(CATALOGUE):
+        raise BadInput(f"{len(request.add)} effects to add; the catalogue has {len(CATALOGUE)}")
     wanted = [*(parse_term(text) for text in request.add), *(Term(f.id, formula=f.text) for f in written)]
     if not wanted and not request.remove:
         raise BadInput("say what to change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")

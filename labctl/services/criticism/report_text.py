@@ -201,7 +201,7 @@ def _list(names: Sequence[str]) -> str:
 
 def _adequate(found: Criticism) -> str:
     floor, left = found.floor.rms_dps, found.base.error.rms_dps if found.base else None
-    if floor is None or left is None or left <= AT_FLOOR * floor:
+    if not floor or left is None or left <= AT_FLOOR * floor:
         return "Adequate: nothing is missing, what is left is noise."
     return (
         f"Adequate: nothing is missing that this recording can show; what is left is {left / floor:.1f} times the "

@@ -11,7 +11,7 @@ from labctl.fitting import FitResult
 from labctl.fitting.criticism import ReducedRecording, Residuals
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.fit_data import fit_data_of
-from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.arrays import Array, over
 from labctl.recording import Recording
 from labctl.services.schemas.criticism import ResidualColumns
 
@@ -87,7 +87,7 @@ def _axis(
         "modelled_error_dps": (measured - residual).tolist(),
         "residual_dps": residual.tolist(),
         "floor_dps": unknown if floor is None else floor.tolist(),
-        "over_floor": unknown if floor is None else (residual / floor).tolist(),
+        "over_floor": unknown if floor is None else over(residual, floor).tolist(),
     }
 
 

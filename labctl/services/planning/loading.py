@@ -14,6 +14,7 @@ from instruments.bench_config import BenchFile, read_bench, shipped_benches
 from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
 from instruments.interfaces.table import TableLimits
+from instruments.toml_documents import read_toml_text, shown
 from labctl.errors import BadBench
 from labctl.services.schemas.plans import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
@@ -23,6 +24,8 @@ from procedures.recipe.recipe import Recipe, parse_recipe, read_recipe, shipped_
 
 #: Of a chamber's set point, until its controller has been asked.
 USUAL_RESOLUTION_C = 0.1
+#: A key of a bench file that is not known is shown up to here.
+LONGEST_PLACE = 80
 
 
 Look = Callable[[Plan, BenchFile], list[Visibility]]
@@ -43,7 +46,7 @@ def own_text(source: str) -> str:
     load_recipe(source)
     if "\n" in source or source in shipped_recipes():
         return source
-    return Path(source).read_text(encoding="utf-8")
+    return read_toml_text(Path(source))
 
 
 def recipe_document(recipe: Recipe) -> dict[str, Any]:
@@ -65,8 +68,8 @@ def load_bench(source: str) -> BenchFile:
         raise BadBench(f"bench file {source}: not TOML: {error}") from error
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise BadBench(f"bench file {source}: {place}: {first['msg']} (is {first['input']!r})") from error
+        place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
+        raise BadBench(f"bench file {source}: {place}: {first['msg']} (is {shown(first['input'])})") from error
 
 
 def limits_of(bench: BenchFile) -> BenchLimits:

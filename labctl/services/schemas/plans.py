@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
+from instruments.toml_documents import shown
 from labctl.services.schemas.base import Request, ResponseModel
 from procedures.contracts.errors import RecipeError
 from procedures.recipe.recipe import shipped_recipes
@@ -15,7 +16,7 @@ def never_a_path(recipe: str) -> str:
     """Refuse what would be looked for as a file: a request names a shipped recipe or brings its own text."""
     if "\n" in recipe or recipe in shipped_recipes():
         return recipe
-    raise RecipeError(f"no recipe {recipe!r}: send its text, or one of {', '.join(shipped_recipes())}")
+    raise RecipeError(f"no recipe {shown(recipe)}: send its text, or one of {', '.join(shipped_recipes())}")
 
 
 RecipeSource = Annotated[

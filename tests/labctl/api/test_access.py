@@ -225,7 +225,26 @@ def test_a_name_that_was_bent_to_this_machine_is_refused(loopback: Ask, host: st
 def test_a_page_of_another_site_may_not_act(loopback: Ask, headers: dict[str, str]) -> None:
     assert loopback("post", "/api/backups", NOTE, **headers).status_code == 403
     assert loopback("get", "/api/audit").json() == []
-    assert loopback("get", "/api/units", **headers).status_code == 200  # the browser keeps the answer from the page
+    asked = loopback("get", "/api/units", **headers).status_code
+    assert asked == (403 if "sec_fetch_site" in headers else 200)
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+def test_a_page_of_another_site_keeps_nothing_busy(loopback: Ask, site: str) -> None:
+    """The browser keeps the answer from the page, but what computes it would be busy all the same."""
+    paths = [
+        "/api/units",
+        "/api/units/U/calibrations/1/criticism",
+        "/api/campaigns/1/events",
+        "/api/recordings/1/allan",
+    ]
+    for method in ("get", "head", "options"):
+        for path in paths:
+            assert loopback(method, path, sec_fetch_site=site).status_code == 403, (method, path)
+    assert loopback("get", "/health", sec_fetch_site=site).status_code == 200
+    assert loopback("get", "/", sec_fetch_site=site).status_code == 200  # a link on another page
+    for own in ("same-origin", "none"):
+        assert loopback("get", "/api/units", sec_fetch_site=own).status_code == 200
 
 
 @pytest.mark.parametrize("header", ["x_forwarded_for", "forwarded"])

@@ -160,3 +160,23 @@ def test_a_serial_number_is_only_ever_compared(client: TestClient, serial: str) 
 def test_a_formula_costs_what_it_looks_like(client: TestClient, formula: str) -> None:
     answer = client.get(f"/api/units/{UNIT}/calibrations/1/criticism", params={"formula": formula})
     assert answer.status_code in {200, 400}
+
+
+def lines(count: int) -> list[str]:
+    return [f"f{index}: sin({index + 1} * table_rate_dps)" for index in range(count)]
+
+
+@pytest.mark.timeout(20)  # 2,000 of them took 35 s
+def test_a_request_has_at_most_20_formulas(client: TestClient) -> None:
+    version = f"/api/units/{UNIT}/calibrations/1"
+    most = {"formula": [f"f{index}: {index}" for index in range(40)]}
+    asked = [
+        client.post(f"{version}/preview", json=most),
+        client.post(f"{version}/improve", json=most),
+        client.get(f"{version}/criticism", params={"formula": lines(21)}),
+        client.get(f"{version}/criticism/events", params={"formula": lines(21)}),
+    ]
+    assert [answer.status_code for answer in asked] == [400] * 4
+    assert all("more than 20 formulas" in answer.json()["detail"] for answer in asked)
+    answer = client.post(f"{version}/preview", json={"add": ["dead_band"] * 40})
+    assert (answer.status_code, "the catalogue has" in answer.json()["detail"]) == (400, True)

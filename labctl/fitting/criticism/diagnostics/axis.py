@@ -11,7 +11,7 @@ from labctl.fitting.criticism.evidence.noise_grid import correlation, factors, w
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import Residuals
-from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.arrays import Array, over
 
 #: Of a 95 % band, in standard deviations.
 BAND = 1.96
@@ -37,6 +37,11 @@ class AxisView:
     def timed(self) -> bool:
         """Whether the recording says when each data set was measured."""
         return "t_s" in self.data.nodes
+
+    @property
+    def over_floor(self) -> Array:
+        """Residuals in units of the noise floor, (m,)."""
+        return over(self.residual_dps, self.floor_dps)
 
     def u_dps(self, weights: NDArray[np.float64]) -> Array:
         """Return the standard uncertainty of weighted sums of means, weights (k, m), as (k,)."""

@@ -50,7 +50,7 @@ def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> dict[str, Any
         "channels": {name: plain_list(along[rows])}
         | {name: plain_list(first.channel(name)[rows]) for name in sorted(names - {"t_s"}) if name in data.nodes},
         "residual_dps": {view.axis: plain_list(view.residual_dps[rows]) for view in axes},
-        "over_floor": {view.axis: plain_list((view.residual_dps / view.floor_dps)[rows]) for view in axes},
+        "over_floor": {view.axis: plain_list(view.over_floor[rows]) for view in axes},
     }
 
 

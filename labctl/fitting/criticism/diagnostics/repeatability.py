@@ -112,7 +112,7 @@ def repeats(view: AxisView) -> dict[str, Any] | None:
         "pairs": len(first),
         "scatter_dps": plain(scatter),
         "floor_dps": plain(floor),
-        "over_floor": plain(scatter / floor),
+        "over_floor": plain(scatter / floor) if floor > 0 else None,
         "datasets": [[int(a), int(b)] for a, b in view.data.dataset[np.stack([first, second], axis=1)[shown]]],
         "apart_sets": np.abs(second - first)[shown].tolist(),
         **apart,

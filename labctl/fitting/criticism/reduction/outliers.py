@@ -35,12 +35,17 @@ def _quantile(ordered: NDArray[np.float64], count: NDArray[np.int64], share: flo
 
 
 def white_level_dps(values: NDArray[np.float64], there: NDArray[np.float64]) -> float:
-    """Return the white standard deviation of one reading, deg/s: the median over data sets and frequencies."""
+    """Return the white standard deviation of one reading, deg/s: the median over data sets and frequencies.
+
+    It is NaN for data sets of fewer than 6 readings: they have no frequencies to tell it by.
+    """
     full = there.all(axis=1) if there.all(axis=1).sum() >= max(8, len(there) // 10) else np.ones(len(there), dtype=bool)
     chosen, mask = values[full], there[full]
     middle = (chosen * mask).sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1.0)
     window = np.hanning(chosen.shape[1])[None, :]
     residual = np.where(mask > 0, chosen - middle, 0.0) * window
     power = np.abs(np.fft.rfft(residual, axis=1)[:, 2:-1]) ** 2 / np.sum(window**2)
+    if not power.size:
+        return float("nan")
     per_set = np.median(power, axis=1) / np.log(2.0)
     return float(np.sqrt(np.median(per_set)))

@@ -1,0 +1,67 @@
+"""How much one data file may hold: an import takes a bounded part of the memory, whatever a file unpacks to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from labctl.errors import BadRecording
+
+#: Rows times columns of one file; each takes 8 bytes in memory, so 800 MB.
+MOST_VALUES = 100_000_000
+MOST_COLUMNS = 256
+VALUE_BYTES = 8
+#: What the pages of a file may unpack to, one after the other: its values with their dictionaries.
+MOST_UNPACKED_BYTES = 2_000_000_000
+#: Whole numbers up to here are exact in every reader of the answers: 2^53 - 1.
+LARGEST_WHOLE = (1 << 53) - 1
+
+_ADVICE = "divide the recording, or give points (one row per data set)"
+
+
+class Space:
+    """What the values of one file may still take, in bytes."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._left = MOST_VALUES * VALUE_BYTES
+
+    def take(self, column: str, size: int) -> None:
+        """Count `size` bytes of a column; raises BadRecording when the file has no room for them."""
+        self._left -= size
+        if self._left < 0:
+            raise BadRecording(
+                f"{self._path}: column {column[:80]!r}: the file's values take more than "
+                f"{MOST_VALUES * VALUE_BYTES / 1e6:g} MB, all that one file may; {_ADVICE}, or shorten its words"
+            )
+
+
+def refuse_too_many(path: Path, rows: int, columns: int) -> None:
+    """Raise BadRecording where a file has more values than are taken in at once."""
+    if rows * columns > MOST_VALUES:
+        raise BadRecording(
+            f"{path}: {rows} rows x {columns} columns = {rows * columns} values; at most {MOST_VALUES} are read from "
+            f"one file; {_ADVICE}"
+        )
+
+
+def refuse_too_large(path: Path, size: int) -> None:
+    """Raise BadRecording where a file unpacks to more than so many values need: long words, padding."""
+    if size > MOST_UNPACKED_BYTES:
+        raise BadRecording(
+            f"{path}: unpacks to {size / 1e6:g} MB; at most {MOST_UNPACKED_BYTES / 1e6:g} MB are read from "
+            f"one file; {_ADVICE}, or shorten its words"
+        )
+
+
+def checked_names(path: Path, names: Sequence[str]) -> None:
+    """Raise BadRecording for columns that are too many, or of one name."""
+    if len(names) > MOST_COLUMNS:
+        raise BadRecording(
+            f"{path}: {len(names)} columns; at most {MOST_COLUMNS} are read; leave out what is not needed"
+        )
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise BadRecording(f"{path}: column {name[:80]!r} stands more than once in the header")
+        seen.add(name)

@@ -1,0 +1,99 @@
+"""A Parquet file as columns: its footer first, then rows in pieces, so that what it unpacks to is known beforehand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from labctl.errors import BadRecording
+from labctl.recording.columns import BY_NAME
+from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names, refuse_too_large, refuse_too_many
+from labctl.recording.data_files.values import ColumnValues, holds_words
+
+#: Rows that are unpacked at a time.
+PIECE_ROWS = 1 << 16
+#: Bytes that are read at a time from each column of a row group.
+BUFFER_BYTES = 1 << 20
+#: Above this, no footer of so few columns is one: 256 columns of 100,000 rows a group need a tenth of it.
+MOST_FOOTER_BYTES = 16 << 20
+MAGIC = b"PAR1"
+
+
+def read_parquet(path: Path) -> dict[str, NDArray[Any]]:
+    """Read a Parquet file into named columns; raises BadRecording naming file, column and row.
+
+    Rows x columns and the size unpacked are compared with the limits by the footer alone, before a value is read.
+    """
+    try:
+        return _read(path)
+    except MemoryError as error:
+        raise BadRecording(f"{path}: needs more memory than this machine has free; divide the recording") from error
+    except (pa.ArrowException, OSError, EOFError, ValueError, OverflowError) as error:
+        first = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise BadRecording(f"{path}: not a whole Parquet file (truncated?): {first[:300]}") from error
+
+
+def _read(path: Path) -> dict[str, NDArray[Any]]:
+    _refuse_large_footer(path)
+    with pq.ParquetFile(path, buffer_size=BUFFER_BYTES, pre_buffer=False) as opened:
+        metadata, schema = opened.metadata, opened.schema_arrow
+    rows = metadata.num_rows
+    checked_names(path, schema.names)
+    for field in schema:
+        _refuse_type(path, field)
+    refuse_too_many(path, rows, len(schema.names))
+    refuse_too_large(path, _unpacked_bytes(metadata))
+    if rows <= 0:
+        raise BadRecording(f"{path}: no rows below the header; expected at least one")
+    words = [field.name for field in schema if holds_words(field.type)]
+    space = Space(path)
+    columns = [ColumnValues(path, name, space) for name in schema.names]
+    for column in columns:
+        if column.name not in words:
+            space.take(column.name, rows * VALUE_BYTES)
+    # words stay numbers of a dictionary: one long word in a million rows is one word
+    with pq.ParquetFile(path, read_dictionary=words, buffer_size=BUFFER_BYTES, pre_buffer=False) as opened:
+        for group in range(metadata.num_row_groups):
+            for piece in opened.iter_batches(PIECE_ROWS, row_groups=[group], use_threads=False):
+                for column, values in zip(columns, piece.columns, strict=True):
+                    column.add(values)
+    if any(column.rows != rows for column in columns):
+        raise BadRecording(f"{path}: {rows} rows by its footer, {columns[0].rows} in the file; write it again")
+    return {column.name: column.whole() for column in columns}
+
+
+def _refuse_large_footer(path: Path) -> None:
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 8))
+        tail = file.read(8)
+    size = int.from_bytes(tail[:4], "little")
+    if tail[4:] == MAGIC and size > MOST_FOOTER_BYTES:
+        raise BadRecording(
+            f"{path}: its footer has {size} bytes; at most {MOST_FOOTER_BYTES} are read; write larger row groups"
+        )
+
+
+def _refuse_type(path: Path, field: pa.Field) -> None:
+    kind = field.type.value_type if pa.types.is_dictionary(field.type) else field.type
+    number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
+    if number or holds_words(kind) or pa.types.is_boolean(kind) or pa.types.is_null(kind):
+        return
+    known = BY_NAME.get(field.name)
+    wanted = "text" if known and known.kind == "text" else f"numbers{f', {known.unit}' if known and known.unit else ''}"
+    advice = "write such a column so" if known else "leave the column out, or write it so"
+    raise BadRecording(
+        f"{path}: column {field.name[:80]!r} holds {str(kind)[:80]}; expected {wanted}; {advice}"
+        + ("; an instant is the seconds since started_at" if pa.types.is_temporal(kind) else "")
+    )
+
+
+def _unpacked_bytes(metadata: pq.FileMetaData) -> int:
+    size = 0
+    for group in range(metadata.num_row_groups):
+        chunks = metadata.row_group(group)
+        size += sum(chunks.column(index).total_uncompressed_size for index in range(chunks.num_columns))
+    return size
