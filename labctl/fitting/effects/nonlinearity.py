@@ -66,6 +66,7 @@ class DeadBand(Effect):
     origin: ClassVar[Origin] = "sensor"
     parameters = (Parameter("band_dps", "deg/s", 0.005, 150.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}
+    one_sign = True
     experiment = "rates from 0.01 to 1 deg/s of both signs, evenly spaced on a logarithmic scale"
     draws = ("table_rate_dps", "map")
 
@@ -87,6 +88,7 @@ class Quantization(Effect):
     origin: ClassVar[Origin] = "sensor"
     parameters = (Parameter("step_dps", "deg/s", 0.003, 1.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}
+    one_sign = True
     needs = ("raw_code",)
     experiment = "a histogram of raw codes at rest"
     draws = ("table_rate_dps", "repeats")
