@@ -26,9 +26,10 @@ class Kind:
     def added(self, recording: Recording, seed: int, size_dps: float) -> Recording:
         """Return the recording with this error in every output, `size_dps` at its largest."""
         columns = dict(recording.columns)
-        position = np.char.lstrip(np.asarray(columns["position"]).astype(np.str_), "-")
+        position = np.asarray(columns["position"]).astype(np.str_)
         for axis in recording.info.axes:
-            rate = np.asarray(columns["table_rate_dps"], dtype=np.float64) * (position == axis)
+            up = (position == axis).astype(np.float64) - (position == f"-{axis}")
+            rate = np.asarray(columns["table_rate_dps"], dtype=np.float64) * up
             values = self.law(columns, rate / max(float(np.abs(rate).max()), 1e-9), seed)
             columns[f"gyro_{axis}"] = columns[f"gyro_{axis}"] + size_dps * values
         return replace(recording, columns=columns)

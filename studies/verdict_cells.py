@@ -11,11 +11,17 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
+
+import numpy as np
 
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import Verdict, criticise
+from labctl.fitting.criticism.evidence.elimination import eliminate_base
+from labctl.fitting.criticism.evidence.noise_grid import Noise, expected_drift_dps
+from labctl.fitting.criticism.model_comparison import design_of
+from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording
@@ -42,6 +48,8 @@ FOREIGN = (
     ("informative", "yang2018", 0.03),
 )
 READINGS_HZ = 4.0
+#: What the model leaves of an error is not to be seen below this size, in noise units.
+LEAST_Z = 5.0
 
 
 @dataclass(frozen=True)
@@ -52,6 +60,7 @@ class Case:
     model: str
     effects: tuple[str, ...] = ()  #: hidden, each of the catalogue
     channels: tuple[str, ...] = ()  #: of what is hidden that no effect of the catalogue describes
+    plain: Callable[[], Recording] | None = None  #: the same recording without what no effect describes
 
 
 @lru_cache(maxsize=64)
@@ -71,7 +80,11 @@ def cells() -> Iterator[tuple[str, list[Case]]]:
             yield f"effect/{name}/z{z}/", list(_hidden(name, z))
     for recipe, model, size_dps in FOREIGN:
         for kind in KINDS:
-            made = [Case(partial(_added, recipe, kind, size_dps, s), model, (), KINDS[kind].channels) for s in seeds]
+            channels = KINDS[kind].channels
+            made = [
+                Case(partial(_added, recipe, kind, size_dps, s), model, (), channels, partial(plain, recipe, s))
+                for s in seeds
+            ]
             yield f"outside/{recipe}/{model}/{size_dps:g}/{kind}", made
 
 
@@ -102,14 +115,35 @@ def verdict_of(case: Case) -> Verdict:
         return Verdict("insufficient_data", reason=str(error))
 
 
+def _is_absorbed(case: Case) -> bool:
+    """Return whether the starting model absorbs what was added, so that nothing of it is left to be seen.
+
+    A table with a node at each temperature absorbs any law of temperature.
+    """
+    if case.plain is None:
+        return False
+    before, after = (reduce_recording(recording, outliers=False) for recording in (case.plain(), case.recording()))
+    model, _ = preset_for(case.model, []).build(fit_data_of(case.plain()))
+    z_squared = 0.0
+    for axis in before.info.axes:
+        design = replace(design_of(before, model, axis, {}), options=[])
+        assert before.white_var is not None
+        white = before.white_var[axis]
+        scale = np.repeat(np.sqrt(white)[None, :], len(before.output[axis]), axis=0)
+        drift = expected_drift_dps(before.info.technology or "", before.info.datasheet.get("bias_stability_dps"))
+        difference = after.output[axis] - before.output[axis]
+        z_squared += eliminate_base(design, difference, white, scale, [Noise(drift, 0.0, 0.0)])[0].chi2
+    return bool(z_squared < LEAST_Z**2)
+
+
 def score(case: Case, verdict: Verdict) -> str:
-    """Return what kind of answer it is: right, honest (no name), missed, or which kind of wrong."""
+    """Return what kind of answer it is: right, honest (no name), missed, unseen (absorbed), or which kind of wrong."""
     named = set(verdict.named)
     if not case.effects and named:
         return "wrong alone" if any(len(group) == 1 for group in verdict.groups) else "wrong"
     if not case.effects and case.channels:
         if verdict.form != "unexplained":
-            return "missed"
+            return "unseen" if _is_absorbed(case) else "missed"
         said = {*verdict.depends_on[:1], *verdict.confounded}
         return "right" if said & set(case.channels) else "other channel"
     if not named:
@@ -121,7 +155,10 @@ def score(case: Case, verdict: Verdict) -> str:
 
 
 def line(name: str, cases: list[Case], *, said: bool) -> str:
-    """Return one cell's counts, its share of right answers with the 95 % interval, and the seconds of one answer."""
+    """Return one cell's counts, its share of right answers with the 95 % interval, and the seconds of one answer.
+
+    Nothing said of what the model absorbs is right.
+    """
     counts: Counter[str] = Counter()
     begun = time.process_time()
     for case in cases:
@@ -131,9 +168,10 @@ def line(name: str, cases: list[Case], *, said: bool) -> str:
         if said and kind != "right":
             also = (verdict.depends_on[:2], verdict.confounded, dict(verdict.remainder or {}))
             print(f"   {kind}: {case.effects} {verdict.form} {verdict.groups} {also}", flush=True)
-    low, high = wilson(counts["right"], len(cases))
+    right = counts["right"] + counts["unseen"]
+    low, high = wilson(right, len(cases))
     seconds = (time.process_time() - begun) / len(cases)
-    share = f"{100 * counts['right'] / len(cases):.0f} ({100 * low:.0f} to {100 * high:.0f})"
+    share = f"{100 * right / len(cases):.0f} ({100 * low:.0f} to {100 * high:.0f})"
     return f"{name:45} {share:18} {dict(counts)} {seconds:.1f} s"
 
 

@@ -121,9 +121,20 @@ def option_of(
 
 def thermometer_options(data: ReducedRecording, model: ErrorModel, axis: str) -> list[CandidateShape]:
     """Return what a thermometer that drifts in time would do: the base's own slope over temperature, times time."""
-    name = f"temperature_{axis}_c" if f"temperature_{axis}_c" in data.nodes else "temperature_c"
-    if "t_s" not in data.nodes or name not in data.nodes:
+    if "t_s" not in data.nodes or (slope := temperature_slope(data, model, axis)) is None:
         return []
+    t_s = data.at_sets(np.asarray(data.nodes["t_s"], dtype=np.float64))
+    if not np.ptp(t_s) > 0:
+        return []
+    elapsed = (t_s - t_s.min()) / np.ptp(t_s)
+    return [CandidateShape(THERMOMETER, None, (slope * elapsed)[:, :, None], ("thermometer drift",), ("K",))]
+
+
+def temperature_slope(data: ReducedRecording, model: ErrorModel, axis: str) -> NDArray[np.float64] | None:
+    """Return the slope of the fitted base over temperature, (R, m) deg/s/K; None where it has none."""
+    name = f"temperature_{axis}_c" if f"temperature_{axis}_c" in data.nodes else "temperature_c"
+    if name not in data.nodes:
+        return None
     base, _, precision = base_rows(data, model, axis)
     size = np.linalg.norm(base[0], axis=0)
     size = np.where(size > 0, size, np.inf)  # a column that the schedule does not excite has no part in it
@@ -133,14 +144,10 @@ def thermometer_options(data: ReducedRecording, model: ErrorModel, axis: str) ->
         columns = {**data.nodes.columns, name: np.asarray(data.nodes[name], dtype=np.float64) + shift_k}
         moved, _, other = base_rows(replace(data, nodes=replace(data.nodes, columns=columns)), model, axis)
         if len(other) != len(precision):
-            return []
+            return None
         ends.append(moved @ (values / size))
-    slope = (ends[0] - ends[1]) / (2 * SHIFT_K)
-    t_s = data.at_sets(np.asarray(data.nodes["t_s"], dtype=np.float64))
-    if not np.ptp(t_s) > 0 or not np.any(slope):
-        return []
-    elapsed = (t_s - t_s.min()) / np.ptp(t_s)
-    return [CandidateShape(THERMOMETER, None, (slope * elapsed)[:, :, None], ("thermometer drift",), ("K",))]
+    slope = np.asarray((ends[0] - ends[1]) / (2 * SHIFT_K))
+    return slope if np.any(slope) else None
 
 
 def _is_known(data: ReducedRecording, effect_id: str) -> bool:

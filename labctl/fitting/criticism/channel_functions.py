@@ -21,6 +21,8 @@ WAVES_OVER_TIME = tuple(float(n) for n in np.arange(1.5, 12.1, 0.5))
 #: A jump is spread over this share of the range.
 SPREAD = 0.1
 SHARP = 0.03
+#: Time constants of a decay of the scale factor after power-on, s: beyond what any effect has, too.
+DECAYS_S = tuple(float(tau) for tau in np.geomspace(900.0, 28800.0, 6))
 #: Columns that are no physical channel: counters, the gyro's own output, and places within a data set.
 NO_CHANNELS = frozenset(
     {
@@ -30,6 +32,8 @@ NO_CHANNELS = frozenset(
 )  # fmt: skip
 TIMES = frozenset({"t_s", "power_s"})
 OF_TEMPERATURE_AND_TIME = TIMES | {"temperature_c"}
+#: Channels whose straight line is an effect, or in the base.
+OF_BASE_AND_TIME = OF_TEMPERATURE_AND_TIME | {"table_rate_dps"}
 #: Time since power-on is time where their difference changes by less than this.
 SAME_TIME_S = 1.0
 #: Channels without steps and waves: the rate, and the time since power-on, which is time again.
@@ -54,9 +58,14 @@ def channel_options(data: ReducedRecording, axis: str) -> list[CandidateShape]:
     """
     found = []
     channels = smooth_channels(data, axis)
-    if "t_s" in channels and "power_s" in channels and np.ptp(channels["t_s"] - channels["power_s"]) < SAME_TIME_S:
-        del channels["power_s"]
+    if "power_s" in channels:
+        same = "t_s" in channels and np.ptp(channels["t_s"] - channels["power_s"]) < SAME_TIME_S
+        found += _decays(data, axis, "t_s" if same else "power_s", channels["power_s"])
+        if same:
+            del channels["power_s"]
     for name, values in channels.items():
+        if name not in OF_BASE_AND_TIME:
+            found += _line(data, axis, name, values)
         for number in KNOTS:
             found += _smooth(data, axis, name, values, number)
         distinct = np.unique(np.round(values, 9))
@@ -87,6 +96,33 @@ def _waves(data: ReducedRecording, name: str, values: Array, over_range: tuple[f
     return [
         CandidateShape(name, None, data.rows_of(np.column_stack([np.cos(n * phase), np.sin(n * phase)])), names, units)
         for n in over_range
+    ]
+
+
+def _line(data: ReducedRecording, axis: str, name: str, values: Array) -> list[CandidateShape]:
+    """Return a channel itself, as bias and as scale factor."""
+    line = ((values - values.mean()) / np.ptp(values))[:, None]
+    return [
+        CandidateShape(name, None, data.rows_of(line), (name,), ("deg/s",)),
+        CandidateShape(
+            name, None, data.rows_of(line * data.nodes.rate_dps(axis)[:, None]), (f"{name} x rate",), ("1",)
+        ),
+    ]
+
+
+def _decays(data: ReducedRecording, axis: str, name: str, power_s: Array) -> list[CandidateShape]:
+    """Return decays of the scale factor after power-on."""
+    since, rate = np.maximum(power_s, 0.0), data.nodes.rate_dps(axis)
+    return [
+        CandidateShape(
+            name,
+            None,
+            data.rows_of((np.exp(-since / tau) * rate)[:, None]),
+            (f"exp(-{name}/{tau:.0f}) x rate",),
+            ("1",),
+            beside_base=True,
+        )
+        for tau in DECAYS_S
     ]
 
 

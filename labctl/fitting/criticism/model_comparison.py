@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.base_columns import base_of
 from labctl.fitting.criticism.candidate_shape import CandidateShape
-from labctl.fitting.criticism.candidates import base_rows, options_of, thermometer_options
+from labctl.fitting.criticism.candidates import options_of, thermometer_options
 from labctl.fitting.criticism.evidence.axis_comparison import compare_axis
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
@@ -49,7 +50,7 @@ def design_of(
     data: ReducedRecording, model: ErrorModel, axis: str, catalogue: Mapping[str, Effect] = CATALOGUE
 ) -> Design:
     """Return the design of one axis: all that does not depend on its output."""
-    base, _, precision = base_rows(data, model, axis)
+    base, precision = base_of(data, model, axis)
     nodes = data.nodes
     t_s = USUAL_SPACING_S * np.arange(len(data), dtype=np.float64)
     if "t_s" in nodes:
@@ -80,7 +81,7 @@ def designs_beside(
     """Return the designs of a comparison with another model, and its discrepancy, as their base."""
     designs = {}
     for axis, design in comparison.designs.items():
-        base, _, precision = base_rows(comparison.data, model, axis)
+        base, precision = base_of(comparison.data, model, axis)
         if axis in discrepancy:
             base = np.concatenate([base, discrepancy[axis].rows], axis=2)
             precision = np.concatenate([precision, discrepancy[axis].precision])
@@ -106,12 +107,13 @@ def centred(option: CandidateShape, level: NDArray[np.float64] | None) -> Candid
 
 
 def orthogonalised(option: CandidateShape, base: NDArray[np.float64]) -> CandidateShape:
-    """Return a formula orthogonalised to the base (R, m, k); other options unchanged.
+    """Return a formula, or what is only meant beside the base, orthogonalised to it (R, m, k); others unchanged.
 
     A formula is not centred on what was measured: of `supply_v * table_rate_dps` all but a hundredth is scale factor,
     and that hundredth is what is meant. A formula that lies in the span of the base stays as it is.
     """
-    if option.term is None or not option.term.formula or base.shape[2] == 0:
+    meant = option.beside_base or (option.term is not None and option.term.formula)
+    if not meant or base.shape[2] == 0:
         return option
     taken, *_ = np.linalg.lstsq(base[0], option.rows[0], rcond=1e-9)
     rows = option.rows - base @ taken

@@ -40,6 +40,8 @@ EXPLAINED_TIME = 0.75
 SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
 #: An effect that takes off less than this share of the excess chi2 is not named alone at the first step.
 LEAST_SHARE = 0.3
+#: A time constant of at least this share of the longest is at the end of its range.
+NEAR_END = 0.9
 #: Columns that are the same up to rounding have the same evidence within this.
 SAME = 0.02
 #: At most this many effects in a group of an ambiguous answer, beside exact aliases of the first and of the last.
@@ -97,6 +99,8 @@ def judge(comparison: Comparison, *, first: bool = True) -> Step:
     depends = channels_behind(comparison)
     if smooth is not None and (effect is None or _is_unexplained(comparison, effect, smooth)):
         return Step("unexplained", (), smooth, depends or (smooth.id,))
+    if effect is not None and refines_base(comparison, effect):
+        effect = _other_than_refined(comparison, effect)
     if effect is None or effect.log_bf < enough:
         return Step("unexplained", (), smooth, depends)
     share = share_removed(comparison, effect)
@@ -107,10 +111,56 @@ def judge(comparison: Comparison, *, first: bool = True) -> Step:
 
 
 def _is_unexplained(comparison: Comparison, effect: Candidate, smooth: Candidate) -> bool:
+    if is_at_end(comparison, effect):
+        return smooth.log_bf > effect.log_bf - LEAD
     if smooth.log_bf <= effect.log_bf + LEAD:
         return False
+    if _directions(comparison, smooth) < _directions(comparison, effect):  # simpler, and still better
+        return True
     limit = EXPLAINED_TIME if smooth.id in TIMES else EXPLAINED
     return overlap(comparison, smooth, effect) < limit
+
+
+def refines_base(comparison: Comparison, effect: Candidate) -> bool:
+    """Return whether the base has an effect in a lower order: then it is not missing, its law is not exact."""
+    if effect.term is None or effect.term.order is None:
+        return False
+    orders = [
+        (option.term.order, int(comparison.axes[axis].dimensions[i]))
+        for axis, design in comparison.designs.items()
+        for i, option in enumerate(design.options)
+        if option.candidate == effect.id and option.term is not None and option.term.order is not None
+    ]
+    lowest = min(order for order, _ in orders)
+    return effect.term.order > lowest and all(directions == 0 for order, directions in orders if order == lowest)
+
+
+def _other_than_refined(comparison: Comparison, refined: Candidate) -> Candidate | None:
+    """Return the best effect that is new to the base and cannot be distinguished from one that is not."""
+    near = (rival for rival in _alike(comparison, refined, physical=True) if not refines_base(comparison, rival))
+    effect = next(near, None)
+    smooth = comparison.leader(smooth=True)
+    return None if effect is None or (smooth is not None and _is_unexplained(comparison, effect, smooth)) else effect
+
+
+def is_of_another_law(comparison: Comparison, effect: Candidate) -> bool:
+    """Return whether an effect is only the nearest of the catalogue to a law that is another one."""
+    return is_at_end(comparison, effect) or refines_base(comparison, effect)
+
+
+def is_at_end(comparison: Comparison, effect: Candidate) -> bool:
+    """Return whether the longest time constant that an effect may have fits clearly best: its law is another one."""
+    if effect.term is None or "tau_s" not in effect.term.parameters:
+        return False
+    lead = 0.0
+    for axis in effect.option:
+        options, found = comparison.designs[axis].options, comparison.axes[axis].log_bf
+        tau_s = {i: o.term.parameters["tau_s"] for i, o in enumerate(options) if o.candidate == effect.id and o.term}
+        end = NEAR_END * max(tau_s.values())
+        last = max((float(found[i]) for i, tau in tau_s.items() if tau >= end), default=-np.inf)
+        inner = max((float(found[i]) for i, tau in tau_s.items() if tau < end), default=-np.inf)
+        lead += last - inner if np.isfinite(last) and np.isfinite(inner) else 0.0
+    return lead > LEAD
 
 
 def alias_group(comparison: Comparison, leader: Candidate) -> tuple[str, ...]:
@@ -157,14 +207,16 @@ def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
 
     A step in time is a temperature where temperatures only rose.
     """
-    smooth = [c for c in comparison.candidates if c.smooth and c.log_bf >= ENOUGH]
-    first = next((c for c in smooth if c.id == channel), None)
-    if first is None:
-        return ()
+    smooth = [c for c in comparison.candidates if c.smooth and c.log_bf > 0]
+    first = next((c for c in smooth if c.id == channel and c.log_bf >= ENOUGH), None) or comparison.candidates[0]
     return tuple(
         c.id
         for c in smooth
-        if c.id != channel and (c.log_bf > first.log_bf - FAR or overlap(comparison, first, c) > CONFOUNDED)
+        if c.id != channel
+        and (
+            (c.log_bf >= ENOUGH and c.log_bf > first.log_bf - FAR)
+            or (c is not first and overlap(comparison, first, c) > CONFOUNDED)
+        )
     )
 
 

@@ -129,6 +129,7 @@ class Effect(ABC):
     max_order: ClassVar[int | None] = None
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     ranges: ClassVar[Mapping[str, tuple[float, float]]] = {}  #: technology -> plausible size of the first coefficient
+    one_sign: ClassVar[bool] = False  #: whether the first coefficient has the sign of its range; else of either sign
     aliases: ClassVar[tuple[str, ...]] = ()  #: ids whose columns are the same whatever the schedule
     experiment: ClassVar[str] = ""  #: what would distinguish it from similar effects
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
@@ -142,6 +143,19 @@ class Effect(ABC):
     def shaped_by(self, term: Term, coefficients: Mapping[str, float]) -> Term:
         """Return a term whose columns have the shape of a fit: axis -> its first coefficient, at the nodes' mean."""
         return term
+
+    @classmethod
+    def outside(cls, technology: str, value: float, u: float) -> bool | None:
+        """Return whether a first coefficient is outside its plausible range by two standard uncertainties `u`.
+
+        None where no range is known for a technology. A range is one of sizes, unless the effect has `one_sign`.
+        """
+        if (span := cls.ranges.get(technology)) is None:
+            return None
+        spare = 2.0 * u if np.isfinite(u) else 0.0  # a fit without degrees of freedom has no uncertainty
+        if cls.one_sign:
+            return value + spare < span[0] or value - spare > span[1]
+        return abs(value) - spare > max(abs(span[0]), abs(span[1]))
 
     def least(self, term: Term) -> tuple[int, int]:
         """Return how many different (rates, temperatures) tell this effect's coefficients apart."""

@@ -64,8 +64,9 @@ class DeadBand(Effect):
     term = "Dead band (threshold, lock-in)"
     sentence = "Below a small rate there is no output, and a little above it too little."
     origin: ClassVar[Origin] = "sensor"
-    parameters = (Parameter("band_dps", "deg/s", 0.005, 20.0, logarithmic=True),)
+    parameters = (Parameter("band_dps", "deg/s", 0.005, 150.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}
+    one_sign = True
     experiment = "rates from 0.01 to 1 deg/s of both signs, evenly spaced on a logarithmic scale"
     draws = ("table_rate_dps", "map")
 
@@ -75,7 +76,7 @@ class DeadBand(Effect):
         return [Column("dead_band", "1", passed - rate)]
 
     def options(self, span: Span) -> list[Term]:
-        return by_parameter(self.id, band_dps=np.geomspace(0.005, 0.1 * span.rate_dps, 9))
+        return by_parameter(self.id, band_dps=np.geomspace(0.005, 0.35 * span.rate_dps, 10))
 
 
 class Quantization(Effect):
@@ -87,6 +88,7 @@ class Quantization(Effect):
     origin: ClassVar[Origin] = "sensor"
     parameters = (Parameter("step_dps", "deg/s", 0.003, 1.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}
+    one_sign = True
     needs = ("raw_code",)
     experiment = "a histogram of raw codes at rest"
     draws = ("table_rate_dps", "repeats")

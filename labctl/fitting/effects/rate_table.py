@@ -131,6 +131,7 @@ class MissedSteps(Effect):
     origin: ClassVar[Origin] = "bench"
     parameters = (Parameter("stall_dps", "deg/s", 20.0, 400.0),)
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
+    one_sign = True
     experiment = "count index pulses"
     draws = ("table_rate_dps", "worst")
 

@@ -151,6 +151,7 @@ class SineResponse(Effect):
     origin: ClassVar[Origin] = "sensor"
     parameters = (Parameter("k", "rad/(rad/s)", 0.05, 1.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 2.25), "mems": (0.0, 0.0), "piezo": (0.0, 0.0)}
+    one_sign = True
     experiment = "more rates in the top third of the range"
     draws = ("table_rate_dps", "map")
 
@@ -186,6 +187,7 @@ class Saturation(Effect):
     origin: ClassVar[Origin] = "sensor"
     parameters = (Parameter("knee_dps", "deg/s", 20.0, 400.0),)
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
+    one_sign = True
     experiment = "rates every 2 to 5 % above 70 % of full scale"
     draws = ("table_rate_dps", "map", "worst")
     softness: ClassVar[float] = 0.02  #: of the knee: what saturates does not break off

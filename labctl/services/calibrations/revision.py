@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
 
-import numpy as np
-
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
 from labctl.fitting import FitResult
@@ -189,17 +187,21 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitRespon
 
 
 def plausible(result: FitResult, technology: str) -> dict[str, dict[str, Any]]:
-    """Return effect -> the range its first coefficient usually lies in, and whether it does on every axis."""
+    """Return effect -> the range its first coefficient usually lies in, and whether it may do so on every axis.
+
+    A range is one of sizes; of an effect that has only one sign, the sign counts too.
+    """
     found: dict[str, dict[str, Any]] = {}
     for term in result.fitted.model.terms:
-        span = kind_of(term).ranges.get(technology)
+        kind = kind_of(term)
+        span = kind.ranges.get(technology)
         if span is None:
             continue
-        sizes = [
-            float(np.max(np.abs(fit.values[fit.effects.index(term.effect)])))
-            for fit in result.fitted.axes.values()
-            if term.effect in fit.effects
-        ]
-        limit = max(abs(span[0]), abs(span[1]))
-        found[term.effect] = {"from": span[0], "to": span[1], "inside": all(size <= limit for size in sizes)}
+        outside = False
+        for fit in result.fitted.axes.values():
+            if term.effect in fit.effects:
+                first = fit.effects.index(term.effect)
+                sizes = zip(fit.values[first], fit.u[first], strict=True)
+                outside |= any(bool(kind.outside(technology, float(value), float(u))) for value, u in sizes)
+        found[term.effect] = {"from": span[0], "to": span[1], "inside": not outside}
     return found

@@ -30,7 +30,7 @@ def log_size_prior(option: CandidateShape, found: AxisEvidence, index: int, tech
         return 0.0
     values, covariance = solve_option(found.best, found.slices[index])
     least = np.maximum(np.abs(values) - SPARE_U * np.sqrt(np.maximum(np.diag(covariance), 0.0)), 0.0)
-    if _is_beyond_all(option, least):
+    if _is_beyond_all(option, least) or _has_wrong_sign(option, float(values[0]), float(least[0]), technology):
         return -np.inf
     span = CATALOGUE[option.term.effect].ranges.get(technology)
     if span is None or not least[0] > 0:
@@ -39,6 +39,15 @@ def log_size_prior(option: CandidateShape, found: AxisEvidence, index: int, tech
     if least[0] > FARTHEST * largest:
         return -np.inf
     return -float(np.log(max(least[0] / largest, 1.0)))
+
+
+def _has_wrong_sign(option: CandidateShape, value: float, least: float, technology: str) -> bool:
+    """Return whether a coefficient is clearly of a sign that its effect cannot have: more output beyond a knee."""
+    kind = CATALOGUE[option.term.effect] if option.term is not None else None
+    if kind is None or not kind.one_sign or technology not in kind.ranges or not least > 0:
+        return False
+    low, high = kind.ranges[technology]
+    return (value < 0 <= low) or (value > 0 >= high)
 
 
 def _is_beyond_all(option: CandidateShape, least: Array) -> bool:

@@ -29,6 +29,7 @@ from labctl.fitting.criticism.verdict import (
     axes_of,
     channels_behind,
     confounded_with,
+    is_of_another_law,
     judge,
     not_physical_group,
     overlap,
@@ -50,8 +51,6 @@ NEXT_SHARE_AMBIGUOUS = 0.08
 LEAST_PART = 0.05
 #: Where what is named leaves more than this share of the excess, it is not the cause.
 MOST_LEFT = 0.5
-
-
 #: An effect whose shape may be wrong by a few per cent explains at least this share of what a smooth function does.
 MOSTLY = 0.8
 
@@ -151,6 +150,8 @@ def _explained_but_for_shape(first: Comparison, initial: Comparison, step: Step)
     """Return a judgement that names the leading effect where it, a few per cent wrong in shape, beats all else."""
     effect, smooth = initial.leader(smooth=False), initial.leader(smooth=True)
     if effect is None or smooth is None or effect.log_bf < ENOUGH or overlap(initial, smooth, effect) < MOSTLY:
+        return step
+    if is_of_another_law(initial, effect):
         return step
     if not is_better_than_smooth(first, initial, effect, smooth, discrepancies(initial, effect)):
         return step
@@ -284,7 +285,7 @@ def _pair(first: Comparison, initial: Comparison, catalogue: Mapping[str, Effect
     smooth = initial.leader(smooth=True)
     pairs = []
     for leader in [c for c in initial.candidates if not c.smooth and c.physical and c.log_bf >= ENOUGH][:LEADERS]:
-        if leader.term is None:
+        if leader.term is None or is_of_another_law(initial, leader):
             continue
         one = Finding((leader.id,), refined_term(initial, leader), leader.log_bf)
         other = _finding_beside(first, [one], catalogue)

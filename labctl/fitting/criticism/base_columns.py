@@ -1,0 +1,43 @@
+"""Columns of the base of one axis: those of the model, and what its table of temperatures may be wrong by."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.criticism.candidates import base_rows, temperature_slope
+from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.temperature import LagrangeTable
+from labctl.fitting.numeric.arrays import Array
+
+#: Standard deviation of the slope of a table at a node, over the slope: the law between the nodes is not known there.
+SLOPE_ERROR = 0.5
+
+
+def base_of(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArray[np.float64], Array]:
+    """Return the coordinates of the base (R, m, k), and the prior precision of each column (k,)."""
+    base, _, precision = base_rows(data, model, axis)
+    slopes = _slope_errors(data, model, axis)
+    if slopes is None:
+        return base, precision
+    return np.concatenate([base, slopes], axis=2), np.concatenate([precision, np.ones(slopes.shape[2])])
+
+
+def _slope_errors(data: ReducedRecording, model: ErrorModel, axis: str) -> NDArray[np.float64] | None:
+    """Return what the slope of a table on both sides of its nodes may be wrong by, (R, m, 2 nodes); None without one.
+
+    A table is exact at its nodes, whatever the unit's law is; how steep the law is there it only takes from the
+    neighbours. The temperatures of a level scatter by hundredths of a kelvin, which a steep law makes visible.
+    """
+    if not isinstance(model.temperature, LagrangeTable) or (slope := temperature_slope(data, model, axis)) is None:
+        return None
+    nodes_c = np.asarray(model.temperature.nodes_c)
+    warm = data.nodes.temperature_c(axis)
+    off = warm[:, None] - nodes_c[None, :]
+    nearest = np.argmin(np.abs(off), axis=1)[:, None] == np.arange(len(nodes_c))
+    sides = np.concatenate(
+        [np.where(nearest, np.minimum(off, 0.0), 0.0), np.where(nearest, np.maximum(off, 0.0), 0.0)], axis=1
+    )
+    of_node = np.repeat(slope[0], len(warm) // len(data))
+    return np.asarray(SLOPE_ERROR * data.rows_of(of_node[:, None] * sides))

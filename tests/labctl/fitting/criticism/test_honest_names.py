@@ -1,0 +1,88 @@
+"""What must not be named: the nearest shape of another law, a law of the base in a higher order, an impossible sign."""
+
+from __future__ import annotations
+
+import pytest
+
+from labctl.fitting.criticism import Verdict
+from labctl.fitting.criticism.model_comparison import compare_models
+from labctl.fitting.criticism.reduction import reduce_recording
+from labctl.fitting.criticism.verdict import is_at_end, refines_base
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.effects import CATALOGUE
+from labctl.fitting.models.presets import preset_for
+from labctl.recording import Recording
+from labctl.services.simulation.recordings import SimulateRequest, make_recording
+from studies.outside_catalogue import KINDS
+from tests.helpers.criticism import held
+from tests.helpers.simulated_recordings import single_axis
+
+
+def plain(recipe: str, seed: int) -> Recording:
+    return make_recording(SimulateRequest(recipe=recipe, seed=seed, sample_rate_hz=4.0)).recording
+
+
+def added(kind: str, recipe: str, model: str, size_dps: float, seed: int = 0) -> Verdict:
+    return held(KINDS[kind].added(plain(recipe, seed), seed, size_dps), model).verdict
+
+
+@pytest.mark.parametrize(
+    ("recipe", "model", "size_dps", "seed"),
+    [("gyrostar", "weiss1995", 0.5, 0), ("ojeda2000", "ojeda2000", 0.03, 1), ("ojeda2000", "ojeda2000", 1.0, 0)],
+)
+def test_a_scale_factor_that_decays_in_hours_is_no_self_heating(
+    recipe: str, model: str, size_dps: float, seed: int
+) -> None:
+    """Self-heating is over within an hour, and its longest time constant is the nearest it comes to two hours."""
+    verdict = added("power_scale", recipe, model, size_dps, seed)
+    assert (verdict.form, verdict.named) == ("unexplained", ())
+    assert {verdict.depends_on[0], *verdict.confounded} & {"t_s", "power_s"}
+
+
+def test_an_effect_may_be_at_the_end_of_its_range_and_a_law_in_the_base() -> None:
+    recording = KINDS["power_scale"].added(plain("ojeda2000", 0), 0, 0.03)
+    model, _ = preset_for("ojeda2000", []).build(fit_data_of(recording))
+    compared = compare_models(reduce_recording(recording), model)
+    found = {c.id: c for c in compared.candidates if not c.smooth}
+    assert is_at_end(compared, found["self_heating"])
+    assert refines_base(compared, found["scale_factor_temperature"])
+    assert not refines_base(compared, found["self_heating"])
+    assert not is_at_end(compared, found["missed_steps"])
+
+
+@pytest.mark.parametrize("seed", [0, 9])
+def test_a_table_is_not_blamed_for_how_steep_the_law_is_at_its_nodes(seed: int) -> None:
+    """A tanh of half a deg/s per kelvin, and levels that scatter by hundredths of a kelvin."""
+    assert held(plain("gyrostar", seed), "weiss1995").verdict.form == "adequate"
+
+
+def test_a_wave_in_time_is_no_warm_up() -> None:
+    verdict = added("daily_wave", "gyrostar", "weiss1995", 0.5)
+    assert (verdict.form, verdict.named, verdict.depends_on[0]) == ("unexplained", (), "t_s")
+
+
+def test_a_channel_times_the_rate_is_that_channel_upside_down_too() -> None:
+    verdict = added("humidity_scale", "informative", "yang2018", 0.03)
+    assert (verdict.form, verdict.named) == ("unexplained", ())
+    assert verdict.depends_on[0] == "humidity_pct"
+
+
+def test_a_dead_band_of_a_quarter_of_the_range_is_named() -> None:
+    assert held(single_axis(3, dead_band=20.0)).verdict.named[:1] == ("dead_band",)
+
+
+def test_a_size_of_a_sign_that_an_effect_cannot_have_is_outside() -> None:
+    """An output beyond its saturation, a band in which there is more than the rate."""
+    assert CATALOGUE["saturation"].outside("mems", 0.1, 0.01)
+    assert not CATALOGUE["saturation"].outside("mems", -0.1, 0.01)
+    assert not CATALOGUE["saturation"].outside("mems", 0.01, 0.01)
+    assert CATALOGUE["dead_band"].outside("fog", -0.1, 0.01)
+    assert not CATALOGUE["g_sensitivity"].outside("mems", -0.05, 0.01)
+    assert CATALOGUE["g_sensitivity"].outside("mems", -0.2, 0.01)
+    assert CATALOGUE["sine_response"].outside("mems", 0.02, 0.001)
+    assert CATALOGUE["sine_response"].outside("no such", 0.02, 0.001) is None
+
+
+def test_what_grows_beyond_the_rate_is_no_saturation() -> None:
+    """The same bend with the other sign: no output of a gyro has it."""
+    assert "saturation" not in held(single_axis(3, saturation=0.02)).verdict.named
