@@ -1,8 +1,8 @@
 """Rich surface of an axis' error: what data sets can have in common whatever the model, so that the rest is noise.
 
-A level of its own for every rate of every position (a dead band or missed steps need no shape), smooth functions of
-temperature that also multiply the rate, what is logged of the surroundings, the time since power-on, and the direction
-in which the temperature goes.
+A level of its own for every rate of every position (a dead band or missed steps need no shape) and for every discrete
+temperature, smooth functions of temperature that also multiply the rates, what is logged of the surroundings, the time
+since power-on, and the direction in which the temperature goes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.levels import rate_levels
+from labctl.fitting.data.levels import level_centres, rate_levels
+from labctl.fitting.data.temperature_levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
 
 #: The surface has at most this share of as many columns as there are data sets, and leaves at least so many free.
@@ -24,7 +25,7 @@ DEGREES = (6, 4, 2, 2)
 #: Time constants of a warm-up after power-on, s.
 WARM_UP_S = (600.0, 3600.0)
 #: A column of which those before it leave less than this share says nothing new.
-LEAST_NEW = 1e-7
+LEAST_NEW = 1e-2
 #: What is logged and no cause of an error by itself, or is there in another form.
 NO_SURROUNDINGS = frozenset({
     "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
@@ -68,8 +69,10 @@ def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
     places = np.column_stack([rows.astype(np.float64) for _, rows in channels.positions()])
     yield places
     yield powers[:, 1:]
+    yield from _of_other_axes(channels, axis, warm)
     for degree in range(1, max(DEGREES) + 1):
         yield np.column_stack([warm[:, degree] * powers[:, n] for n, most in enumerate(DEGREES) if degree <= most])
+    yield _levels_of_temperature(channels.temperature_c(axis), rate)
     yield _levels_of_rate(channels)
     yield from _history(channels, warm, rate)
     for name in sorted(set(channels.columns) - NO_SURROUNDINGS):
@@ -79,6 +82,26 @@ def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
             yield np.column_stack([around, around * rate])
     yield np.column_stack([(place * powers[:, 1:].T).T for place in places.T])
     yield np.column_stack([(place * warm[:, 1:4].T).T for place in places.T])
+
+
+def _of_other_axes(channels: Channels, axis: str, warm: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """Yield the rate about each other axis, alone and times straight and bent functions of temperature."""
+    for other in channels.rates:
+        if other != axis:
+            yield _scaled(channels.rate_dps(other), about_zero=True)[:, None] * warm[:, :3]
+
+
+def _levels_of_temperature(temperature_c: Array, rate: Array) -> NDArray[np.float64]:
+    """Return the indicators of discrete temperatures, (m, k): as bias, as scale factor, and times what is left in them.
+
+    A law that is steep between two of them is no polynomial of all, and turns even hundredths of a kelvin into error.
+    """
+    level = temperature_levels(temperature_c)
+    if level is None:
+        return np.zeros((len(temperature_c), 0))
+    here = np.eye(int(level.max()) + 1)[level]
+    within = temperature_c - level_centres(temperature_c, level)
+    return np.column_stack([here, here * rate[:, None], here * within[:, None], here * (within * rate)[:, None]])
 
 
 def _levels_of_rate(channels: Channels) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ def test_it_is_the_noise_that_was_simulated() -> None:
         floor = data.noise_floor
         assert floor.source == "within and between data sets"
         ratios.append((floor.rms_dps or 0.0) / true_floor_dps(data))
-    assert np.mean(ratios) == pytest.approx(1.0, abs=0.12)
+    assert 0.8 < np.mean(ratios) < 1.1  # on one rising leg of temperatures a long drift is partly a temperature
     assert max(ratios) < 1.4
     assert min(ratios) > 0.5  # of 15 h of drift a few hours of one unit may show little
 
@@ -70,7 +70,8 @@ def test_without_readings_repeats_tell_else_the_scatter_else_nothing() -> None:
     data = replace(fit_data_of(single_axis(1)), white_var=None)
     scatter = data.noise_floor
     assert scatter.source == "scatter about a smooth surface"
-    assert scatter.rms_dps == pytest.approx(DRIFT_DPS, rel=0.4)
+    assert scatter.rms_dps is not None
+    assert 0.35 * DRIFT_DPS < scatter.rms_dps < 1.2 * DRIFT_DPS  # of the drift only what changes from set to set
     twice = np.repeat(np.arange(len(data)), 2)
     doubled = replace(
         data,
