@@ -13,18 +13,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.levels import SAME_TEMPERATURE_C
-from labctl.fitting.data.rich_surface import LEAST_FREE, rich_surface
+from labctl.fitting.data.rich_surface import LEAST_FREE, rich_surface, with_levels_of_temperature
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import Drift, Scatter
+from labctl.fitting.numeric.drift_noise import Drift, Scatter, whitened
 from labctl.fitting.numeric.least_squares import solve
 
 #: Data sets closer than this in rate (of the fastest) and temperature repeat each other.
 REPEAT_RATE = 1e-3
 REPEAT_TEMPERATURE_C = SAME_TEMPERATURE_C
 REPEATS_NEEDED = 8
+#: Probability at which noise alone is taken for a law that no smooth function of temperature follows.
+FALSE_ALARM = 1e-4
 #: A drift stays within the bias stability that a data sheet states, as two standard deviations.
 DATASHEET_SHARE = 0.5
 
@@ -61,7 +64,7 @@ def noise_floor_of(channels: Channels, errors_dps: Mapping[str, Array], scatter:
     surfaces = {axis: rich_surface(channels, axis) for axis in errors_dps}
     white = {axis: known.white_var for axis, known in scatter.items()}
     if all(values is not None for values in white.values()):
-        return _with_known_white(surfaces, errors_dps, scatter)
+        return _with_known_white(channels, surfaces, errors_dps, scatter)
     left = {axis: values - surfaces[axis] @ (surfaces[axis].T @ values) for axis, values in errors_dps.items()}
     m = len(channels)
     repeats = repeats_dps(channels, left)
@@ -75,7 +78,10 @@ def noise_floor_of(channels: Channels, errors_dps: Mapping[str, Array], scatter:
 
 
 def _with_known_white(
-    surfaces: Mapping[str, NDArray[np.float64]], errors_dps: Mapping[str, Array], scatter: Mapping[str, Scatter]
+    channels: Channels,
+    surfaces: Mapping[str, NDArray[np.float64]],
+    errors_dps: Mapping[str, Array],
+    scatter: Mapping[str, Scatter],
 ) -> NoiseFloor:
     enough = all(len(surface) - surface.shape[1] >= LEAST_FREE for surface in surfaces.values())
     stability = next(iter(scatter.values())).datasheet_drift_dps
@@ -84,7 +90,7 @@ def _with_known_white(
         known = scatter[axis]
         assert known.white_var is not None
         if enough:
-            drift = solve(surface, errors_dps[axis], known).drift
+            drift = _drift(surface, with_levels_of_temperature(surface, channels, axis), errors_dps[axis], known)
         else:
             drift = Drift(DATASHEET_SHARE * float(stability or 0.0), 1.0)
         floor = np.sqrt(known.white_var + drift.drift_dps**2 + (drift.per_rate * known.rate_dps) ** 2)
@@ -92,6 +98,21 @@ def _with_known_white(
     if enough:
         return NoiseFloor(axes, "within and between data sets")
     return NoiseFloor(axes, "within data sets, and by the data sheet" if stability else "within data sets")
+
+
+def _drift(surface: NDArray[np.float64], fuller: NDArray[np.float64], error_dps: Array, scatter: Scatter) -> Drift:
+    """Return the drift beside a surface (m, k), or a fuller one where an F-test at the first drift asks for it."""
+    first = solve(surface, error_dps, scatter).drift
+    more, free = fuller.shape[1] - surface.shape[1], len(surface) - fuller.shape[1]
+    if more == 0 or scatter.white_var is None:
+        return first
+    together = np.column_stack([fuller, error_dps])
+    ((*columns, y),) = (rows.T for rows in whitened(scatter, [first], scatter.white_var, together)[0])
+    design = np.column_stack(columns)
+    left = [float(np.sum((y - part @ np.linalg.lstsq(part, y)[0]) ** 2)) for part in (design[:, :-more], design)]
+    if fdtrc(more, free, (left[0] - left[1]) / more / max(left[1] / free, 1e-300)) > FALSE_ALARM:
+        return first
+    return solve(fuller, error_dps, scatter).drift
 
 
 def _of_scatter(m: int, scatter_dps: Mapping[str, float], source: str) -> NoiseFloor:

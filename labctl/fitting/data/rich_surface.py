@@ -1,8 +1,8 @@
 """Rich surface of an axis' error: what data sets can have in common whatever the model, so that the rest is noise.
 
-A level of its own for every rate of every position (a dead band or missed steps need no shape) and for every discrete
-temperature, smooth functions of temperature that also multiply the rates, what is logged of the surroundings, the time
-since power-on, and the direction in which the temperature goes.
+A level of its own for every rate of every position (a dead band or missed steps need no shape), smooth functions of
+temperature that also multiply the rates, what is logged of the surroundings, the time since power-on, and the direction
+in which the temperature goes; where the data ask for it a level of its own for every discrete temperature too.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from labctl.fitting.data.temperature_levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
 
 #: The surface has at most this share of as many columns as there are data sets, and leaves at least so many free.
-MOST_SHARE, LEAST_FREE = 0.5, 8
+MOST_SHARE, MOST_SHARE_WITH_LEVELS, LEAST_FREE = 0.5, 0.7, 8
 #: Largest degree in temperature of the bias, of the scale factor and of the terms quadratic and cubic in the rate.
 DEGREES = (6, 4, 2, 2)
 #: Time constants of a warm-up after power-on, s.
@@ -35,14 +35,28 @@ NO_SURROUNDINGS = frozenset({
 
 def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
     """Return orthonormal columns (m, k), the most important first; k is at most half of m, and at most m - 8."""
-    m = len(channels)
-    most = min(int(MOST_SHARE * m), m - LEAST_FREE)
-    found: list[Array] = []
-    for block in _blocks(channels, axis):
+    return _orthonormal(_blocks(channels, axis), np.zeros((len(channels), 0)), MOST_SHARE)
+
+
+def with_levels_of_temperature(surface: NDArray[np.float64], channels: Channels, axis: str) -> NDArray[np.float64]:
+    """Return a surface (m, k) with a level of its own for every discrete temperature, at most 0.7 m columns in all.
+
+    On one rising leg of temperatures these take a drift for a temperature, so they are only for laws that need them.
+    """
+    rate = _scaled(channels.rate_dps(axis), about_zero=True)
+    levels = _levels_of_temperature(channels.temperature_c(axis), rate)
+    return _orthonormal(iter([levels]), surface, MOST_SHARE_WITH_LEVELS)
+
+
+def _orthonormal(
+    blocks: Iterator[NDArray[np.float64]], begin: NDArray[np.float64], share: float
+) -> NDArray[np.float64]:
+    m = len(begin)
+    most = min(int(share * m), m - LEAST_FREE)
+    found = list(begin.T)
+    for block in blocks:
         for column in block.T:
-            if len(found) >= most:
-                return np.column_stack(found) if found else np.zeros((m, 0))
-            if (new := _new_part(column, found)) is not None:
+            if len(found) < most and (new := _new_part(column, found)) is not None:
                 found.append(new)
     return np.column_stack(found) if found else np.zeros((m, 0))
 
@@ -72,7 +86,6 @@ def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
     yield from _of_other_axes(channels, axis, warm)
     for degree in range(1, max(DEGREES) + 1):
         yield np.column_stack([warm[:, degree] * powers[:, n] for n, most in enumerate(DEGREES) if degree <= most])
-    yield _levels_of_temperature(channels.temperature_c(axis), rate)
     yield _levels_of_rate(channels)
     yield from _history(channels, warm, rate)
     for name in sorted(set(channels.columns) - NO_SURROUNDINGS):

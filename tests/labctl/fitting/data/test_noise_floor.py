@@ -30,7 +30,7 @@ def test_it_is_the_noise_that_was_simulated() -> None:
         assert floor.source == "within and between data sets"
         ratios.append((floor.rms_dps or 0.0) / true_floor_dps(data))
     assert 0.8 < np.mean(ratios) < 1.1  # on one rising leg of temperatures a long drift is partly a temperature
-    assert max(ratios) < 1.4
+    assert max(ratios) < 1.7
     assert min(ratios) > 0.5  # of 15 h of drift a few hours of one unit may show little
 
 
