@@ -15,6 +15,7 @@ LabctlError              exit 2, HTTP 400
 ├── NotAllowed           the key's role may not do this, or the request came a way it may not    HTTP 403
 │   └── NotIdentified    no key was given, or it is not one in force                             HTTP 401
 ├── TooLarge             a request carries more than this service takes              HTTP 413
+├── BenchSilent          the bench process does not answer; the bench may move       HTTP 503
 └── StoreError           the database cannot be used: newer, damaged, locked         HTTP 503
     └── DiskFull         nothing of the act was kept                                 HTTP 507
 """
@@ -126,6 +127,13 @@ class CertificationRefused(Conflict):
     """Something speaks against certifying a version; it can be overridden with a reason."""
 
     slug = "certification-refused"
+
+
+class BenchSilent(LabctlError):
+    """The bench process does not answer: what the bench does is not known."""
+
+    status = 503
+    slug = "bench-silent"
 
 
 class StoreError(LabctlError):

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from labctl import web
-from labctl.api import problems, systemd
+from labctl.api import problems
 from labctl.api.access_policy import AccessPolicy
 from labctl.api.middleware import AccessMiddleware
 from labctl.api.routers import (
@@ -56,11 +56,9 @@ def create_app(service: LabService, access: AccessPolicy | None = None) -> FastA
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         service.start()
-        systemd.ready()
         try:
             yield
         finally:
-            systemd.stopping()
             service.close()
 
     app = FastAPI(

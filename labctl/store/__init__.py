@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
-from labctl.store.connection.database import Database
+from labctl.store.connection.database import Database, Writer
 from labctl.store.connection.location import is_url
-from labctl.store.connection.writer_lock import Holder, holder_of
+from labctl.store.connection.transactions import run_transaction
+from labctl.store.connection.writer_lock import NO_SERVICE, Holder, ServiceAddress, holder_of
 from labctl.store.integrity.backup import Copy, copy_database
 from labctl.store.integrity.check import Checked, Finding, Progress, check
 from labctl.store.records import (
@@ -72,6 +74,7 @@ __all__ = [
     "Recordings",
     "ResumePoint",
     "ResumePoints",
+    "ServiceAddress",
     "StartEventRow",
     "StartRow",
     "Starts",
@@ -81,6 +84,7 @@ __all__ = [
     "TakeUp",
     "Unit",
     "Units",
+    "Writer",
     "check",
     "copy_database",
     "holder_of",
@@ -119,18 +123,30 @@ class Store:
         """Whether no other process can write to the database as long as this one holds it."""
         return self._database.writes and not is_url(self.location)
 
+    def note_address(self, address: ServiceAddress) -> None:
+        """Write down at which address the service that holds this database is reached now."""
+        self._database.note_address(address)
+
+    def run(self, name: str, args: Any, kwargs: Any) -> Any:
+        """Run a transaction that another process sent. Raises KeyError for an unknown name, and what it raises."""
+        return run_transaction({type(each).__name__: each for each in vars(self).values()}, name, args, kwargs)
+
     def close(self) -> None:
         """Close the database."""
         self._database.close()
 
 
 @contextmanager
-def open_store(location: str, *, write: bool, url: str | None = None) -> Iterator[Store]:
+def open_store(
+    location: str, *, write: bool, address: ServiceAddress = NO_SERVICE, writer: Writer | None = None
+) -> Iterator[Store]:
     """Open a database by path or URL, made and migrated on first use; `write` holds it for this process.
+
+    Without, transactions run by `writer`, the process that holds it.
 
     Raises Conflict when another process holds it, StoreError when it is newer than the code or damaged.
     """
-    store = Store(Database(location, write=write, url=url))
+    store = Store(Database(location, write=write, address=address, writer=writer))
     try:
         yield store
     finally:

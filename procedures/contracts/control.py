@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,13 @@ class Control:
     def __init__(self, loss: Callable[[], str] = _no_loss) -> None:
         self._lock = threading.RLock()  # a signal handler may run in the thread that holds it
         self._request = ControlRequest()
+        self._end: ControlRequest | None = None  # beside the lock: an abort waits for nothing
         self._loss = loss
 
     @property
     def request(self) -> ControlRequest:
         """The present request."""
-        return self._request
+        return self._end or self._request
 
     def poll(self) -> ControlRequest:
         """Interrupt the campaign if the bench may no longer be driven; returns the present request.
@@ -45,26 +46,28 @@ class Control:
         """
         if reason := self._loss():
             self.interrupt(reason)
-        return self._request
+        return self.request
 
     def pause(self, reason: str = "asked by a person") -> None:
         """Ask to hold after the data set that is being taken; the environment is still recorded."""
-        self._change(lambda now: replace(now, pause=True, reason=reason))
+        self._change(pause=True, reason=reason)
 
     def resume(self, reason: str = "asked by a person") -> None:
         """Ask to go on."""
-        self._change(lambda now: replace(now, pause=False, reason=reason))
+        self._change(pause=False, reason=reason)
 
     def abort(self, reason: str = "asked by a person") -> None:
-        """Ask for the end, now and in the safe state."""
-        self._change(lambda now: replace(now, abort=True, reason=reason))
+        """Ask for the end, now and in the safe state. Waits for no lock."""
+        self._final(ControlRequest(abort=True, reason=reason))
 
     def interrupt(self, reason: str) -> None:
         """Ask to release the bench, now and in the safe state; the campaign is to be resumed."""
-        self._change(lambda now: replace(now, abort=True, resumable=True, reason=reason))
+        self._final(ControlRequest(abort=True, resumable=True, reason=reason))
 
-    def _change(self, change: Callable[[ControlRequest], ControlRequest]) -> None:
-        """Change the request, unless it is an abort already."""
+    def _final(self, request: ControlRequest) -> None:
+        if self._end is None:
+            self._end = request
+
+    def _change(self, *, pause: bool, reason: str) -> None:
         with self._lock:
-            if not self._request.abort:
-                self._request = change(self._request)
+            self._request = ControlRequest(pause=pause, reason=reason)

@@ -103,7 +103,7 @@ class Service:
 
     def until(self, path: str, holds: Callable[[Any], bool]) -> Any:
         """Return the answer once it is as it should be; looked at again whenever the bench reports something."""
-        return wait_until(self.lab_service.bench_runner.listen, lambda: self.get(path), holds)
+        return wait_until(self.lab_service.bench_access.listen, lambda: self.get(path), holds)
 
 
 class Faults(list[str]):

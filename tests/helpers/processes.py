@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -57,7 +59,9 @@ class ServiceProcess:
         self.database = database
         command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json", *options]
         self.process = begin(labctl(database, *command))
-        self.url = json.loads(first_line(self.process))["url"]
+        told = json.loads(first_line(self.process))
+        self.url = told["url"]
+        self.bench_pid, self.web_pid = told["bench_pid"], told["web_pid"]
         self.http = httpx.Client(base_url=self.url, timeout=REQUEST_S)
 
     def run(self, *arguments: str, status: int = 0, key: str = "") -> subprocess.CompletedProcess[str]:
@@ -80,8 +84,12 @@ class ServiceProcess:
             assert any('"step_text":"data set' in line for line in lines)
 
     def close(self) -> None:
-        """End the service at once, as a power cut would."""
+        """End all processes of the service at once, as a power cut would."""
         self.http.close()
+        self.process.kill()  # first: it would start the others again
+        for pid in (self.bench_pid, self.web_pid):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
         kill(self.process)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.interrupts import ending_is_an_interrupt
 from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import console, print_json, stderr
 
@@ -36,25 +36,25 @@ def serve(
     database: Database = None,
 ) -> None:
     """Serve calibrations over HTTP and run campaigns on the bench. Stops with Ctrl-C, bench left safe."""
-    from labctl.api.server import SIMULATED_BENCH, ServeRequest, serve_forever
+    from labctl.processes.settings import ServeRequest
+    from labctl.processes.supervisor import Ready, serve_forever
 
-    named = bench or (SIMULATED_BENCH if simulate else None)
+    request = ServeRequest(
+        bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
+        require_keys=require_keys, max_upload_mib=max_upload_mib,
+    )  # fmt: skip
 
-    def ready(url: str) -> None:
+    def ready(service: Ready) -> None:
+        named = request.bench_name
         unconfirmed, cut_short = ("", "") if named is None else _found(named, database)
         if as_json:
-            print_json({"url": url, "unconfirmed": unconfirmed, "cut_short": cut_short}, one_line=True)
+            print_json({**asdict(service), "unconfirmed": unconfirmed, "cut_short": cut_short}, one_line=True)
             return
-        console.print(f"labctl listens on {url}  (API text: {url}/api-docs)", markup=False)
+        console.print(f"labctl listens on {service.url}  (API text: {service.url}/api-docs)", markup=False)
         for text in filter(None, (unconfirmed, cut_short)):
             console.print(text, style="yellow", markup=False, soft_wrap=True)
 
-    # the HTTP server, once stopped, raises the signal again: with its own meaning that would end us before the bench
-    with one_clear_line(), ending_is_an_interrupt():
-        request = ServeRequest(
-            bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
-            require_keys=require_keys, max_upload_mib=max_upload_mib,
-        )  # fmt: skip
+    with one_clear_line():
         left = serve_forever(request, ready)
     stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
 

@@ -33,7 +33,7 @@ from procedures.contracts.operator import HumanOperator, Operator
 from procedures.execution.signals import ignore_signals
 from procedures.monitoring.progress import Progress
 
-#: How long a request to abort waits for the safe state before it says how far the campaign is.
+#: How long an abort waits for the safe state before it returns how far the campaign is.
 SAFE_WITHIN_S = 120.0
 STOPS = "the service stops"
 
@@ -53,9 +53,16 @@ class BenchRunner:
     """The one that drives this service's bench."""
 
     def __init__(
-        self, store: Store, bench: BenchFile, make_clock: Callable[[], Clock], hold: BenchHold | None = None
+        self,
+        store: Store,
+        bench: BenchFile,
+        make_clock: Callable[[], Clock],
+        hold: BenchHold | None = None,
+        *,
+        safe_within_s: float = SAFE_WITHIN_S,
     ) -> None:
         self._store = store
+        self._safe_within_s = safe_within_s
         self._hold = hold
         self._bench = bench
         self._make_clock = make_clock
@@ -218,13 +225,23 @@ class BenchRunner:
             return None
         return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.request)
 
-    def abort(self, campaign: int, reason: str) -> CampaignResponse:
-        """End the running campaign in the safe state; returns once it is there."""
+    def stop_now(self, campaign: int | None, reason: str) -> bool:
+        """Ask for the end of what runs, or of this campaign if it runs; returns whether it was asked.
+
+        Waits for no lock and for no database.
+        """
         job = self._job
-        if job is not None and job.row.id == campaign and job.thread is not None:
-            job.control.abort(reason)
-            job.thread.join(SAFE_WITHIN_S)
-        return campaign_status(self._store, campaign)
+        if job is None or campaign not in {None, job.row.id}:
+            return False
+        job.control.abort(reason)
+        return True
+
+    def abort(self, campaign: int, reason: str) -> CampaignResponse:
+        """End the running campaign in the safe state; returns once it is there, or how far it is after a while."""
+        job = self._job
+        if job is not None and self.stop_now(campaign, reason) and job.thread is not None:
+            job.thread.join(self._safe_within_s)
+        return self.status(campaign) or campaign_status(self._store, campaign)
 
     def describe(self) -> dict[str, Any]:
         """Return the bench and what it is doing."""

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any, Protocol
 
 import sqlalchemy as sa
 from sqlalchemy.exc import DatabaseError
@@ -19,21 +20,41 @@ from labctl.store import migrate
 from labctl.store.connection.commit_seal import count_commit, missing, seal
 from labctl.store.connection.engines import make_engine
 from labctl.store.connection.location import is_url, shown
-from labctl.store.connection.writer_lock import WriterLock
+from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress, WriterLock
 
 #: What SQLite and PostgreSQL call a full disk.
 SQLITE_FULL, POSTGRESQL_DISK_FULL = 13, "53100"
 
 
+class Writer(Protocol):
+    """The process that writes, as another one reaches it."""
+
+    def run(self, name: str, args: Any, kwargs: Any) -> Any:
+        """Run the transaction of this name there; returns or raises what it did."""
+        ...
+
+
 class Database:
     """A migrated database. `write` holds it for this process; without, only `reading` may be used.
+
+    `writer` runs the transactions of a process that does not hold it. `address` is written into the note that tells
+    other processes who holds it.
 
     `as_it_is` opens a database without making or migrating it: the file may be of any kind.
     """
 
-    def __init__(self, location: str, *, write: bool, url: str | None = None, as_it_is: bool = False) -> None:
+    def __init__(
+        self,
+        location: str,
+        *,
+        write: bool,
+        address: ServiceAddress = NO_SERVICE,
+        writer: Writer | None = None,
+        as_it_is: bool = False,
+    ) -> None:
         self.location, self._shown = location, shown(location)
         self.writes = write
+        self.writer = writer
         self._guard = threading.RLock()
         self._lock: WriterLock | None = None
         self._sqlite = not is_url(location)
@@ -41,7 +62,7 @@ class Database:
         if self._sqlite and not as_it_is:
             Path(location).parent.mkdir(parents=True, exist_ok=True)
         if write and self._sqlite:
-            self._lock = WriterLock(location, url)
+            self._lock = WriterLock(location, address)
         elif self._sqlite and not Path(location).exists():
             if as_it_is:
                 raise StoreError(f"{location}: there is no such file; name the database with --database")
@@ -90,6 +111,10 @@ class Database:
         What is not `synced` outlives this process at once, but a power cut only when the next synced transaction ends:
         a log is written in order, so that one carries all before it to the disk.
         """
+        if self.writer is not None:
+            raise StoreError(
+                f"{self._shown}: another process writes to it; only a marked transaction can be sent there"
+            )
         counted = synced and self._sqlite
         with self._guard:
             try:
@@ -130,6 +155,12 @@ class Database:
                 yield connection
         except sa.exc.DatabaseError as error:
             raise StoreError(f"{self._shown}: {error.orig}") from error
+
+    def note_address(self, address: ServiceAddress) -> None:
+        """Write down at which address the service that holds this database is reached now."""
+        if self._lock is not None:
+            with suppress(OSError):  # a full disk: the note is only a hint
+                self._lock.note(address)
 
     def close(self) -> None:
         """Close the database and let the next writer in."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -15,12 +15,24 @@ from labctl.store.connection.location import is_url
 
 
 @dataclass(frozen=True)
+class ServiceAddress:
+    """Where a service that holds a database is reached."""
+
+    url: str | None = None  #: its HTTP API
+    calls: str | None = None  #: folder of the Unix sockets of its bench process
+
+
+NO_SERVICE = ServiceAddress()
+
+
+@dataclass(frozen=True)
 class Holder:
     """Who writes to a database now."""
 
     pid: int
     url: str | None  #: of the service, where the holder is one
     campaign: int | None = None  #: that runs in the holder's terminal, where the holder is no service
+    calls: str | None = None  #: folder of the Unix sockets of the service's bench process
 
 
 def _describe(holder: Holder) -> str:
@@ -56,7 +68,7 @@ def _note_path(location: str) -> Path:
 def _read_note(location: str) -> Holder:
     try:
         note = json.loads(_note_path(location).read_text(encoding="utf-8"))
-        return Holder(int(note["pid"]), note["url"], note.get("campaign"))
+        return Holder(int(note["pid"]), note["url"], note.get("campaign"), note.get("calls"))
     except (OSError, ValueError, KeyError):
         return Holder(0, None)
 
@@ -73,7 +85,7 @@ def note_campaign(location: str, campaign: int) -> None:
 class WriterLock:
     """The lock on one SQLite file, held from its making to `release`."""
 
-    def __init__(self, location: str, url: str | None) -> None:
+    def __init__(self, location: str, address: ServiceAddress = NO_SERVICE) -> None:
         """Take the lock and note at which address this process can be asked to write.
 
         Raises Conflict naming the holder, and OSError when the note cannot be written.
@@ -85,11 +97,15 @@ class WriterLock:
         except Timeout:
             raise Conflict(f"{location}: {_describe(_read_note(location))}") from None
         try:
-            note = {"pid": os.getpid(), "url": url}
-            _note_path(location).write_text(json.dumps(note), encoding="utf-8")
+            self.note(address)
         except OSError:
             self.release()
             raise
+
+    def note(self, address: ServiceAddress) -> None:
+        """Write down at which address this process is reached. Raises OSError."""
+        note = {"pid": os.getpid(), **asdict(address)}
+        _note_path(self._location).write_text(json.dumps(note), encoding="utf-8")
 
     def release(self) -> None:
         """Let the next writer in. Safe to call twice."""

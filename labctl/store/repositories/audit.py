@@ -13,6 +13,7 @@ import sqlalchemy as sa
 
 from labctl.acting_user import actor
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.records import AuditRow
 from labctl.store.schema import tables
 from labctl.store.schema.types import EPOCH
@@ -136,6 +137,7 @@ class Audit:
     def __init__(self, database: Database) -> None:
         self._database = database
 
+    @transaction
     def record(
         self, at: datetime, action: str, subject: str, detail: Mapping[str, Any], *, who: str | None = None
     ) -> None:

@@ -9,6 +9,7 @@ import sqlalchemy as sa
 
 from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.repositories import audit
 from labctl.store.schema import tables
 
@@ -40,11 +41,13 @@ class Benches:
         """Return what the last safe state of a bench did not confirm; empty for nothing, or a bench never used."""
         return next((row.unconfirmed for row in self.all() if row.name == name), "")
 
+    @transaction
     def mark(self, name: str, unconfirmed: str, at: datetime) -> None:
         """Write down what could not be confirmed; it stays until `clear`."""
         with self._database.writing() as connection:
             mark(connection, name, unconfirmed, at)
 
+    @transaction
     def clear(self, name: str, by: str, reason: str, at: datetime) -> BenchRow:
         """Take in that a person has looked. Raises NotFound, and Conflict when there is nothing to clear."""
         found = next((row for row in self.all() if row.name == name), None)

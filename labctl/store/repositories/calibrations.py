@@ -11,6 +11,7 @@ import sqlalchemy as sa
 
 from labctl.errors import Conflict, NotCertified, NotFound
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
 from labctl.store.repositories.audit import append
 from labctl.store.schema import tables
@@ -88,6 +89,7 @@ class Calibrations:
     def __init__(self, database: Database) -> None:
         self._database = database
 
+    @transaction
     def add(self, serial: str, at: datetime, build: Callable[[int], NewCalibration]) -> CalibrationRecord:
         """Keep a unit's next version; `build` is given its number."""
         c = tables.calibrations
@@ -150,6 +152,7 @@ class Calibrations:
             row = connection.execute(_ACTS.limit(1), {"serial": serial}).first()
         return None if row is None else _act(row)
 
+    @transaction
     def certify(
         self,
         serial: str,

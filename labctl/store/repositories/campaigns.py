@@ -12,6 +12,7 @@ import sqlalchemy as sa
 from labctl.errors import NotFound
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.records import CampaignRow, EventRow, NewUnit, StepRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
@@ -46,6 +47,7 @@ class Campaigns:
         """Return how far each campaign is, by its number."""
         return self._summaries.of(campaigns)
 
+    @transaction
     def create(self, new: NewCampaign, at: datetime) -> int:
         """Write down a whole campaign before anything moves; returns its number."""
         with self._database.writing() as connection:
@@ -178,6 +180,7 @@ class Campaigns:
         """Return campaigns that a process left without an end."""
         return self._rows(tables.campaigns.c.state.in_(("planned", "running", "paused", "waiting", "interrupted")))
 
+    @transaction
     def close_unfinished(
         self, campaign: int, reason: str, at: datetime, state: Literal["failed", "aborted"] = "failed"
     ) -> None:

@@ -8,6 +8,7 @@ import sqlalchemy as sa
 
 from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.records import KeyRow
 from labctl.store.repositories.audit import append
 from labctl.store.schema import tables
@@ -24,6 +25,7 @@ class Keys:
     def __init__(self, database: Database) -> None:
         self._database = database
 
+    @transaction
     def add(self, name: str, role: str, digest: str, at: datetime) -> KeyRow:
         """Keep a new key's digest. Raises Conflict when the name was used before."""
         with self._database.writing() as connection:
@@ -35,6 +37,7 @@ class Keys:
             append(connection, at, "key create", f"key {name}", {"role": role})
         return KeyRow(name, role, digest, at, None)
 
+    @transaction
     def revoke(self, name: str, reason: str, at: datetime) -> KeyRow:
         """Take a key's power away, at once. Raises NotFound, Conflict when it was revoked before."""
         with self._database.writing() as connection:

@@ -8,6 +8,7 @@ from datetime import datetime
 import sqlalchemy as sa
 
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.schema import tables
 
 
@@ -42,6 +43,7 @@ class Leases:
             row = connection.execute(query).first()
         return None if row is None else LeaseRow(*row)
 
+    @transaction
     def claim(self, lease: LeaseRow, replacing: LeaseRow | None) -> bool:
         """Take a bench that is free, or from the holder `replacing` as it was seen; False when that changed."""
         x = tables.leases
@@ -59,6 +61,7 @@ class Leases:
         except sa.exc.IntegrityError:
             return False
 
+    @transaction
     def renew(self, bench_name: str, owner: str, at: datetime, expires_at: datetime) -> bool:
         """Prolong a lease; False when it is no longer the owner's."""
         x = tables.leases
@@ -67,6 +70,7 @@ class Leases:
             changed = connection.execute(mine.values(beat=x.c.beat + 1, beat_at=at, expires_at=expires_at))
         return changed.rowcount == 1
 
+    @transaction
     def release(self, bench_name: str, owner: str) -> None:
         """Let a bench go; nothing happens when the lease is another's by now."""
         x = tables.leases

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from labctl.errors import NotFound
 from labctl.recording import Recording, RecordingInfo
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.points import points_columns
@@ -29,6 +30,7 @@ class Recordings:
     def __init__(self, database: Database) -> None:
         self._database = database
 
+    @transaction
     def add_import(self, recording: Recording, at: datetime, simulated: Mapping[str, Any] | None = None) -> int:
         """Take in a recording made elsewhere; returns its number. All of it is kept, or nothing.
 

@@ -10,6 +10,7 @@ import sqlalchemy as sa
 
 from labctl.errors import Conflict
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.sample_blocks import blocks_of
@@ -119,6 +120,7 @@ class ResumePoints:
         tries = sa.select(sa.func.count()).where(v.campaign_id == campaign, v.kind == "taken_up", v.t_s >= ended_s)
         return last(OWED) > last(PAID), int(connection.scalar(tries) or 0)
 
+    @transaction
     def take_up(self, campaign: int, point: ResumePoint, how: TakeUp) -> None:
         """Mark what the interruption left half done, and the campaign as running again. Safe to be cut short itself.
 

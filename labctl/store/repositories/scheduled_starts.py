@@ -10,6 +10,7 @@ import sqlalchemy as sa
 
 from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
 from labctl.store.repositories import audit
 from labctl.store.schema import tables
 
@@ -61,6 +62,7 @@ class Starts:
     def __init__(self, database: Database) -> None:
         self._database = database
 
+    @transaction
     def add(self, new: NewStart, at: datetime) -> int:
         """Enter a start; returns its number."""
         row = sa.insert(tables.scheduled_starts).values(**asdict(new), state="waiting", created_at=at)
@@ -100,6 +102,7 @@ class Starts:
             rows = connection.execute(query.where(condition).order_by(*order)).mappings().all()
         return [StartRow(**dict(row)) for row in rows]
 
+    @transaction
     def take(
         self, row: StartRow, due_at: datetime, next_due: datetime | None, at: datetime, outcome: Outcome, message: str
     ) -> StartEventRow | None:
@@ -123,6 +126,7 @@ class Starts:
                 _note(connection, at, row.id, outcome, message, None)
         return StartEventRow(number, row.id, at, due_at, outcome, message, None, after_campaign)
 
+    @transaction
     def conclude(
         self, event: StartEventRow, at: datetime, outcome: Outcome, message: str, campaign: int | None = None
     ) -> None:
@@ -133,6 +137,7 @@ class Starts:
             connection.execute(sa.update(e).where(e.c.id == event.id).values(**values))
             _note(connection, at, event.start, outcome, message, campaign)
 
+    @transaction
     def put_back(self, event: StartEventRow) -> None:
         """Undo a claim that came to nothing: the start is due again, unless it was cancelled."""
         s, e = tables.scheduled_starts, tables.start_events
@@ -164,6 +169,7 @@ class Starts:
         with self._database.reading() as connection:
             return [StartEventRow(*row) for row in connection.execute(query)]
 
+    @transaction
     def cancel(self, start: int, at: datetime) -> None:
         """End an entry; what it has started runs on. Raises NotFound, Conflict."""
         row = self.get(start)

@@ -19,7 +19,7 @@ from sqlalchemy.dialects import postgresql
 
 from labctl.errors import BadInput, Conflict, NotCertified, NotFound, StoreError
 from labctl.recording import Recording, RecordingInfo, to_points
-from labctl.store import Judgement, NewCalibration, Store, holder_of, migrate, open_store
+from labctl.store import Judgement, NewCalibration, ServiceAddress, Store, holder_of, migrate, open_store
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 
@@ -106,7 +106,7 @@ def test_something_else_is_refused(location: str) -> None:
 
 
 def test_a_second_writer_is_told_who_holds_it(location: str) -> None:
-    with open_store(location, write=True, url="http://127.0.0.1:1") as store:
+    with open_store(location, write=True, address=ServiceAddress("http://127.0.0.1:1")) as store:
         holder = holder_of(location)
         assert holder is not None
         assert holder.url == "http://127.0.0.1:1"

@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
-from labctl.api.server import ServeRequest, create_service
 from labctl.cli.app import app
-from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
+from labctl.errors import BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
+from labctl.processes.supervisor import Ready
 from labctl.services.campaigns import recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run, run_here
@@ -265,12 +265,6 @@ def test_a_bench_that_was_not_used_is_not_called_safe(store: Store) -> None:
     assert lab_service.left == "bench single-axis-sim was not used"
 
 
-def test_simulate_never_takes_a_real_bench(tmp_path: Path) -> None:
-    asked = ServeRequest(bench="example-real", simulate=True, database=str(tmp_path / "lab.sqlite"))
-    with pytest.raises(BadInput, match="--simulate with --bench example-real: that bench has real instruments"):
-        create_service(asked, None)
-
-
 def labctl(location: str, *arguments: str) -> Any:
     return CliRunner().invoke(app, [*arguments, "--database", location])
 
@@ -347,10 +341,10 @@ def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes
 
 def test_a_service_that_starts_says_what_it_finds(left: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def serve(_request: Any, ready: Any) -> str:
-        ready("http://127.0.0.1:1")
+        ready(Ready("http://127.0.0.1:1", 1, 2))
         return ""
 
-    monkeypatch.setattr("labctl.api.server.serve_forever", serve)
+    monkeypatch.setattr("labctl.processes.supervisor.serve_forever", serve)
     assert "campaign 1 was cut short at 0 % and is taken up now" in labctl(left, "serve", "--bench", BENCH.name).stdout
     with open_store(left, write=True) as opened:
         opened.benches.mark(BENCH.name, "table to rest: no answer", AT)

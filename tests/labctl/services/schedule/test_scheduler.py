@@ -16,6 +16,7 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.commands.registry import START_CAMPAIGN
 from labctl.services.commands.requests import CampaignStart
 from labctl.services.lab_service import LabService
+from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import add_start, cancel_start, is_scheduled, list_starts, start_status
 from labctl.services.schedule.scheduler import Scheduler
@@ -292,8 +293,9 @@ class Served:
         self.store = Store(Database(location, write=True))
         self.runner = BenchRunner(self.store, BENCH, VirtualClock)
         self.lab_service = LabService(self.store, self.clock, self.runner)
-        assert self.lab_service.scheduler is not None
-        self.scheduler = self.lab_service.scheduler
+        assert isinstance(self.lab_service.bench_access, LocalBench)
+        assert self.lab_service.bench_access.scheduler is not None
+        self.scheduler = self.lab_service.bench_access.scheduler
 
     def rest(self) -> None:
         job = self.runner._job

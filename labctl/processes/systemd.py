@@ -1,4 +1,4 @@
-"""What the service tells systemd: that it is ready, that its loop turns, that it stops. Elsewhere, nothing."""
+"""What the service tells systemd: that it is ready, that it lives, that it stops. Elsewhere, nothing."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def stopping() -> None:
     tell(f"STOPPING=1\nWATCHDOG_USEC={STOPPING_US}")
 
 
-async def alive() -> None:
-    """Say that the service's loop turns; called from that loop."""
+def alive() -> None:
+    """Say that the supervisor watches."""
     tell("WATCHDOG=1")
 
 

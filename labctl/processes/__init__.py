@@ -1,0 +1,1 @@
+"""The processes of `labctl serve`: a supervisor, the bench process, and the web process."""

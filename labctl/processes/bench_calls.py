@@ -1,0 +1,90 @@
+"""What other processes may ask of the bench process."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any
+
+from instruments.clock import WallClock
+from labctl.acting_user import acting
+from labctl.processes.calls import Answer, Call, answer_with
+from labctl.processes.supervision import Supervision
+from labctl.services.commands.context import CommandContext
+from labctl.services.local_bench import LocalBench
+from labctl.store import Store
+
+#: A watcher is told that the process lives this often, s,
+BEAT_S = 1.0
+#: and of changes at most this often, s.
+LEAST_BEAT_S = 0.1
+#: Acts of a person on a campaign; each is a method of CampaignControl.
+CONTROL = frozenset({"start", "schedule", "resume", "pause", "abort", "confirm"})
+
+
+@dataclass(frozen=True)
+class Beat:
+    """What a watcher hears: that the process lives, and what it does."""
+
+    busy: bool
+    stops: bool
+    schedule_trouble: str
+
+
+class BenchCalls:
+    """Answers the calls of other processes."""
+
+    def __init__(self, store: Store, local: LocalBench, supervision: Supervision) -> None:
+        self._store, self._local, self._supervision = store, local, supervision
+        self._context = CommandContext(lambda: store, WallClock(), local.control)
+
+    def stop(self, call: Call, _: Connection) -> Answer:
+        """Ask for the end of a campaign, or of whatever runs: nothing is waited for, nothing is written."""
+        campaign, reason = call.args
+        return Answer(self._local.stop_now(campaign, reason))
+
+    def answer(self, call: Call, connection: Connection) -> Answer | None:
+        """Answer a call; None where the connection is kept for a watcher or a supervisor."""
+        if call.name == "watch":
+            self._watch(connection)
+            return None
+        if call.name == "supervise":
+            return self._supervise(call, connection)
+        with acting(call.actor):
+            return answer_with(lambda: self._value(call))
+
+    def _supervise(self, call: Call, connection: Connection) -> Answer | None:
+        answer = answer_with(lambda: self._supervision.take_charge(call.args[0], connection))
+        if answer.raised is not None:
+            return answer
+        return None
+
+    def _value(self, call: Call) -> Any:
+        area, _, name = call.name.partition(".")
+        if area == "store":
+            return self._store.run(name, *call.args)
+        if area == "control" and name in CONTROL:
+            return getattr(self._local.control, name)(self._context, *call.args)
+        if call.name == "bench.live":
+            return self._local.runs(*call.args), self._local.status(*call.args)
+        if call.name == "bench.describe":
+            return self._local.describe()
+        raise KeyError(call.name)
+
+    def _watch(self, connection: Connection) -> None:
+        """Tell a watcher what happens, until it goes; this thread is the watcher's."""
+        changed, never = threading.Event(), threading.Event()
+        remove = self._local.listen(changed.set)
+        try:
+            with contextlib.suppress(OSError):
+                while True:
+                    local = self._local
+                    connection.send(Beat(local.busy, local.stops, local.schedule_trouble))
+                    changed.wait(BEAT_S)
+                    changed.clear()
+                    never.wait(LEAST_BEAT_S)
+        finally:
+            remove()
+            connection.close()

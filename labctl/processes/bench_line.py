@@ -1,0 +1,79 @@
+"""The supervisor's side of a bench process: one that it has started, or one that outlived its service."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import threading
+import time
+from multiprocessing.connection import Connection
+
+from labctl.processes.calls import Call, Caller
+from labctl.processes.children import Child
+from labctl.processes.settings import CALLS, BenchSettings
+from labctl.processes.supervision import Left
+
+ANSWER_S = 10.0
+
+
+class BenchLine:
+    """A bench process that this supervisor is in charge of."""
+
+    def __init__(self, settings: BenchSettings, pid: int, child: Child | None = None) -> None:
+        """Take charge. Raises Conflict while another supervisor is, or for another bench; BenchSilent."""
+        self.pid, self._child = pid, child
+        self._handle = os.pidfd_open(pid)
+        self.left: str | None = None  #: how the bench was left, once the process has said so
+        self._line = self._take_charge(settings)
+        self._heard_at_s = time.monotonic()
+        self._thread = threading.Thread(target=self._hear, name="bench-line", daemon=True)
+        self._thread.start()
+
+    def _take_charge(self, settings: BenchSettings) -> Connection:
+        line = Caller(settings.folder / CALLS, ANSWER_S).connect()
+        line.send(Call("supervise", (settings,)))
+        said = line.recv()
+        if said != "beat":
+            line.close()
+            raise said.raised
+        return line
+
+    def _hear(self) -> None:
+        with contextlib.suppress(EOFError, OSError):
+            while True:
+                said = self._line.recv()
+                self._heard_at_s = time.monotonic()
+                if isinstance(said, Left):
+                    self.left = said.text
+
+    @property
+    def heard_s(self) -> float:
+        """How long ago it was last heard of, s."""
+        return time.monotonic() - self._heard_at_s
+
+    def tell(self, what: str) -> None:
+        """Say `begin` or `end`."""
+        with contextlib.suppress(OSError):
+            self._line.send(what)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for its end; returns whether it came."""
+        ended = bool(select.select([self._handle], [], [], seconds)[0])
+        if ended and self._child is not None:
+            self._child.wait(seconds)
+        return ended
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send it a signal, unless it is over."""
+        with contextlib.suppress(ProcessLookupError):
+            signal.pidfd_send_signal(self._handle, number)
+
+    def close(self) -> None:
+        """Let go of a process that has ended."""
+        self._thread.join()
+        self._line.close()
+        os.close(self._handle)
+        if self._child is not None:
+            self._child.kill()

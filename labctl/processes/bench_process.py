@@ -1,0 +1,130 @@
+"""The bench process: engine, instruments, journal, schedule, and the one writing connection of the database.
+
+It takes no request from a network and computes no fit. Other processes call it over Unix sockets; a stop has a socket
+and a thread of its own that wait for no lock and no database. It outlives its supervisor: a campaign goes on to its
+end, and another supervisor finds it again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+from multiprocessing.connection import Connection
+
+from instruments.clock import Clock, WallClock
+from labctl.errors import BadInput, LabctlError
+from labctl.processes.bench_calls import BenchCalls
+from labctl.processes.calls import CallServer
+from labctl.processes.children import line_to_parent, tell
+from labctl.processes.settings import CALLS, STOP, BenchSettings
+from labctl.processes.supervision import Supervision
+from labctl.processes.waker import Waker
+from labctl.services.benches.lease import hold_bench
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.preparation import clock_for
+from labctl.services.local_bench import LocalBench
+from labctl.services.planning.loading import load_bench
+from labctl.store import ServiceAddress, Store
+from labctl.store.connection.database import Database
+from procedures.execution.signals import ENDING
+
+#: An abort is answered within this, with how far the campaign then is, s.
+ANSWER_WITHIN_S = 0.5
+#: A bench process without a supervisor ends by itself when no campaign has run for so long, s.
+ALONE_S = 60.0
+LOOK_S = 1.0
+
+
+def open_bench_service(settings: BenchSettings) -> tuple[Store, LocalBench]:
+    """Open the database for writing, and the bench where one is named.
+
+    Raises Conflict naming who holds either, BadBench, BadInput for `--simulate` with real instruments.
+    """
+    address = ServiceAddress(settings.url, str(settings.folder))
+    store = Store(Database(settings.location, write=True, address=address))
+    try:
+        return store, LocalBench(store, WallClock(), _runner(settings, store))
+    except BaseException:
+        store.close()
+        raise
+
+
+def _runner(settings: BenchSettings, store: Store) -> BenchRunner | None:
+    if settings.bench is None:
+        return None
+    bench = load_bench(settings.bench)
+    if settings.simulate and not bench.is_simulated:
+        raise BadInput(
+            f"--simulate with --bench {settings.bench}: that bench has real instruments, and they would move; leave "
+            "--simulate out, or name a bench of sim:// addresses"
+        )
+
+    def make_clock() -> Clock:
+        own_pace = settings.speed == 0 or not bench.is_simulated
+        return clock_for(bench, None if own_pace else settings.speed)
+
+    return BenchRunner(store, bench, make_clock, hold_bench(store, bench), safe_within_s=ANSWER_WITHIN_S)
+
+
+class BenchProcess:
+    """One run of the process, from the open database to the bench left safe."""
+
+    def __init__(self, settings: BenchSettings, store: Store, local: LocalBench) -> None:
+        self._store, self._local = store, local
+        self._waker = Waker()
+        self._supervision = Supervision(settings, store, self._waker)
+        calls = BenchCalls(store, local, self._supervision)
+        self._servers = (
+            CallServer(settings.folder / STOP, calls.stop, in_turn=True),
+            CallServer(settings.folder / CALLS, calls.answer),
+        )
+
+    def run(self, line: Connection) -> None:
+        """Serve until asked to end, or left alone; the bench is safe and the database closed when this returns."""
+        self._waker.listen_to(ENDING)
+        for server in self._servers:
+            server.start()
+        tell(line, "ready")
+        try:
+            self._serve()
+        finally:
+            self._close()
+
+    def _serve(self) -> None:
+        begun = False
+        while not self._waker.ending:
+            self._waker.wait(LOOK_S)
+            if self._supervision.begin and not begun:
+                begun = True
+                self._local.start()
+            if self._supervision.alone_s > ALONE_S and not self._local.busy:
+                return
+
+    def _close(self) -> None:
+        left = f"how bench {self._local.bench.name} was left is not known" if self._local.bench else ""
+        try:
+            left = self._local.close()
+        finally:
+            self._servers[1].close()
+            with contextlib.suppress(LabctlError):
+                self._store.close()
+            self._supervision.say_left(left)
+            self._servers[0].close()
+
+
+def main() -> int:
+    """Run the process that the supervisor has started; returns its exit status."""
+    line, settings = line_to_parent()
+    threading.current_thread().name = "bench"
+    try:
+        store, local = open_bench_service(settings)
+    except Exception as error:  # noqa: BLE001  the supervisor says it
+        tell(line, error)
+        return 2
+    BenchProcess(settings, store, local).run(line)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

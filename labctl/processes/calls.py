@@ -1,0 +1,172 @@
+"""Calls from one labctl process to another: a name, data, and who acts, over a Unix socket in a private folder.
+
+Both ends are processes of one user and one installation, so calls and answers are pickled. The folder (mode 0700) keeps
+others out.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import pickle
+import socket
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.connection import Client, Connection, Listener
+from pathlib import Path
+from typing import Any
+
+from labctl.acting_user import Actor, actor
+from labctl.errors import BenchSilent, LabctlError
+
+BACKLOG = 64
+#: A caller that was accepted has this long to say what it wants, where callers are answered one after the other, s.
+SAID_WITHIN_S = 1.0
+
+
+@dataclass(frozen=True)
+class Call:
+    """What is asked, and in whose name."""
+
+    name: str
+    args: tuple[Any, ...] = ()
+    kwargs: dict[str, Any] = field(default_factory=dict)
+    actor: Actor = field(default_factory=actor)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of a call: a value, or what was raised."""
+
+    value: Any = None
+    raised: BaseException | None = None
+
+
+#: Answers a call; one that returns None has taken the connection over.
+Respond = Callable[[Call, Connection], Answer | None]
+
+
+class CallServer:
+    """Answers calls at a Unix socket: each caller in a thread of its own, or all in turn in one thread."""
+
+    def __init__(self, path: Path, respond: Respond, *, in_turn: bool = False) -> None:
+        self._path, self._respond, self._in_turn = path, respond, in_turn
+        self._listener = Listener(str(path), "AF_UNIX", backlog=BACKLOG)
+        self._over = False
+        self._thread = threading.Thread(target=self._accept, name=f"calls-{path.name}", daemon=True)
+
+    def start(self) -> None:
+        """Answer from now on."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Answer no caller that comes from now on."""
+        self._over = True
+        with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as waker:
+            waker.connect(str(self._path))  # a thread that waits for a caller gets this one
+        if self._thread.is_alive():
+            self._thread.join()
+        self._listener.close()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                connection = self._listener.accept()
+            except OSError:
+                if self._over:
+                    return
+                continue
+            if self._over:
+                connection.close()
+                return
+            if not self._in_turn:
+                threading.Thread(target=self._serve, args=(connection,), name="call", daemon=True).start()
+            elif connection.poll(SAID_WITHIN_S):
+                self._one(connection)
+                connection.close()
+
+    def _serve(self, connection: Connection) -> None:
+        while self._one(connection):
+            pass
+
+    def _one(self, connection: Connection) -> bool:
+        """Answer one call; returns whether the connection waits for another."""
+        try:
+            call = connection.recv()
+            answer = self._respond(call, connection)
+            if answer is None:
+                return False
+            connection.send_bytes(_packed(answer))
+        except (EOFError, OSError):
+            connection.close()
+            return False
+        return True
+
+
+def answer_with(work: Callable[[], Any]) -> Answer:
+    """Return what `work` returns, or what it raises."""
+    try:
+        return Answer(work())
+    except Exception as error:  # noqa: BLE001  the caller is told; this end goes on
+        return Answer(raised=error)
+
+
+def _packed(answer: Answer) -> bytes:
+    try:
+        return pickle.dumps(answer)
+    except Exception as error:  # noqa: BLE001  whatever cannot travel is told in words
+        text = str(answer.raised or error)
+        return pickle.dumps(Answer(raised=LabctlError(f"an answer that cannot be sent: {text}")))
+
+
+class Caller:
+    """Calls the process behind a Unix socket. Any thread may call; each call has a connection to itself."""
+
+    def __init__(self, path: Path, timeout_s: float) -> None:
+        self._path, self._timeout_s = path, timeout_s
+        self._idle: list[Connection] = []
+        self._guard = threading.Lock()
+
+    def call(self, name: str, *args: Any, timeout_s: float | None = None, **kwargs: Any) -> Any:
+        """Return what the other process answers, or raise what it raised. Raises BenchSilent without an answer."""
+        wait_s = self._timeout_s if timeout_s is None else timeout_s
+        connection = self._taken()
+        try:
+            connection.send(Call(name, args, kwargs))
+            if not connection.poll(wait_s):
+                raise BenchSilent(f"the bench process has not answered within {wait_s:g} s")
+            answer: Answer = connection.recv()
+        except (EOFError, OSError) as error:
+            connection.close()
+            raise BenchSilent(f"the bench process has gone ({error or type(error).__name__})") from error
+        except BaseException:
+            connection.close()  # an answer that comes later must not be taken for that of the next call
+            raise
+        with self._guard:
+            self._idle.append(connection)
+        if answer.raised is not None:
+            raise answer.raised
+        return answer.value
+
+    def _taken(self) -> Connection:
+        with self._guard:
+            while self._idle:
+                connection = self._idle.pop()
+                if not connection.poll(0):  # one that has something to say was closed at the other end
+                    return connection
+                connection.close()
+        return self.connect()
+
+    def connect(self) -> Connection:
+        """Return a new connection. Raises BenchSilent."""
+        try:
+            return Client(str(self._path), "AF_UNIX")
+        except OSError as error:
+            raise BenchSilent(f"the bench process cannot be reached ({error.strerror or error})") from error
+
+    def close(self) -> None:
+        """Close the connections that wait for a call."""
+        with self._guard:
+            for connection in self._idle:
+                connection.close()
+            self._idle.clear()

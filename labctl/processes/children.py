@@ -1,0 +1,101 @@
+"""Child processes of the supervisor: started with settings, and a line on which each says that it is ready, or why not.
+
+The end of the line tells either side that the other has ended.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Sequence
+from multiprocessing.connection import Connection
+from typing import Any
+
+from labctl.errors import LabctlError
+
+Line = Connection
+
+
+class Failed(LabctlError):
+    """A child process ended before it was ready, without saying why."""
+
+    slug = "process-failed"
+
+
+class Child:
+    """A process that this one has started. It loads its modules, then waits for its settings."""
+
+    def __init__(self, module: str, pass_fds: Sequence[int] = ()) -> None:
+        """Start `python -m module` in a process group of its own: a Ctrl-C in the terminal is not for it."""
+        ours, theirs = socket.socketpair()
+        with theirs:
+            self._process = subprocess.Popen(  # noqa: S603  this very program
+                [sys.executable, "-m", module, str(theirs.fileno())],
+                pass_fds=[theirs.fileno(), *pass_fds],
+                stdin=subprocess.DEVNULL,
+                process_group=0,
+            )
+        self.line: Line = Connection(ours.detach())
+        self.name = module.rpartition(".")[2].replace("_", " ")
+
+    @property
+    def pid(self) -> int:
+        """The process's number."""
+        return self._process.pid
+
+    def open(self, settings: Any) -> None:
+        """Let it begin with its settings, and wait until it is ready; raises what kept it from that."""
+        try:
+            self.line.send(settings)
+            said = self.line.recv()
+        except (EOFError, OSError):
+            self._process.wait()
+            raise Failed(f"the {self.name} ended with status {self._process.returncode} at its start") from None
+        if isinstance(said, BaseException):
+            self._process.wait()
+            raise said
+
+    def has_ended(self) -> bool:
+        """Return whether the process is over."""
+        return self._process.poll() is not None
+
+    @property
+    def status(self) -> int | None:
+        """How it ended: its exit status, negative for a signal; None while it runs."""
+        return self._process.poll()
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal, unless it is over."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.send_signal(number)
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for its end; returns whether it came."""
+        try:
+            self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def kill(self) -> None:
+        """End it at once."""
+        self.signal(signal.SIGKILL)
+        self._process.wait()
+        self.line.close()
+
+
+def line_to_parent() -> tuple[Line, Any]:
+    """Return the line to the process that started this one, and the settings that came over it."""
+    line = Connection(int(sys.argv[1]))
+    os.set_inheritable(line.fileno(), False)
+    return line, line.recv()
+
+
+def tell(line: Line, what: Any) -> None:
+    """Say something to the parent; nothing where it has gone."""
+    with contextlib.suppress(OSError, ValueError):
+        line.send(what)

@@ -1,0 +1,74 @@
+"""What `labctl serve` was asked for, as each of its processes needs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from labctl.config import default_database
+from labctl.errors import BadInput
+
+SIMULATED_BENCH = "triaxial-sim"
+LAST_PORT = 65535
+#: Names of the sockets in the folder of a bench process.
+CALLS, STOP = "calls", "stop"
+
+
+@dataclass(frozen=True)
+class ServeRequest:
+    """What to serve, and where."""
+
+    bench: str | None = None
+    simulate: bool = False
+    speed: float = 1.0  #: of a simulated bench; 0: as fast as it can
+    host: str = "127.0.0.1"
+    port: int = 8420
+    database: str | None = None
+    require_keys: bool = False
+    max_upload_mib: int = 2048
+
+    @property
+    def location(self) -> str:
+        """The database: a URL, or a path that means the same in every process."""
+        return self.database or default_database()
+
+    @property
+    def bench_name(self) -> str | None:
+        """The bench to drive, if any."""
+        return self.bench or (SIMULATED_BENCH if self.simulate else None)
+
+    def check(self) -> None:
+        """Raise BadInput for a number that is out of its range."""
+        if not 0 <= self.speed < float("inf"):
+            raise BadInput(f"--speed {self.speed}: a positive number, or 0 for as fast as it can")
+        if not 0 <= self.port <= LAST_PORT:
+            raise BadInput(f"--port {self.port}: 1 to {LAST_PORT}, or 0 for a free one")
+        if not 1 <= self.max_upload_mib <= 1 << 20:
+            raise BadInput(f"--max-upload-mib {self.max_upload_mib}: 1 to {1 << 20}")
+
+
+@dataclass(frozen=True)
+class BenchSettings:
+    """What the bench process is started with. Two with equal `drives` drive the same bench the same way."""
+
+    location: str
+    bench: str | None
+    simulate: bool
+    speed: float
+    folder: Path  #: of its sockets
+    url: str  #: of the web process
+
+    @property
+    def drives(self) -> tuple[str, str | None, float]:
+        """The database, the bench and its pace."""
+        return self.location, self.bench, self.speed
+
+
+@dataclass(frozen=True)
+class WebSettings:
+    """What the web process is started with."""
+
+    request: ServeRequest
+    folder: Path  #: of the bench process's sockets
+    listener: int  #: file descriptor of the socket that listens for HTTP
+    at: str  #: the address, as a Host header names it

@@ -1,0 +1,87 @@
+"""How a bench process and its supervisor hear of each other."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+
+from labctl.errors import Conflict
+from labctl.processes.settings import BenchSettings
+from labctl.processes.waker import Waker
+from labctl.store import ServiceAddress, Store
+
+BEAT_S = 1.0
+
+
+@dataclass(frozen=True)
+class Left:
+    """How a bench was left, the last word of a bench process."""
+
+    text: str
+
+
+class Supervision:
+    """The bench process's side: one supervisor at a time, or none."""
+
+    def __init__(self, settings: BenchSettings, store: Store, waker: Waker) -> None:
+        self._settings, self._store, self._waker = settings, store, waker
+        self._guard = threading.Lock()
+        self._line: Connection | None = None
+        self._alone_since_s = time.monotonic()
+        self.begin = False  #: whether a supervisor has said that the bench may be used
+
+    @property
+    def alone_s(self) -> float:
+        """For how long there has been no supervisor, s."""
+        return 0.0 if self._line is not None else time.monotonic() - self._alone_since_s
+
+    def take_charge(self, wanted: BenchSettings, line: Connection) -> None:
+        """Obey a supervisor from now on. Raises Conflict while there is another, or for another bench."""
+        with self._guard:
+            if self._line is not None:
+                raise Conflict(f"the service at {self._settings.url} is in charge of this bench process")
+            if wanted.drives != self._settings.drives:
+                own = self._settings
+                raise Conflict(
+                    f"a bench process that outlived its service drives bench {own.bench} at speed {own.speed:g} and "
+                    "holds this database; start the service with the same --bench and --speed, or stop that process"
+                )
+            self._line = line
+        self._settings = wanted
+        self._store.note_address(ServiceAddress(wanted.url, str(wanted.folder)))
+        threading.Thread(target=self._hear, args=(line,), name="supervisor", daemon=True).start()
+        threading.Thread(target=self._beat, args=(line,), name="beat", daemon=True).start()
+
+    def _hear(self, line: Connection) -> None:
+        with contextlib.suppress(EOFError, OSError):
+            while True:
+                said = line.recv()
+                if said == "begin":
+                    self.begin = True
+                    self._waker.wake()
+                elif said == "end":
+                    self._waker.end()
+        self._let_go(line)
+
+    def _beat(self, line: Connection) -> None:
+        never = threading.Event()
+        with contextlib.suppress(OSError):
+            while self._line is line:
+                line.send("beat")
+                never.wait(BEAT_S)
+
+    def _let_go(self, line: Connection) -> None:
+        with self._guard:
+            if self._line is line:
+                self._line = None
+                self._alone_since_s = time.monotonic()
+
+    def say_left(self, text: str) -> None:
+        """Tell the supervisor, if there is one, how the bench was left."""
+        line, self._line = self._line, None
+        if line is not None:
+            with contextlib.suppress(OSError):
+                line.send(Left(text))

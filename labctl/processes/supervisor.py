@@ -1,0 +1,213 @@
+"""The supervisor: what `labctl serve` runs. It starts the bench process and the web process, and watches both.
+
+It opens no database and computes nothing, so that little can stop it. A process that has ended, or has not been heard
+of for `SILENT_S`, is started again; a bench process starts with the safe state. An end of the supervisor itself ends
+the web process, not the bench process: the next supervisor on the same database takes charge of it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import signal
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from labctl.errors import BenchSilent, LabctlError
+from labctl.processes import systemd
+from labctl.processes.bench_line import BenchLine
+from labctl.processes.children import Child
+from labctl.processes.listening import Listening, listening
+from labctl.processes.settings import BenchSettings, ServeRequest, WebSettings
+from labctl.processes.waker import Waker
+from labctl.store.connection.writer_lock import holder_of
+from procedures.execution.signals import ENDING, restore
+
+LOOK_S = 0.5
+#: A process that was not heard of for so long is ended and started again, s.
+SILENT_S = 30.0
+#: Processes that end so often within a quarter of an hour are not started again.
+MOST_RESTARTS, RESTARTS_WITHIN_S = 5, 900.0
+#: The web process cuts its requests and ends within this, s.
+WEB_END_S = 15.0
+
+
+@dataclass(frozen=True)
+class Ready:
+    """Where a service answers, and its processes."""
+
+    url: str
+    bench_pid: int
+    web_pid: int
+
+
+class _Restarts:
+    """Counts how often something had to be started again lately."""
+
+    def __init__(self) -> None:
+        self._at_s: list[float] = []
+
+    def one_more(self, what: str) -> None:
+        """Count one. Raises LabctlError when there are too many."""
+        now_s = time.monotonic()
+        self._at_s = [at_s for at_s in self._at_s if now_s - at_s < RESTARTS_WITHIN_S] + [now_s]
+        if len(self._at_s) > MOST_RESTARTS:
+            raise LabctlError(f"{what} ended {len(self._at_s)} times within {RESTARTS_WITHIN_S / 60:g} min; given up")
+
+
+def serve_forever(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
+    """Serve until interrupted; returns how the bench was left, nothing where there is none.
+
+    Raises BadInput for an address that others can reach while there is no key to ask them for, Conflict, BadBench.
+    """
+    request.check()
+    with listening(request.host, request.port) as at, ending_signals() as waker:
+        return Supervisor(request, at, waker).run(ready)
+
+
+@contextmanager
+def ending_signals() -> Iterator[Waker]:
+    """Take the ending signals as the request to end while the block runs; the handlers found are restored."""
+    before = {number: signal.getsignal(number) for number in ENDING}
+    waker = Waker()
+    waker.listen_to(ENDING)
+    try:
+        yield waker
+    finally:
+        restore(before)
+        waker.close()
+
+
+class Supervisor:
+    """Starts both processes and keeps them running."""
+
+    def __init__(self, request: ServeRequest, at: Listening, waker: Waker) -> None:
+        self._request, self._at, self._waker = request, at, waker
+        self._restarts = _Restarts()
+
+    def run(self, ready: Callable[[Ready], None]) -> str:
+        """Serve until asked to end; returns how the bench was left."""
+        self._web = self._new_web()  # both load their modules at the same time
+        try:
+            bench = self._open_bench()
+        except BaseException:
+            self._web.kill()
+            raise
+        try:
+            self._web.open(self._web_settings())
+        except BaseException:
+            self._end_bench(bench)
+            raise
+        ready(Ready(self._at.url, bench.pid, self._web.pid))
+        bench.tell("begin")
+        systemd.ready()
+        self._bench, self._web_heard_s = bench, time.monotonic()
+        try:
+            self._watch()
+        finally:
+            systemd.stopping()
+            left = self._end_bench(self._bench)
+            self._end_web()
+        return left
+
+    # -- the bench process
+
+    def _settings(self, folder: Path) -> BenchSettings:
+        request = self._request
+        return BenchSettings(
+            request.location, request.bench_name, request.simulate, request.speed, folder, self._at.url
+        )
+
+    def _open_bench(self) -> BenchLine:
+        """Take charge of the bench process that outlived its service, or start one."""
+        holder = holder_of(self._request.location)
+        if holder is not None and holder.calls is not None:
+            with contextlib.suppress(BenchSilent):
+                self._folder = Path(holder.calls)
+                return BenchLine(self._settings(self._folder), holder.pid)
+        self._folder = Path(tempfile.mkdtemp(prefix="labctl-"))
+        return self._start_bench()
+
+    def _start_bench(self) -> BenchLine:
+        for left_over in self._folder.iterdir():
+            left_over.unlink()
+        settings = self._settings(self._folder)
+        child = Child("labctl.processes.bench_process")
+        try:
+            child.open(settings)
+            return BenchLine(settings, child.pid, child)
+        except BaseException:
+            child.signal(signal.SIGTERM)
+            child.wait(SILENT_S)
+            child.kill()
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise
+
+    def _end_bench(self, bench: BenchLine) -> str:
+        """Let the bench process leave its bench safe, however long that takes; returns how it was left."""
+        bench.tell("end")
+        while not bench.wait(LOOK_S):
+            systemd.alive()
+            if bench.heard_s > SILENT_S:
+                bench.signal(signal.SIGKILL)
+        bench.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+        if bench.left is not None:
+            return bench.left
+        return "the bench process ended without a word: how the bench was left is not known; look at it"
+
+    # -- the web process
+
+    def _new_web(self) -> Child:
+        return Child("labctl.processes.web_process", pass_fds=[self._at.socket.fileno()])
+
+    def _web_settings(self) -> WebSettings:
+        return WebSettings(self._request, self._folder, self._at.socket.fileno(), self._at.name)
+
+    def _end_web(self) -> None:
+        self._web.signal(signal.SIGTERM)
+        self._web.wait(WEB_END_S)
+        self._web.kill()
+
+    # -- watching
+
+    def _watch(self) -> None:
+        told_s = time.monotonic()
+        while not self._waker.ending:
+            self._waker.wait(LOOK_S)
+            self._look_after_bench()
+            self._look_after_web()
+            if time.monotonic() - told_s > systemd.period_s():
+                told_s = time.monotonic()
+                systemd.alive()
+
+    def _look_after_bench(self) -> None:
+        if self._bench.heard_s > SILENT_S:
+            self._bench.signal(signal.SIGKILL)
+        if not self._bench.wait(0.0) or self._waker.ending:
+            return
+        self._bench.close()
+        self._restarts.one_more("the bench process")
+        self._bench = self._start_bench()
+        self._bench.tell("begin")
+
+    def _look_after_web(self) -> None:
+        while self._web.line.poll(0):
+            try:
+                self._web.line.recv()
+            except (EOFError, OSError):
+                break
+            self._web_heard_s = time.monotonic()
+        if time.monotonic() - self._web_heard_s > SILENT_S:
+            self._web.signal(signal.SIGKILL)
+        if not self._web.has_ended() or self._waker.ending:
+            return
+        self._web.kill()
+        self._restarts.one_more("the web process")
+        self._web, self._web_heard_s = self._new_web(), time.monotonic()
+        with contextlib.suppress(LabctlError, OSError):  # it is looked after again
+            self._web.open(self._web_settings())

@@ -1,0 +1,101 @@
+"""The web process: HTTP, pages, imports, fits and criticism. It reads the database; the bench process writes."""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import os
+import signal
+import socket
+import sys
+import threading
+from multiprocessing.connection import Connection
+
+import uvicorn
+
+from instruments.clock import WallClock
+from labctl.api.access_policy import LOOPBACK_NAMES, MIB, AccessPolicy
+from labctl.api.app import create_app
+from labctl.processes.children import line_to_parent, tell
+from labctl.processes.remote_bench import RemoteBench, RemoteWriter
+from labctl.processes.settings import ServeRequest, WebSettings
+from labctl.services.admin.api_keys import require_an_api_key
+from labctl.services.lab_service import LabService
+from labctl.services.planning.loading import load_bench
+from labctl.store import Store
+from labctl.store.connection.database import Database
+
+#: A request that has not ended so long after the end was asked for is cut, s.
+GRACE_S = 5
+BEAT_S = 1
+
+
+def create_service(settings: WebSettings) -> LabService:
+    """Open the store for reading and the bench process for writing. Raises BadBench, StoreError."""
+    request, folder = settings.request, settings.folder
+    bench = load_bench(request.bench_name) if request.bench_name is not None else None
+    store = Store(Database(request.location, write=False, writer=RemoteWriter(folder)))
+    return LabService(store, WallClock(), access=RemoteBench(folder, bench))
+
+
+def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:
+    """Return who may come in: on loopback this machine's users, elsewhere whoever shows a key. Raises BadInput."""
+    upload = request.max_upload_mib * MIB
+    if _is_loopback(request.host) and not request.require_keys:
+        return AccessPolicy(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload)
+    asked = (
+        "--require-keys" if _is_loopback(request.host) else f"--host {request.host}: other machines could reach this"
+    )
+    require_an_api_key(store, asked)
+    return AccessPolicy(keys=True, upload_bytes=upload)
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _end_with(line: Connection) -> None:
+    """End this process when its supervisor has gone: another one may want its address."""
+    with contextlib.suppress(EOFError, OSError):
+        line.recv()
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def serve(line: Connection, settings: WebSettings) -> None:
+    """Serve until told to end. Raises BadInput without a key where one is needed."""
+    service = create_service(settings)
+    app = create_app(service, access_for(settings.request, service.store, settings.at))
+
+    async def beat() -> None:
+        tell(line, "beat")
+
+    server = uvicorn.Server(
+        uvicorn.Config(
+            app, log_level="warning", lifespan="on", callback_notify=beat, timeout_notify=BEAT_S, proxy_headers=False,
+            timeout_graceful_shutdown=GRACE_S,
+        )
+    )  # fmt: skip
+    tell(line, "ready")
+    threading.Thread(target=_end_with, args=(line,), name="supervisor", daemon=True).start()
+    with socket.socket(fileno=settings.listener) as listener, contextlib.suppress(KeyboardInterrupt):
+        server.run(sockets=[listener])
+    service.close()
+
+
+def main() -> int:
+    """Run the process that the supervisor has started; returns its exit status."""
+    line, settings = line_to_parent()
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the supervisor hears it
+    try:
+        serve(line, settings)
+    except Exception as error:  # noqa: BLE001  the supervisor says it
+        tell(line, error)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,72 @@
+"""Access to the bench of a service: driven by this process, or by the bench process that it talks to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from instruments.bench_config import BenchFile
+from labctl.services.commands.context import CampaignControl
+from labctl.services.schemas.campaigns import CampaignResponse
+
+
+class BenchAccess(Protocol):
+    """What a service needs of its bench; all of it may be called by any thread."""
+
+    @property
+    def bench(self) -> BenchFile | None:
+        """The bench, where the service has one."""
+        ...
+
+    @property
+    def control(self) -> CampaignControl:
+        """Control over the campaigns of the bench."""
+        ...
+
+    @property
+    def stops(self) -> bool:
+        """Whether nothing is begun any more because the service ends."""
+        ...
+
+    @property
+    def busy(self) -> bool:
+        """Whether a campaign runs now."""
+        ...
+
+    @property
+    def schedule_trouble(self) -> str:
+        """Why the schedule could not be looked at; empty when all is well."""
+        ...
+
+    @property
+    def heard_s(self) -> float:
+        """How long ago the process that drives the bench was last heard of, s; 0 for this process."""
+        ...
+
+    def runs(self, campaign: int) -> bool:
+        """Whether this campaign runs now; True also where the bench process does not answer and may be running it."""
+        ...
+
+    def status(self, campaign: int) -> CampaignResponse | None:
+        """Return the live picture of a campaign that runs; None for any other."""
+        ...
+
+    def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        ...
+
+    def describe(self) -> dict[str, Any] | None:
+        """Return the bench and what it is doing; None without a bench."""
+        ...
+
+    def start(self) -> None:
+        """Resume what an earlier process left on the bench, safe state first; then start the schedule."""
+        ...
+
+    def end_soon(self) -> None:
+        """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
+        ...
+
+    def close(self) -> str:
+        """End what runs, in the safe state; returns how the bench was left, empty where there is none."""
+        ...

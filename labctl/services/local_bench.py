@@ -1,0 +1,107 @@
+"""The bench of a service that drives it in its own process: its runner, its schedule, and the control over both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from instruments.bench_config import BenchFile
+from instruments.clock import Clock
+from labctl.acting_user import ITSELF, acting
+from labctl.errors import StoreError
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.execution import describe_safe_state
+from labctl.services.commands.service_control import ServiceControl
+from labctl.services.schedule.scheduler import Scheduler
+from labctl.services.schemas.campaigns import CampaignResponse
+from labctl.store import Store
+
+
+class LocalBench:
+    """Drives a bench, or none, and its schedule."""
+
+    heard_s = 0.0
+
+    def __init__(self, store: Store, clock: Clock, runner: BenchRunner | None) -> None:
+        self._store = store
+        self.runner = runner
+        self.scheduler = None if runner is None else Scheduler(store, clock, runner, runner.bench.name)
+        self.control = ServiceControl(runner)
+        self.stops = False
+
+    @property
+    def bench(self) -> BenchFile | None:
+        """The bench, where there is one."""
+        return None if self.runner is None else self.runner.bench
+
+    @property
+    def busy(self) -> bool:
+        """Whether a campaign runs now."""
+        return self.runner is not None and self.runner.busy
+
+    @property
+    def schedule_trouble(self) -> str:
+        """Why the schedule could not be looked at; empty when all is well."""
+        return "" if self.scheduler is None else self.scheduler.trouble
+
+    def runs(self, campaign: int) -> bool:
+        """Whether this campaign runs here now."""
+        return self.runner is not None and self.runner.runs(campaign)
+
+    def status(self, campaign: int) -> CampaignResponse | None:
+        """Return the live picture of a campaign that runs here."""
+        return None if self.runner is None else self.runner.status(campaign)
+
+    def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        return (lambda: None) if self.runner is None else self.runner.listen(listener)
+
+    def describe(self) -> dict[str, Any] | None:
+        """Return the bench and what it is doing; None without a bench."""
+        return None if self.runner is None else self.runner.describe()
+
+    def start(self) -> None:
+        """Resume the campaign that an earlier process left on this bench, safe state first; then start the schedule.
+
+        What is due waits for that campaign.
+        """
+        with acting(ITSELF):  # no request asked for it
+            if self.runner is not None:
+                self.runner.resume_unfinished()
+            if self.scheduler is not None:
+                self.scheduler.start()
+
+    def stop_now(self, campaign: int | None, reason: str) -> bool:
+        """Ask for the end of the campaign that runs, or of this one if it is it; returns whether it was asked.
+
+        Waits for no lock and for no database.
+        """
+        return self.runner is not None and self.runner.stop_now(campaign, reason)
+
+    def end_soon(self) -> None:
+        """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
+        self.stops = True
+        if self.scheduler is not None:
+            self.scheduler.end_soon()
+        if self.runner is not None:
+            self.runner.end_soon()
+
+    def close(self) -> str:
+        """End what runs, in the safe state; returns how the bench was left, empty where there is none."""
+        self.end_soon()
+        if self.scheduler is not None:
+            self.scheduler.close()
+        if self.runner is None:
+            return ""
+        self.runner.close()
+        return self._how_left(self.runner)
+
+    def _how_left(self, runner: BenchRunner) -> str:
+        bench = runner.bench.name
+        try:
+            unconfirmed = self._store.benches.unconfirmed(bench)
+        except StoreError as error:
+            return f"whether bench {bench} is safe cannot be read ({error}); look at it"
+        if runner.used or unconfirmed:
+            return describe_safe_state(bench, unconfirmed)
+        return f"bench {bench} was not used"

@@ -1,0 +1,57 @@
+"""Transactions of repositories: run by the writing process itself, or sent to it by any other.
+
+SQLite has one writing process. Every other one sends it a repository's method by name, with plain data as arguments:
+the transaction begins and ends there, so that no other process can hold it open.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+
+from labctl.store.connection.database import Database
+
+ArgumentsP = ParamSpec("ArgumentsP")
+ResultT = TypeVar("ResultT")
+
+
+class Repository(Protocol):
+    """Anything that keeps its records in a database."""
+
+    _database: Database
+
+
+RepositoryT = TypeVar("RepositoryT", bound=Repository)
+
+#: Names of all methods that may be sent, as `Benches.mark`.
+TRANSACTIONS: set[str] = set()
+
+
+def transaction(
+    method: Callable[Concatenate[RepositoryT, ArgumentsP], ResultT],
+) -> Callable[Concatenate[RepositoryT, ArgumentsP], ResultT]:
+    """Mark a repository's method as one short transaction. Arguments and result are data that can be pickled."""
+    name = method.__qualname__
+    TRANSACTIONS.add(name)
+
+    @functools.wraps(method)
+    def run(self: RepositoryT, /, *args: ArgumentsP.args, **kwargs: ArgumentsP.kwargs) -> ResultT:
+        writer = self._database.writer
+        if writer is None:
+            return method(self, *args, **kwargs)
+        answer: ResultT = writer.run(name, args, kwargs)
+        return answer
+
+    return run
+
+
+def run_transaction(repositories: Mapping[str, object], name: str, args: Any, kwargs: Any) -> Any:
+    """Run a transaction that another process sent; `repositories` by the names of their classes.
+
+    Raises KeyError for a name that is not of a transaction.
+    """
+    if name not in TRANSACTIONS:
+        raise KeyError(name)
+    repository, _, method = name.partition(".")
+    return getattr(repositories[repository], method)(*args, **kwargs)

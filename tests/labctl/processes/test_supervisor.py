@@ -1,0 +1,99 @@
+"""The supervisor refuses what cannot be served, and hears signals while it serves."""
+
+from __future__ import annotations
+
+import signal
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from instruments.clock import WallClock
+from labctl.errors import BadInput
+from labctl.processes import supervisor
+from labctl.processes.bench_process import open_bench_service
+from labctl.processes.listening import listening
+from labctl.processes.settings import BenchSettings, ServeRequest
+from labctl.processes.waker import Waker
+from labctl.services.lab_service import LabService
+from labctl.store import holder_of, open_store
+from procedures.execution.signals import ENDING
+
+
+def handlers() -> dict[signal.Signals, object]:
+    return {number: signal.getsignal(number) for number in ENDING}
+
+
+@contextmanager
+def waker() -> Iterator[Waker]:
+    made = Waker()
+    before = handlers()
+    try:
+        yield made
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)  # type: ignore[arg-type]
+        made.close()
+
+
+@pytest.mark.parametrize("number", ENDING)
+def test_a_signal_ends_a_wait_at_once_and_the_handlers_are_restored(number: signal.Signals) -> None:
+    before = handlers()
+    with supervisor.ending_signals() as woken:
+        signal.raise_signal(number)
+        woken.wait(3600.0)
+        assert woken.ending
+    assert handlers() == before
+
+
+def test_a_wait_that_nothing_wakes_ends_by_itself() -> None:
+    with waker() as quiet:
+        quiet.wait(0.0)
+        assert not quiet.ending
+
+
+def test_simulate_never_takes_a_real_bench(tmp_path: Path) -> None:
+    location = str(tmp_path / "lab.sqlite")
+    asked = BenchSettings(location, "example-real", simulate=True, speed=1.0, folder=tmp_path, url="")
+    with pytest.raises(BadInput, match="--simulate with --bench example-real: that bench has real instruments"):
+        open_bench_service(asked)
+    assert holder_of(location) is None
+
+
+@pytest.mark.parametrize(("asked", "said"), [
+    (ServeRequest(speed=-1.0), "--speed -1.0"),
+    (ServeRequest(speed=float("inf")), "--speed inf"),
+    (ServeRequest(port=70000), "--port 70000"),
+    (ServeRequest(max_upload_mib=0), "--max-upload-mib 0"),
+])  # fmt: skip
+def test_numbers_out_of_range_are_refused_before_anything_starts(asked: ServeRequest, said: str) -> None:
+    with pytest.raises(BadInput, match=said):
+        supervisor.serve_forever(asked, lambda _: None)
+
+
+def test_a_port_that_is_taken_is_refused() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(BadInput, match=f"--port {port} on 127.0.0.1"), listening("127.0.0.1", port):
+            pass
+
+
+def test_a_service_hears_of_signals_until_it_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends: list[int] = []
+    monkeypatch.setattr(LabService, "end_soon", lambda _: ends.append(1))
+    for number in ENDING:
+        signal.signal(number, lambda *_: None)
+    before = handlers()
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        service = LabService(store, WallClock())
+        service.start()
+        signal.raise_signal(signal.SIGTERM)
+        assert ends == [1]
+        service.close()
+    signal.raise_signal(signal.SIGTERM)
+    assert ends == [1]
+    assert handlers() == before
