@@ -11,6 +11,7 @@ from fastapi import FastAPI
 from labctl import web
 from labctl.api import problems
 from labctl.api.access_policy import AccessPolicy
+from labctl.api.dependencies import ControlPool
 from labctl.api.middleware import AccessMiddleware
 from labctl.api.routers import (
     admin,
@@ -56,10 +57,12 @@ def create_app(service: LabService, access: AccessPolicy | None = None) -> FastA
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         service.start()
+        app.state.control_pool = ControlPool()
         try:
             yield
         finally:
             service.close()
+            app.state.control_pool.close()
 
     app = FastAPI(
         title="labctl",

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextvars
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Annotated, Any, TypeVar, cast
 
 from fastapi import APIRouter, Depends, Request
 
 from labctl.services.commands.command import Command
 from labctl.services.lab_service import LabService
+
+CONTROL_THREADS = 4
+
+ResultT = TypeVar("ResultT")
 
 
 def get_service(request: Request) -> LabService:
@@ -17,6 +24,30 @@ def get_service(request: Request) -> LabService:
 
 
 ServiceDep = Annotated[LabService, Depends(get_service)]
+
+
+class ControlPool:
+    """Threads for acts that end or hold a campaign: other requests, however many, cannot fill them."""
+
+    def __init__(self) -> None:
+        self._threads = ThreadPoolExecutor(CONTROL_THREADS, thread_name_prefix="control")
+
+    async def run(self, work: Callable[[], ResultT]) -> ResultT:
+        """Return what `work` returns, in the name of the caller."""
+        context = contextvars.copy_context()
+        return await asyncio.get_running_loop().run_in_executor(self._threads, context.run, work)
+
+    def close(self) -> None:
+        """End the threads."""
+        self._threads.shutdown()
+
+
+def get_control_pool(request: Request) -> ControlPool:
+    """Return the threads that acts on campaigns are executed in."""
+    return cast(ControlPool, request.app.state.control_pool)
+
+
+ControlPoolDep = Annotated[ControlPool, Depends(get_control_pool)]
 
 EndpointT = TypeVar("EndpointT", bound=Callable[..., Any])
 

@@ -7,11 +7,11 @@ import os
 import select
 import signal
 import threading
-import time
 from multiprocessing.connection import Connection
 
 from labctl.processes.calls import Call, Caller
 from labctl.processes.children import Child
+from labctl.processes.elapsed import Elapsed
 from labctl.processes.settings import CALLS, BenchSettings
 from labctl.processes.supervision import Left
 
@@ -27,7 +27,7 @@ class BenchLine:
         self._handle = os.pidfd_open(pid)
         self.left: str | None = None  #: how the bench was left, once the process has said so
         self._line = self._take_charge(settings)
-        self._heard_at_s = time.monotonic()
+        self._heard = Elapsed()
         self._thread = threading.Thread(target=self._hear, name="bench-line", daemon=True)
         self._thread.start()
 
@@ -44,14 +44,14 @@ class BenchLine:
         with contextlib.suppress(EOFError, OSError):
             while True:
                 said = self._line.recv()
-                self._heard_at_s = time.monotonic()
+                self._heard.restart()
                 if isinstance(said, Left):
                     self.left = said.text
 
     @property
     def heard_s(self) -> float:
         """How long ago it was last heard of, s."""
-        return time.monotonic() - self._heard_at_s
+        return self._heard.s
 
     def tell(self, what: str) -> None:
         """Say `begin` or `end`."""

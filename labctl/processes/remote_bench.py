@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from instruments.bench_config import BenchFile
 from labctl.errors import BenchSilent
 from labctl.processes.bench_calls import Beat
 from labctl.processes.calls import Call, Caller
+from labctl.processes.elapsed import Elapsed
 from labctl.processes.settings import CALLS, STOP
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.commands.context import CommandContext
@@ -104,7 +104,7 @@ class RemoteBench:
         self._caller = Caller(folder / CALLS, ANSWER_S)
         self._listeners = ChangeListeners()
         self._beat = Beat(busy=False, stops=False, schedule_trouble="")
-        self._heard_at_s = time.monotonic()
+        self._heard = Elapsed()
         self._last_live: CampaignResponse | None = None
         self._described: dict[str, Any] | None = None
         self._over = threading.Event()
@@ -128,7 +128,7 @@ class RemoteBench:
     @property
     def heard_s(self) -> float:
         """How long ago the bench process was last heard of, s."""
-        return time.monotonic() - self._heard_at_s
+        return self._heard.s
 
     @property
     def _silence(self) -> str:
@@ -199,7 +199,7 @@ class RemoteBench:
                     self._listeners.notify()  # that nothing is heard is news too
                     continue
                 self._beat = connection.recv()
-                self._heard_at_s = time.monotonic()
+                self._heard.restart()
                 self._listeners.notify()
 
     def end_soon(self) -> None:

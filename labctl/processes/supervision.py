@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import threading
-import time
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from labctl.errors import Conflict
+from labctl.processes.elapsed import Elapsed
 from labctl.processes.settings import BenchSettings
 from labctl.processes.waker import Waker
 from labctl.store import ServiceAddress, Store
@@ -30,13 +30,13 @@ class Supervision:
         self._settings, self._store, self._waker = settings, store, waker
         self._guard = threading.Lock()
         self._line: Connection | None = None
-        self._alone_since_s = time.monotonic()
+        self._alone = Elapsed()
         self.begin = False  #: whether a supervisor has said that the bench may be used
 
     @property
     def alone_s(self) -> float:
         """For how long there has been no supervisor, s."""
-        return 0.0 if self._line is not None else time.monotonic() - self._alone_since_s
+        return 0.0 if self._line is not None else self._alone.s
 
     def take_charge(self, wanted: BenchSettings, line: Connection) -> None:
         """Obey a supervisor from now on. Raises Conflict while there is another, or for another bench."""
@@ -77,7 +77,7 @@ class Supervision:
         with self._guard:
             if self._line is line:
                 self._line = None
-                self._alone_since_s = time.monotonic()
+                self._alone.restart()
 
     def say_left(self, text: str) -> None:
         """Tell the supervisor, if there is one, how the bench was left."""

@@ -11,7 +11,6 @@ import contextlib
 import shutil
 import signal
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from labctl.errors import BenchSilent, LabctlError
 from labctl.processes import systemd
 from labctl.processes.bench_line import BenchLine
 from labctl.processes.children import Child
+from labctl.processes.elapsed import Elapsed
 from labctl.processes.listening import Listening, listening
 from labctl.processes.settings import BenchSettings, ServeRequest, WebSettings
 from labctl.processes.waker import Waker
@@ -29,7 +29,7 @@ from procedures.execution.signals import ENDING, restore
 
 LOOK_S = 0.5
 #: A process that was not heard of for so long is ended and started again, s.
-SILENT_S = 30.0
+SILENT_S = 15.0
 #: Processes that end so often within a quarter of an hour are not started again.
 MOST_RESTARTS, RESTARTS_WITHIN_S = 5, 900.0
 #: The web process cuts its requests and ends within this, s.
@@ -49,11 +49,12 @@ class _Restarts:
     """Counts how often something had to be started again lately."""
 
     def __init__(self) -> None:
+        self._age = Elapsed()
         self._at_s: list[float] = []
 
     def one_more(self, what: str) -> None:
         """Count one. Raises LabctlError when there are too many."""
-        now_s = time.monotonic()
+        now_s = self._age.s
         self._at_s = [at_s for at_s in self._at_s if now_s - at_s < RESTARTS_WITHIN_S] + [now_s]
         if len(self._at_s) > MOST_RESTARTS:
             raise LabctlError(f"{what} ended {len(self._at_s)} times within {RESTARTS_WITHIN_S / 60:g} min; given up")
@@ -105,7 +106,7 @@ class Supervisor:
         ready(Ready(self._at.url, bench.pid, self._web.pid))
         bench.tell("begin")
         systemd.ready()
-        self._bench, self._web_heard_s = bench, time.monotonic()
+        self._bench, self._web_heard = bench, Elapsed()
         try:
             self._watch()
         finally:
@@ -176,13 +177,13 @@ class Supervisor:
     # -- watching
 
     def _watch(self) -> None:
-        told_s = time.monotonic()
+        told = Elapsed()
         while not self._waker.ending:
             self._waker.wait(LOOK_S)
             self._look_after_bench()
             self._look_after_web()
-            if time.monotonic() - told_s > systemd.period_s():
-                told_s = time.monotonic()
+            if told.s > systemd.period_s():
+                told.restart()
                 systemd.alive()
 
     def _look_after_bench(self) -> None:
@@ -201,13 +202,13 @@ class Supervisor:
                 self._web.line.recv()
             except (EOFError, OSError):
                 break
-            self._web_heard_s = time.monotonic()
-        if time.monotonic() - self._web_heard_s > SILENT_S:
+            self._web_heard.restart()
+        if self._web_heard.s > SILENT_S:
             self._web.signal(signal.SIGKILL)
         if not self._web.has_ended() or self._waker.ending:
             return
         self._web.kill()
         self._restarts.one_more("the web process")
-        self._web, self._web_heard_s = self._new_web(), time.monotonic()
+        self._web, self._web_heard = self._new_web(), Elapsed()
         with contextlib.suppress(LabctlError, OSError):  # it is looked after again
             self._web.open(self._web_settings())

@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
-from labctl.api.dependencies import ServiceDep, command_route
+from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
 from labctl.services.campaigns.plan_view import campaign_plan
 from labctl.services.commands.registry import (
     ABORT_CAMPAIGN,
@@ -61,15 +61,22 @@ def plan(campaign: int, service: ServiceDep) -> CampaignPlanResponse:
 
 
 @command_route(router, ABORT_CAMPAIGN, "End a campaign")
-def abort(campaign: int, request: ReasonRequest, service: ServiceDep) -> CampaignResponse:
-    """End a running campaign now, in the safe state. What was measured is kept."""
-    return service.execute(ABORT_CAMPAIGN, ToCampaign(campaign, request))
+async def abort(
+    campaign: int, request: ReasonRequest, service: ServiceDep, control: ControlPoolDep
+) -> CampaignResponse:
+    """End a running campaign now, in the safe state. What was measured is kept.
+
+    Answered within a second; `wish` is `abort` while the safe state is still being reached.
+    """
+    return await control.run(lambda: service.execute(ABORT_CAMPAIGN, ToCampaign(campaign, request)))
 
 
 @command_route(router, PAUSE_CAMPAIGN, "Hold a campaign")
-def pause(campaign: int, request: ReasonRequest, service: ServiceDep) -> CampaignResponse:
+async def pause(
+    campaign: int, request: ReasonRequest, service: ServiceDep, control: ControlPoolDep
+) -> CampaignResponse:
     """Hold after the present data set. `wish` says that it was asked; `state` becomes `paused` when it holds."""
-    return service.execute(PAUSE_CAMPAIGN, ToCampaign(campaign, request))
+    return await control.run(lambda: service.execute(PAUSE_CAMPAIGN, ToCampaign(campaign, request)))
 
 
 @command_route(router, RESUME_CAMPAIGN, "Let a campaign go on")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import getpass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,12 @@ from labctl.cli.campaign_output import print_campaign, print_end
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json
 from labctl.cli.output import console, print_json
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.campaigns import CampaignResponse
+
+#: How long an abort is followed until the bench is safe, and how often it is looked at, s.
+SAFE_WITHIN_S, LOOK_S = 120.0, 0.2
 
 Id = Annotated[int, typer.Argument(metavar="ID", help="Campaign.")]
 By = Annotated[str | None, typer.Option("--by", metavar="NAME", help="Who says so; default: the user logged in.")]
@@ -109,7 +115,22 @@ def abort(
 
     with one_clear_line():
         answer = execute(database, ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason=reason)))
+        answer = _at_its_end(database, answer)
     print_json(answer) if as_json else print_campaign(answer)
+
+
+def _at_its_end(database: str | None, answer: CampaignResponse) -> CampaignResponse:
+    """Return where an aborted campaign is once its bench is safe, or after `SAFE_WITHIN_S`."""
+    from instruments.clock import SystemClock
+    from labctl.services.campaigns.status import ENDED
+    from labctl.services.commands.open import current_status
+
+    clock = SystemClock()
+    until_s = clock.now_s() + SAFE_WITHIN_S
+    while answer.state not in ENDED and clock.now_s() < until_s:
+        clock.sleep(LOOK_S)
+        answer = current_status(database, answer.id)
+    return answer
 
 
 def confirm(

@@ -1,0 +1,109 @@
+"""The processes of a service are killed and stopped: each is started again, and the campaign goes on or is taken up."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from labctl.store import holder_of
+from tests.helpers.processes import WAIT_S, ServiceProcess, begin, first_line, labctl, running
+
+pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
+
+#: Slow enough that a campaign lasts while processes start again.
+SPEED = ("--speed", "10")
+
+
+@pytest.fixture
+def service(tmp_path: Path) -> Iterator[ServiceProcess]:
+    with running(tmp_path / "lab.sqlite", *SPEED) as made:
+        yield made
+
+
+def started(service: ServiceProcess) -> int:
+    campaign: int = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
+    service.wait_for_data_set(campaign)
+    return campaign
+
+
+def holder(service: ServiceProcess) -> int:
+    """Return the process that holds the database."""
+    found = holder_of(str(service.database))
+    assert found is not None
+    return found.pid
+
+
+def asked_until(service: ServiceProcess, path: str, holds: Callable[[Any], bool]) -> Any:
+    """Ask until the answer is as expected; requests that find no process wait for the next one."""
+    while True:  # the test has a time-out
+        try:
+            answer = service.http.get(path).json()
+        except (httpx.TransportError, ValueError):
+            continue
+        if holds(answer):
+            return answer
+
+
+def test_a_campaign_does_not_notice_that_the_web_process_is_killed(service: ServiceProcess) -> None:
+    campaign = started(service)
+    os.kill(service.web_pid, signal.SIGKILL)
+    answer = asked_until(service, f"/api/campaigns/{campaign}", lambda told: told["t_s"] is not None)
+    assert (answer["state"], answer["abandoned"], answer["last_error"]) == ("running", False, None)
+    assert holder(service) == service.bench_pid
+    assert service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "tea"}).status_code == 200
+    asked_until(service, f"/api/campaigns/{campaign}", lambda told: told["state"] == "aborted")
+
+
+def test_a_killed_bench_process_is_started_again_and_takes_its_campaign_up(service: ServiceProcess) -> None:
+    campaign = started(service)
+    os.kill(service.bench_pid, signal.SIGKILL)
+    runs = {"state": "running", "abandoned": False, "last_error": None}
+    asked_until(service, f"/api/campaigns/{campaign}", lambda told: runs.items() <= told.items())
+    assert holder(service) != service.bench_pid
+    assert service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "tea"}).status_code == 200
+
+
+def test_a_stopped_bench_process_is_told_of_and_replaced(service: ServiceProcess) -> None:
+    campaign = started(service)
+    os.kill(service.bench_pid, signal.SIGSTOP)
+    told = asked_until(service, "/health", lambda told: told["bench"]["heard_s"] > 3)
+    assert told["status"] == "look at the bench"
+    assert "the bench may move" in told["bench"]["unconfirmed"]
+    assert "the bench may move" in service.http.get(f"/api/campaigns/{campaign}").json()["last_error"]
+    refused = service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "tea"})
+    assert (refused.status_code, refused.json()["type"].rpartition("/")[2]) == (503, "bench-silent")
+    asked_until(service, "/health", lambda told: told["status"] == "ok" and told["bench"]["campaign"] == campaign)
+
+
+def test_a_bench_process_outlives_its_supervisor_and_the_next_service_takes_charge_of_it(
+    service: ServiceProcess,
+) -> None:
+    campaign = started(service)
+    service.process.kill()
+    service.process.wait()
+    command = ["serve", "--port", "0", "--json", *SPEED, "--bench"]
+    other = subprocess.run(
+        labctl(service.database, *command, "triaxial-sim"), capture_output=True, text=True, check=False, timeout=WAIT_S
+    )
+    assert (other.returncode, "drives bench single-axis-sim at speed 10" in other.stderr) == (2, True)
+    heir = begin(labctl(service.database, *command, "single-axis-sim"))
+    try:
+        told = json.loads(first_line(heir))
+        assert told["bench_pid"] == service.bench_pid
+        with httpx.Client(base_url=told["url"], timeout=WAIT_S) as http:
+            assert http.get(f"/api/campaigns/{campaign}").json()["state"] == "running"
+        heir.send_signal(signal.SIGTERM)
+        _, said = heir.communicate(timeout=WAIT_S)
+        assert "bench single-axis-sim is safe" in said
+        assert holder_of(str(service.database)) is None
+    finally:
+        heir.kill()
+        heir.communicate()
