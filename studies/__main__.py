@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-STUDIES = ("coverage", "use_coverage", "criticism", "crash_recovery", "process_kill", "faults")
+STUDIES = ("coverage", "use_coverage", "criticism", "crash_recovery", "process_kill", "process_pairs", "faults")
 
 
 def main(names: list[str]) -> int:

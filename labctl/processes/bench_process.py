@@ -74,6 +74,8 @@ class BenchProcess:
         self._store, self._local = store, local
         self._waker = Waker()
         self._supervision = Supervision(settings, store, self._waker)
+        if local.scheduler is not None:
+            local.scheduler.attended = lambda: self._supervision.alone_s == 0.0
         calls = BenchCalls(store, local, self._supervision)
         self._servers = (
             CallServer(settings.folder / STOP, calls.stop, in_turn=True),

@@ -37,6 +37,7 @@ class Child:
                 [sys.executable, "-m", module, str(theirs.fileno())],
                 pass_fds=[theirs.fileno(), *pass_fds],
                 stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,  # the supervisor's carries one document
                 process_group=0,
             )
         self.line: Line = Connection(ours.detach())

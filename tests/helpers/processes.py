@@ -14,7 +14,7 @@ from pathlib import Path
 
 import httpx
 
-from labctl.store import open_store
+from labctl.store import holder_of, open_store
 from tests.helpers.signal_defaults import default_signals
 
 #: For what a process does on a busy machine.
@@ -87,7 +87,8 @@ class ServiceProcess:
         """End all processes of the service at once, as a power cut would."""
         self.http.close()
         self.process.kill()  # first: it would start the others again
-        for pid in (self.bench_pid, self.web_pid):
+        holder = holder_of(str(self.database))
+        for pid in {self.bench_pid, self.web_pid, holder.pid if holder else self.bench_pid}:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
         kill(self.process)

@@ -8,6 +8,7 @@ again.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from datetime import datetime, timedelta
 from typing import Protocol
 
@@ -49,6 +50,7 @@ class Scheduler:
         self._guard = threading.Lock()
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
+        self.attended: Callable[[], bool] = lambda: True  #: whether a campaign that begins could be seen and ended
         self.trouble = ""  #: why the schedule could not be looked at
         self._owes = False  #: what became of a start could not be written down
 
@@ -107,7 +109,7 @@ class Scheduler:
                 if row.late_limit_s is not None and late_s > max(row.late_limit_s, GRACE_S):
                     message = f"missed: {_span(late_s)} late, the limit is {_span(row.late_limit_s)}"
                     self._store.starts.take(row, due, self._next(row, now), now, "missed", message)
-                elif self._runner.free:
+                elif self._runner.free and self.attended():
                     self._begin(row, due, now)
 
     @staticmethod

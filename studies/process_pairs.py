@@ -1,0 +1,171 @@
+"""Two processes of a service killed or stopped at random instants of a campaign, over pty and TCP: is it finished?
+
+`LABCTL_STUDY_PAIRS` is how many pairs. What systemd does to a supervisor that died or stands still is done here: it is
+killed, and started again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+
+from labctl.store.connection.database import Database
+from studies.crashable_process import all_readings, complete_data_sets
+from studies.process_kill import DATA_SETS, RECIPE, WHOLE_S, simulators
+
+PAIRS = int(os.environ.get("LABCTL_STUDY_PAIRS", "100"))
+PROCESSES = ("supervisor", "bench", "web")
+SIGNALS = (signal.SIGKILL, signal.SIGSTOP)
+#: A service manager gives a supervisor that stands still so long, s.
+WATCHDOG_S = 5.0
+#: Everything must be over within this, s.
+WITHIN_S = 180.0
+LOOK_S = 0.2
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A signal to one process of the service, so long after the fault before, or after the start."""
+
+    process: str
+    number: signal.Signals
+    after_s: float
+
+    def __str__(self) -> str:
+        return f"{self.number.name} {self.process} after {self.after_s:.1f} s"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of the campaign."""
+
+    faults: tuple[Fault, ...]
+    state: str
+    reason: str
+    readings_missing: int
+    wrong_counts: int
+    unconfirmed: str
+    answers_after_s: float  #: from the last fault to the first answer that knows the bench
+
+    @property
+    def well(self) -> bool:
+        """Whether the plan was finished, once, with everything kept, and the bench is known to be safe."""
+        return self.state == "done" and not (self.readings_missing or self.wrong_counts or self.unconfirmed)
+
+
+class Service:
+    """`labctl serve` as a service manager runs it."""
+
+    def __init__(self, folder: Path, bench: Path) -> None:
+        self.database = folder / "lab.sqlite"
+        words = ["serve", "--bench", str(bench), "--port", "0", "--json", "--database", str(self.database)]
+        self._command = [sys.executable, "-m", "labctl", *words]
+        self._start()
+
+    def _start(self) -> None:
+        self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None
+        told = json.loads(self._process.stdout.readline())
+        self.pids = {"supervisor": self._process.pid, "bench": told["bench_pid"], "web": told["web_pid"]}
+        self.http = httpx.Client(base_url=told["url"], timeout=10.0)
+
+    def suffer(self, fault: Fault) -> None:
+        """Let a fault happen."""
+        time.sleep(fault.after_s)
+        with suppress(ProcessLookupError):
+            os.kill(self.pids[fault.process], fault.number)
+
+    def manage(self, supervisor_stopped: bool) -> None:
+        """Do what a service manager does: end a supervisor that stands still, start one that has ended."""
+        if supervisor_stopped:
+            time.sleep(WATCHDOG_S)
+            self._process.kill()
+            self._process.wait()
+        if self._process.poll() is not None:
+            self.http.close()
+            self._start()
+
+    def asked(self, path: str, holds: Callable[[Any], bool], within_s: float) -> Any:
+        """Ask until the answer is as expected; returns the last answer, None where there was none."""
+        until_s, answer = time.monotonic() + within_s, None
+        while time.monotonic() < until_s:
+            with suppress(httpx.TransportError, ValueError):
+                answer = self.http.get(path).json()
+                if holds(answer):
+                    break
+            time.sleep(LOOK_S)
+        return answer
+
+    def close(self) -> None:
+        """End the service."""
+        self._process.terminate()
+        self._process.communicate()
+        self.http.close()
+
+
+def suffer(folder: Path, bench: Path, faults: tuple[Fault, ...]) -> Outcome:
+    """Run a campaign, let the faults happen, and look at what is there in the end."""
+    (folder / "killed.toml").write_text(RECIPE)
+    service = Service(folder, bench)
+    try:
+        campaign = service.http.post("/api/campaigns", json={"recipe": RECIPE}).json()["id"]
+        for fault in faults:
+            service.suffer(fault)
+        before = _readings(service.database)
+        begun_s = time.monotonic()
+        service.manage(any(f.process == "supervisor" and f.number == signal.SIGSTOP for f in faults))
+        service.asked("/health", lambda told: told["bench"]["heard_s"] < 3.0, WITHIN_S)
+        answers_after_s = time.monotonic() - begun_s
+        over = {"done", "failed", "aborted"}
+        answer = service.asked(f"/api/campaigns/{campaign}", lambda told: told["state"] in over, WITHIN_S)
+        unconfirmed = service.http.get("/health").json()["bench"]["unconfirmed"]
+    finally:
+        service.close()
+    database = Database(str(service.database), write=False)
+    counts = complete_data_sets(database)
+    wrong = sum(counts[number] != 1 for number in range(1, DATA_SETS + 1))
+    missing = len(before - all_readings(database))
+    database.close()
+    return Outcome(faults, answer["state"], answer["reason"], missing, wrong, unconfirmed, answers_after_s)
+
+
+def _readings(location: Path) -> set[Any]:
+    database = Database(str(location), write=False)
+    found = all_readings(database)
+    database.close()
+    return found
+
+
+def run() -> dict[str, float]:
+    """Let pairs of faults happen at instants spread over the length of a campaign."""
+    rng = np.random.default_rng(11)
+    outcomes = []
+    for number in range(PAIRS):
+        which = [PROCESSES[k] for k in rng.choice(len(PROCESSES), 2, replace=False)]
+        how = [SIGNALS[k] for k in rng.integers(len(SIGNALS), size=2)]
+        when = (float(1.0 + WHOLE_S * (number + rng.uniform()) / PAIRS), float(rng.exponential(2.0)))
+        faults = tuple(Fault(*each) for each in zip(which, how, when, strict=True))
+        with tempfile.TemporaryDirectory() as name, simulators(Path(name)) as bench:
+            outcomes.append(suffer(Path(name), bench, faults))
+        if not outcomes[-1].well:
+            print(f"   not as promised: {', '.join(map(str, faults))}: {outcomes[-1]}", flush=True)
+    return {
+        "pairs": float(len(outcomes)),
+        "finished_as_promised": float(sum(outcome.well for outcome in outcomes)),
+        "readings_missing": float(sum(outcome.readings_missing for outcome in outcomes)),
+        "data_sets_twice_or_missing": float(sum(outcome.wrong_counts for outcome in outcomes)),
+        "answers_again_after_s_largest": max(outcome.answers_after_s for outcome in outcomes),
+    }
