@@ -49,6 +49,7 @@ def create_service(request: ServeRequest, url: str | None) -> LabService:
     """Open the store for this process and put a bench runner beside it, where a bench is named."""
     store = Store(Database(request.database or default_database(), write=True, url=url))
     try:
+        store.imports.discard_unfinished()
         name = request.bench or (SIMULATED_BENCH if request.simulate else None)
         runner = None
         if name is not None:
