@@ -62,8 +62,10 @@ class WriterTurn:
         who = "others, one after the other"
         if turn is not None:
             held_s = self._clock.now_s() - turn.began_s
-            who = f"{turn.function} of thread {turn.thread!r}, for {held_s:.3g} s already"
-        cause = f"{self._location}: no turn to write within {waited_s:.3g} s; {who}, holds the one writing connection"
+            who = f"{turn.function} in thread {turn.thread!r}, for {held_s:.3g} s already"
+        cause = (
+            f"{self._location}: no turn to write within {waited_s:.3g} s; the one writing connection is held by {who}"
+        )
         return StoreError(f"{cause}; nothing of this act was kept", cause=cause)
 
 
