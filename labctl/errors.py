@@ -11,6 +11,7 @@ LabctlError              exit 2, HTTP 400
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
 ├── Conflict             somebody else holds it, or it is already so               HTTP 409
 │   ├── CertificationRefused   something speaks against a version; it can be overridden      HTTP 409
+│   ├── VersionTaken     another calibration of the unit got this number meanwhile    HTTP 409
 │   └── BenchBusy        somebody drives the bench now: it may be free later          HTTP 409
 ├── NotAllowed           the key's role may not do this, or the request came a way it may not    HTTP 403
 │   └── NotIdentified    no key was given, or it is not one in force                             HTTP 401
@@ -121,6 +122,12 @@ class BenchBusy(Conflict):
     """Somebody drives the bench now: another campaign, or another process. It may be free later."""
 
     slug = "bench-busy"
+
+
+class VersionTaken(Conflict):
+    """Another calibration of the unit got this number meanwhile; build it again with the next one."""
+
+    slug = "version-taken"
 
 
 class CertificationRefused(Conflict):

@@ -85,6 +85,8 @@ def print_campaign(answer: CampaignResponse) -> None:
         console.print(f"  {unit} takes no further part: {why}", style="red", markup=False)
     if answer.last_error:
         console.print(f"  last fault: {answer.last_error}", style="red", markup=False)
+    if answer.unrecorded:
+        console.print(f"  {answer.unrecorded}", style="red", markup=False)
     for serial, recording in answer.recordings.items():
         console.print(f"  recording {recording}: {serial}", markup=False)
 

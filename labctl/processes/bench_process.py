@@ -44,6 +44,7 @@ def open_bench_service(settings: BenchSettings) -> tuple[Store, LocalBench]:
     address = ServiceAddress(settings.url, str(settings.folder))
     store = Store(Database(settings.location, write=True, address=address))
     try:
+        store.imports.discard_unfinished()
         return store, LocalBench(store, WallClock(), _runner(settings, store))
     except BaseException:
         store.close()

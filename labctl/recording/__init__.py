@@ -1,5 +1,6 @@
 """A recording in memory, and the interchange format it is read from and written to."""
 
+from labctl.recording.data_set_limits import refuse_too_many_data_sets
 from labctl.recording.files import read_recording, write_recording
 from labctl.recording.info import OutputUnit, RecordingInfo
 from labctl.recording.points import dataset_starts, to_points
@@ -12,6 +13,7 @@ __all__ = [
     "RecordingInfo",
     "dataset_starts",
     "read_recording",
+    "refuse_too_many_data_sets",
     "to_points",
     "write_recording",
 ]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from labctl.errors import BadRecording
 from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, needed
 from labctl.recording.constant_rate import rate_change
+from labctl.recording.data_set_limits import refuse_large_numbers, refuse_too_many_data_sets
 from labctl.recording.info import RecordingInfo
 
 #: What no gyro, table or chamber has ever been at: another unit, or a slip.
@@ -33,8 +34,10 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -
             _possible(path, name, columns[name], low, high)
     for name, values in columns.items():
         _squarable(path, name, values, columns.get("valid"))
+    refuse_large_numbers(path, columns)
     if info.kind == "coefficients":
         return columns
+    refuse_too_many_data_sets(path, info, columns)
     if "t_s" in columns:
         _time(path, columns["t_s"], strict=info.kind == "samples")
     _datasets(path, columns["dataset"], points=info.kind == "points")
@@ -78,6 +81,7 @@ def checked_environment(path: Path, columns: dict[str, NDArray[Any]]) -> dict[st
     for name, values in columns.items():
         _squarable(path, name, values, None)
     _time(path, columns["t_s"], strict=False)
+    refuse_large_numbers(path, columns)
     columns.setdefault("run", np.ones(len(columns["t_s"]), dtype=np.int64))
     return columns
 

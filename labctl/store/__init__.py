@@ -35,6 +35,7 @@ from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
+from labctl.store.repositories.recording_writer import Imports, ImportTicket
 from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, TakeUp
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
@@ -59,6 +60,8 @@ __all__ = [
     "Finding",
     "Head",
     "Holder",
+    "ImportTicket",
+    "Imports",
     "Judgement",
     "KeyRow",
     "Keys",
@@ -99,6 +102,7 @@ class Store:
         self._database = database
         self.units = Units(database)
         self.recordings = Recordings(database)
+        self.imports = Imports(database)
         self.campaigns = Campaigns(database)
         self.resume_points = ResumePoints(database)
         self.benches = Benches(database)
@@ -148,6 +152,8 @@ def open_store(
     """
     store = Store(Database(location, write=write, address=address, writer=writer))
     try:
+        if write:
+            store.imports.discard_unfinished()
         yield store
     finally:
         store.close()

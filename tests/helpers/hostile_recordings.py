@@ -61,6 +61,15 @@ def constant_rows(folder: Path) -> None:
     write_constant_rows(folder / "samples.parquet", 1_000_000, 400)
 
 
+def one_row_data_sets(folder: Path) -> None:
+    """Write 300,000 data sets of one reading: 5 MB that held the database's writer for 300 s."""
+    (folder / "recording.toml").write_text(HEAD)
+    n = 300_000
+    steps = {name: pa.array([values[0]] * n) for name, values in GOOD.items()}
+    steps |= {"dataset": pa.array(range(1, n + 1)), "t_s": pa.array([0.1 * row for row in range(n)])}
+    pq.write_table(pa.table(steps), folder / "samples.parquet")
+
+
 def with_bytes(folder: Path, file: str, content: bytes) -> None:
     """Write a recording whose data file has these bytes."""
     (folder / "recording.toml").write_text(HEAD)
@@ -115,6 +124,9 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
         column("dataset", pa.array([1, 1, 2, 2**64 - 1], pa.uint64())),
         r"row 4: 18446744073709551615 is beyond",
     ),
+    "2^31": (column("dataset", [1, 1, 2**31, 2**31]), r"'dataset', row 3: 2147483648 is beyond 2147483647"),
+    "mounting 2^31": (column("mounting", [1, 1, 1, -(2**31)]), r"'mounting', row 4: -2147483648 is beyond"),
+    "300,000 data sets": (one_row_data_sets, r"300000 data sets; at most 50000 are taken in at once; divide"),
     "1e24": (column("dataset", [1.0, 1.0, 1e24, 2e24]), r"row 3: 1e\+24 is beyond 9007199254740991"),
     "2^53 + 1 in CSV": (datasets("9007199254740991", "9007199254740993"), r"row 3: 9007199254740993 is beyond"),
     "1e24 in CSV": (datasets("1", "1e24"), r"column 'dataset', row 3: 1e\+24 is beyond"),

@@ -178,6 +178,7 @@ def open_for(bench: BenchFile, location: str) -> Iterator[Store]:
             raise
         raise Conflict(f"{described(holder)}. {taken}") from taken
     try:
+        opened.imports.discard_unfinished()
         yield opened
     finally:
         opened.close()

@@ -12,6 +12,7 @@ from labctl.fitting import fit
 from labctl.fitting.uncertainty import evidence_of
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
+from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.recordings.coverage import covered_of
 from labctl.services.recordings.inspection import inspect_stored, refuse_wrong, warning_of
 from labctl.services.recordings.loading import newest_row, points_of
@@ -66,7 +67,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
             None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
         )
 
-    kept = store.calibrations.add(serial, at, build)
+    kept = keep_next_version(store, serial, at, build)
     return FitResponse.model_validate(dict(kept.answer))
 
 

@@ -21,6 +21,7 @@ from labctl.fitting.uncertainty import use_evidence
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
+from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, load_reduced_readings
 from labctl.services.criticism.residuals import residual_columns
@@ -183,7 +184,7 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitRespon
             parent, change.recording.id, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
         )
 
-    return FitResponse.model_validate(dict(store.calibrations.add(serial, at, build).answer))
+    return FitResponse.model_validate(dict(keep_next_version(store, serial, at, build).answer))
 
 
 def plausible(result: FitResult, technology: str) -> dict[str, dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from labctl.errors import Conflict
+from labctl.errors import Conflict, StoreError
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.unattended import abort_abandoned, not_running, record_action
 from labctl.services.commands.context import CommandContext
@@ -54,14 +54,19 @@ class ServiceControl:
         return answer
 
     def abort(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-        """End a campaign now, in the safe state; one that does not run here is only closed."""
+        """End a campaign now, in the safe state; one that does not run here is only closed.
+
+        It is written down after it is done: neither a full disk nor a slow writer is a reason to go on.
+        """
         reason = asked.body.text
         if self._runner is None or not self._runner.runs(asked.campaign):
             return abort_abandoned(context.store, asked.campaign, reason, context.now())
+        answer = self._runner.abort(asked.campaign, reason)
         try:
             self._record(context, "abort", asked.campaign, reason)
-        finally:  # a full disk is no reason to go on
-            answer = self._runner.abort(asked.campaign, reason)
+        except StoreError as error:
+            text = f"it was aborted, but who did it and why is not in the audit trail: {error.cause}"
+            return answer.model_copy(update={"unrecorded": text})
         return answer
 
     def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:

@@ -131,6 +131,7 @@ class CampaignResponse(ResponseModel):
     started_at: datetime | None = None
     ended_at: datetime | None = None
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
+    unrecorded: str = Field(default="", description="Of a request that was carried out: what could not be written.")
 
 
 class EventResponse(ResponseModel):

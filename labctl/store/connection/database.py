@@ -6,7 +6,6 @@ process writes; `writer_lock` enforces it.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -21,6 +20,7 @@ from labctl.store.connection.commit_seal import count_commit, missing, seal
 from labctl.store.connection.engines import make_engine
 from labctl.store.connection.location import is_url, shown
 from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress, WriterLock
+from labctl.store.connection.writer_turn import WriterTurn
 
 #: What SQLite and PostgreSQL call a full disk.
 SQLITE_FULL, POSTGRESQL_DISK_FULL = 13, "53100"
@@ -55,7 +55,7 @@ class Database:
         self.location, self._shown = location, shown(location)
         self.writes = write
         self.writer = writer
-        self._guard = threading.RLock()
+        self._turn = WriterTurn(self._shown)
         self._lock: WriterLock | None = None
         self._sqlite = not is_url(location)
         self._synced = True
@@ -109,14 +109,15 @@ class Database:
         """Give the one writing connection inside a transaction: all of it is kept, or nothing.
 
         What is not `synced` outlives this process at once, but a power cut only when the next synced transaction ends:
-        a log is written in order, so that one carries all before it to the disk.
+        a log is written in order, so that one carries all before it to the disk. Raises StoreError, naming who holds
+        the connection, when it does not come free within 20 s.
         """
         if self.writer is not None:
             raise StoreError(
                 f"{self._shown}: another process writes to it; only a marked transaction can be sent there"
             )
         counted = synced and self._sqlite
-        with self._guard:
+        with self._turn.take():
             try:
                 self._sync(synced)
                 with self._engine.begin() as connection:

@@ -17,9 +17,9 @@ from labctl.store import migrate, sample_codec
 from labctl.store.connection.commit_seal import missing
 from labctl.store.connection.database import Database
 from labctl.store.connection.location import is_url
-from labctl.store.integrity.check_means import KeptMeans
+from labctl.store.import_parts import WHOLE_TABLE
+from labctl.store.integrity.check_means import MeansCheck
 from labctl.store.repositories.audit import Head, first_broken
-from labctl.store.repositories.sample_blocks import WHOLE_TABLE
 from labctl.store.schema import tables
 
 #: Blocks that are in memory at a time.
@@ -124,10 +124,13 @@ class _Check:
 
     def _check_readings(self, connection: sa.Connection) -> bool:
         b, d, r = tables.sample_blocks.c, tables.data_sets.c, tables.recordings.c
-        kinds = {int(number): kind for number, kind in connection.execute(sa.select(r.id, r.kind))}
-        valid = self._valid_readings(connection, int(connection.scalar(sa.select(sa.func.count(b.id))) or 0))
+        whole = r.importing.is_(None)  # what is being imported is not there yet
+        kinds = {int(number): kind for number, kind in connection.execute(sa.select(r.id, r.kind).where(whole))}
+        total = sa.select(sa.func.count(b.id)).where(_of_whole_recordings(b.recording_id))
+        valid = self._valid_readings(connection, int(connection.scalar(total) or 0))
         known = set()
-        for recording, number, state, n in connection.execute(sa.select(d.recording_id, d.number, d.state, d.n)):
+        heads = sa.select(d.recording_id, d.number, d.state, d.n).where(_of_whole_recordings(d.recording_id))
+        for recording, number, state, n in connection.execute(heads):
             known.add((recording, number))
             found = valid.get((recording, number), 0)
             if kinds.get(recording) == "samples" and state != "open" and found is not None and found != n:
@@ -146,10 +149,11 @@ class _Check:
         """Unpack every block; returns (recording, data set) -> valid readings, None where a block is damaged."""
         b = tables.sample_blocks.c
         query = sa.select(b.recording_id, b.number, b.seq, b.n, b.codec, b.crc32, b.data)
+        query = query.where(_of_whole_recordings(b.recording_id))
         ordered = query.order_by(b.recording_id, b.number, b.seq).execution_options(yield_per=AT_ONCE)
         valid: dict[tuple[int, int], int | None] = {}
         expected: dict[tuple[int, int], int] = {}
-        means: KeptMeans | None = None
+        means = MeansCheck(connection)
         for recording, number, seq, n, codec, crc32, data in connection.execute(ordered):
             place = (recording, number)
             if seq != expected.get(place, 0):
@@ -160,14 +164,13 @@ class _Check:
             columns = self._unpacked(f"{where} block {seq}", sample_codec.Block(n, codec, crc32, data))
             before, found = valid.get(place, 0), None if columns is None else _count(columns, n)
             valid[place] = None if found is None or before is None else before + found
-            if columns is not None and seq == 0:  # of a data set that is not closed, in several blocks, nothing is kept
-                if means is None or means.recording != recording:
-                    means = KeptMeans(connection, recording)
-                for text in means.complaints(number, columns):
-                    self.find("readings", f"{where}: {text}")
+            for text in means.take(recording, number, columns):
+                self.find("readings", text)
             self.blocks += 1
             if self.blocks % AT_ONCE == 0:
                 self._progress("readings", self.blocks, total)
+        for text in means.rest():
+            self.find("readings", text)
         return valid
 
     def _unpacked(self, place: str, block: sample_codec.Block) -> dict[str, NDArray[Any]] | None:
@@ -211,6 +214,12 @@ class _Check:
         if broken := first_broken(connection, self._anchor):
             self.find("audit", f"row {broken.row}: {broken.what}")
         return True
+
+
+def _of_whole_recordings(recording: sa.ColumnElement[int]) -> sa.ColumnElement[bool]:
+    """Return the condition that a row is of no recording that is being imported."""
+    r = tables.recordings.c
+    return recording.not_in(sa.select(r.id).where(r.importing.is_not(None)))
 
 
 def _count(columns: dict[str, NDArray[Any]], n: int) -> int:

@@ -10,11 +10,48 @@ import sqlalchemy as sa
 from numpy.typing import NDArray
 
 from labctl.store.dataset_statistics import statistics
-from labctl.store.repositories.sample_blocks import scaled
+from labctl.store.repositories.sample_blocks import join_blocks, scaled
 from labctl.store.schema import tables
 
 #: Sums differ in their last places by the order in which they are made; figures that were changed differ by more.
 ROUNDING = 1e-9
+
+
+class MeansCheck:
+    """Holds what is kept of each data set against its readings, whose blocks come in order."""
+
+    def __init__(self, connection: sa.Connection) -> None:
+        self._connection = connection
+        self._kept: KeptMeans | None = None
+        self._place = (0, 0)
+        self._parts: list[dict[str, NDArray[Any]]] = []
+        self._damaged = False
+
+    def take(self, recording: int, number: int, columns: dict[str, NDArray[Any]] | None) -> list[str]:
+        """Take one block, None for a damaged one; returns what is wrong with the data set before, if that was its end.
+
+        A data set with a damaged block has its own finding.
+        """
+        found: list[str] = []
+        if (recording, number) != self._place:
+            found = self.rest()
+            self._place = (recording, number)
+        self._damaged |= columns is None
+        self._parts += [columns] if columns is not None else []
+        return found
+
+    def rest(self) -> list[str]:
+        """Return what is wrong with the data set whose blocks came last, one line a channel."""
+        (recording, number), parts, damaged = self._place, self._parts, self._damaged
+        self._parts, self._damaged = [], False
+        if damaged or not parts:
+            return []
+        if self._kept is None or self._kept.recording != recording:
+            self._kept = KeptMeans(self._connection, recording)
+        where = f"recording {recording} data set {number}"
+        if any(part.keys() != parts[0].keys() for part in parts):
+            return [f"{where}: its blocks have different columns"]
+        return [f"{where}: {text}" for text in self._kept.complaints(number, join_blocks(parts))]
 
 
 class KeptMeans:

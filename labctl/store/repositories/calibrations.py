@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal
 
 import sqlalchemy as sa
 
-from labctl.errors import Conflict, NotCertified, NotFound
+from labctl.errors import Conflict, NotCertified, NotFound, VersionTaken
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.units import SEEN
 from labctl.store.schema import tables
 
 
@@ -66,6 +66,11 @@ def _audited(judgement: Judgement) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _next_version(connection: sa.Connection, serial: str) -> int:
+    c = tables.calibrations.c
+    return int(connection.scalar(sa.select(sa.func.max(c.version)).where(c.serial == serial)) or 0) + 1
+
+
 #: Made once: what every GET asks.
 _DOCUMENT = _document_query().where(tables.calibrations.c.version == sa.bindparam("version"))
 _IN_FORCE = _in_force_query()
@@ -89,30 +94,34 @@ class Calibrations:
     def __init__(self, database: Database) -> None:
         self._database = database
 
+    def next_version(self, serial: str) -> int:
+        """Return the number that a unit's next version will have, unless another one is added before it."""
+        with self._database.reading() as connection:
+            return _next_version(connection, serial)
+
     @transaction
-    def add(self, serial: str, at: datetime, build: Callable[[int], NewCalibration]) -> CalibrationRecord:
-        """Keep a unit's next version; `build` is given its number."""
-        c = tables.calibrations
-        with self._database.writing() as connection:
-            last = connection.scalar(sa.select(sa.func.max(c.c.version)).where(c.c.serial == serial))
-            version = int(last or 0) + 1
-            new = build(version)
-            connection.execute(
-                sa.insert(c).values(
-                    serial=serial,
-                    version=version,
-                    parent=new.parent,
-                    recording_id=new.recording,
-                    model=new.model,
-                    created_at=at,
-                    hash=new.hash,
-                    document=new.document,
-                    answer=new.answer,
-                )
-            )
-            detail = {"model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash}
-            act = "fit" if new.parent is None else "improve"
-            append(connection, at, act, f"{serial} version {version}", detail)
+    def add(self, serial: str, at: datetime, version: int, new: NewCalibration) -> CalibrationRecord:
+        """Keep a unit's next version, which was built with its number.
+
+        Raises VersionTaken when another one got the number meanwhile; nothing was changed.
+        """
+        values = {
+            "serial": serial, "version": version, "parent": new.parent, "recording_id": new.recording,
+            "model": new.model, "created_at": at, "hash": new.hash, "document": new.document, "answer": new.answer,
+        }  # fmt: skip
+        taken = VersionTaken(f"{serial} version {version} was made by another fit meanwhile; fit again")
+        try:
+            with self._database.writing() as connection:
+                if _next_version(connection, serial) != version:
+                    raise taken
+                connection.execute(sa.insert(tables.calibrations).values(**values))
+                detail = {"model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash}
+                act = "fit" if new.parent is None else "improve"
+                append(connection, at, act, f"{serial} version {version}", detail)
+        except sa.exc.IntegrityError as error:  # where several processes write: after the look, before the end
+            if self.next_version(serial) == version:
+                raise
+            raise taken from error
         return CalibrationRecord(
             serial, version, new.parent, new.recording, new.model, at, new.hash, new.document, new.answer
         )
@@ -200,7 +209,7 @@ class Calibrations:
         if row is not None:
             return bytes(row[0]), str(row[1])
         with self._database.reading() as connection:
-            known = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial))
+            known = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN))
         if known is None:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign brings one in")
         if version is None:

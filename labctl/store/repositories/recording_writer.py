@@ -1,21 +1,39 @@
-"""Writes recordings that were made elsewhere: readings, points or coefficients, with their environment."""
+"""Writes recordings: the row of one that is measured here, and one made elsewhere, under a mark until all of it is in.
+
+An import is a sequence of short transactions, so that a campaign's journal never waits for a long one. A recording
+under the mark is seen by no reading method; what a killed process left is discarded by `Imports.discard_unfinished`.
+"""
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Mapping
-from datetime import datetime
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime, timedelta
 from typing import Any
 
-import numpy as np
 import sqlalchemy as sa
-from numpy.typing import NDArray
 
-from labctl.recording import Recording, RecordingInfo, dataset_starts
-from labctl.store import sample_codec
-from labctl.store.dataset_statistics import means_rows
-from labctl.store.repositories.sample_blocks import WHOLE_TABLE, block_row
-from labctl.store.repositories.units import remember_unit
+from labctl.errors import Conflict
+from labctl.recording import RecordingInfo
+from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
+from labctl.store.import_parts import MOST_BYTES, MOST_ROWS, TABLES, ImportPart
+from labctl.store.repositories.audit import append
+from labctl.store.repositories.units import add_missing_unit, remember_unit
 from labctl.store.schema import tables
+
+#: Where several processes write (PostgreSQL): an import that gave no sign for so long is nobody's any more.
+ABANDONED_AFTER = timedelta(minutes=15)
+
+
+@dataclass(frozen=True)
+class ImportTicket:
+    """The right to write to a recording that is under the mark: numbers are given again, tokens are not."""
+
+    recording: int
+    token: str
 
 
 def new_recording(
@@ -29,88 +47,138 @@ def new_recording(
 ) -> int:
     """Make the row of a recording, and of its unit where that is new; returns the recording's number."""
     remember_unit(connection, info.serial, info.model, info.technology, at)
+    values = {"campaign_id": campaign, "gyro": gyro, "channels": [dict(channel) for channel in channels]}
+    return _insert_recording(connection, info, at, values)
+
+
+def _insert_recording(connection: sa.Connection, info: RecordingInfo, at: datetime, values: dict[str, Any]) -> int:
     row = sa.insert(tables.recordings).values(
-        serial=info.serial,
-        campaign_id=campaign,
-        gyro=gyro,
-        kind=info.kind,
-        info=info.model_dump(mode="json"),
-        channels=[dict(channel) for channel in channels],
-        created_at=at,
+        serial=info.serial, kind=info.kind, info=info.model_dump(mode="json"), created_at=at, **values
     )
     return int(connection.scalar(row.returning(tables.recordings.c.id)) or 0)
 
 
-def write_recording(connection: sa.Connection, recording: Recording, at: datetime) -> int:
-    """Write a whole recording inside the transaction of `connection`; returns its number."""
-    number = new_recording(connection, recording.info, at)
-    if recording.info.kind == "samples":
-        _add_samples(connection, number, recording)
-    else:
-        _add_table(connection, number, recording)
-    _add_environment(connection, number, recording)
-    return number
+class Imports:
+    """Recordings that are being imported. Each method is one short transaction, or a few of them."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    @transaction
+    def begin(self, info: RecordingInfo, at: datetime) -> ImportTicket:
+        """Make a recording under the mark, without content."""
+        token = secrets.token_hex(16)
+        marked = {"channels": [], "importing": token, "import_sign_at": sa.func.now()}
+        with self._database.writing(synced=False) as connection:
+            add_missing_unit(connection, info.serial, info.model, info.technology, at)
+            return ImportTicket(_insert_recording(connection, info, at, marked), token)
+
+    @transaction
+    def add_part(self, ticket: ImportTicket, part: ImportPart) -> None:
+        """Insert one part's rows. Raises Conflict when the import was discarded meanwhile."""
+        with self._database.writing(synced=False) as connection:
+            _give_sign(connection, ticket)
+            for name in TABLES:
+                if rows := part.rows[name]:
+                    connection.execute(sa.insert(tables.metadata.tables[name]), rows)
+
+    @transaction
+    def finish(self, ticket: ImportTicket, at: datetime, action: str, detail: Mapping[str, Any]) -> int:
+        """Take the mark away and write the audit row; returns the recording's number. Raises Conflict as `add_part`."""
+        r = tables.recordings
+        with self._database.writing() as connection:
+            _give_sign(connection, ticket)
+            values = {"importing": None, "import_sign_at": None}
+            info = RecordingInfo.model_validate(
+                connection.scalar(sa.update(r).where(r.c.id == ticket.recording).values(**values).returning(r.c.info))
+            )
+            remember_unit(connection, info.serial, info.model, info.technology, at)
+            append(connection, at, action, f"recording {ticket.recording}", detail)
+        return ticket.recording
+
+    @transaction
+    def discard(self, ticket: ImportTicket) -> None:
+        """Remove all of a recording that is under the mark, in short transactions; nothing where it is gone already."""
+        with suppress(Conflict):
+            while self._discard_some(ticket):
+                pass
+
+    def discard_unfinished(self) -> int:
+        """Discard what processes left that ended during an import; returns how many there were.
+
+        SQLite has one writing process, so its next one finds only what the one before left. Elsewhere an import may
+        be another process's, which lives: it is left alone until it gave no sign for 15 minutes, by the server's clock.
+        """
+        r = tables.recordings.c
+        with self._database.reading() as connection:
+            query = sa.select(r.id, r.importing).where(r.importing.is_not(None))
+            if connection.dialect.name != "sqlite":
+                query = query.where(r.import_sign_at < sa.func.now() - ABANDONED_AFTER)
+            found = [ImportTicket(*row) for row in connection.execute(query)]
+        for ticket in found:
+            with suppress(Conflict):
+                self.discard(self._claimed(ticket))
+        return len(found)
+
+    def _claimed(self, ticket: ImportTicket) -> ImportTicket:
+        """Return a ticket that only this process has: whoever had it before can write no further part."""
+        mine = ImportTicket(ticket.recording, secrets.token_hex(16))
+        with self._database.writing(synced=False) as connection:
+            _give_sign(connection, ticket, token=mine.token)
+        return mine
+
+    def _discard_some(self, ticket: ImportTicket) -> bool:
+        """Delete some rows of a recording, in the end its own; returns whether there is more."""
+        number = ticket.recording
+        with self._database.writing(synced=False) as connection:
+            _give_sign(connection, ticket)
+            if _delete_blocks(connection, number):
+                return True
+            for name, key in (("data_set_means", "number"), ("data_sets", "number"), ("environment", "id")):
+                if _delete_rows(connection, tables.metadata.tables[name], key, number):
+                    return True
+            r = tables.recordings
+            serial = connection.scalar(sa.delete(r).where(r.c.id == number).returning(r.c.serial))
+        # nothing but a recording brings a unit in; another import that begins now may need the row: then it stays
+        with suppress(sa.exc.IntegrityError), self._database.writing(synced=False) as connection:
+            u = tables.units.c
+            unused = ~sa.exists().where(r.c.serial == u.serial)
+            connection.execute(sa.delete(tables.units).where(u.serial == serial, unused))
+        return False
 
 
-def _add_samples(connection: sa.Connection, recording: int, samples: Recording) -> None:
-    columns = {name: np.asarray(values) for name, values in samples.columns.items()}
-    starts = dataset_starts(columns["dataset"])
-    ends = np.append(starts[1:], len(columns["dataset"]))
-    heads, means, packed = [], [], []
-    for start, end in zip(starts, ends, strict=True):
-        part = {name: values[start:end] for name, values in columns.items()}
-        number = int(part["dataset"][0])
-        valid = part["valid"] != 0 if "valid" in part else np.ones(end - start, dtype=bool)
-        counted = {name: values[valid] for name, values in part.items()} if valid.any() else part
-        heads.append(_head_of(recording, number, counted, int(valid.sum())))
-        means += means_rows(recording, number, part, valid)
-        packed.append(block_row(recording, number, 0, sample_codec.pack(part, sample_codec.FINAL)))
-    _insert(connection, (tables.data_sets, heads), (tables.data_set_means, means), (tables.sample_blocks, packed))
+def _give_sign(connection: sa.Connection, ticket: ImportTicket, *, token: str | None = None) -> None:
+    """Note that an import lives, and perhaps give it a new token. Raises Conflict when it is discarded or finished."""
+    r = tables.recordings
+    mine = sa.and_(r.c.id == ticket.recording, r.c.importing == ticket.token)
+    signed = sa.update(r).where(mine).values(import_sign_at=sa.func.now(), importing=token or ticket.token)
+    if connection.execute(signed).rowcount == 0:
+        raise Conflict(
+            f"recording {ticket.recording}: its import was discarded when the writing process was started again; "
+            "nothing of it was kept, import it again"
+        )
 
 
-def _head_of(recording: int, number: int, part: dict[str, NDArray[Any]], n: int) -> dict[str, Any]:
-    angle, setpoint = part.get("table_angle_deg"), part.get("chamber_setpoint_c")
-    power = part.get("power_s")
-    return {
-        "recording_id": recording,
-        "number": number,
-        "state": "complete",
-        "reason": "",
-        "position": str(part["position"][0]),
-        "run": int(part["run"][0]) if "run" in part else 1,
-        "mounting": int(part["mounting"][0]) if "mounting" in part else 1,
-        "table_rate_dps": float(part["table_rate_dps"].mean()),
-        "table_angle_deg": None if angle is None else float(angle[0]),
-        "chamber_setpoint_c": None if setpoint is None else float(setpoint[0]),
-        "gate_from_s": float(part["t_s"][0]) if "t_s" in part else None,
-        "gate_until_s": float(part["t_s"][-1]) if "t_s" in part else None,
-        "power_on_s": None if power is None else float(part["t_s"][0] - power[0]),
-        "n": n,
-    }
+def _delete_rows(connection: sa.Connection, table: sa.Table, key: str, recording: int) -> bool:
+    """Delete some rows of a recording, those of the lowest keys; returns whether any were there."""
+    mine, keys = table.c.recording_id == recording, table.c[key]
+    query = sa.select(keys).where(mine).order_by(keys).limit(1)
+    last = connection.scalar(query.offset(MOST_ROWS - 1))
+    some = mine if last is None else sa.and_(mine, keys <= last)
+    return connection.execute(sa.delete(table).where(some)).rowcount > 0
 
 
-def _add_table(connection: sa.Connection, recording: int, table: Recording) -> None:
-    columns = {name: np.asarray(values) for name, values in table.columns.items()}
-    packed = [block_row(recording, WHOLE_TABLE, 0, sample_codec.pack(columns, sample_codec.FINAL))]
-    heads: list[dict[str, Any]] = []
-    if table.info.kind == "points":
-        for row in range(len(table)):
-            part = {name: values[row : row + 1] for name, values in columns.items()}
-            n = int(part["n"][0]) if "n" in part else 1
-            heads.append({**_head_of(recording, int(part["dataset"][0]), part, n), "power_on_s": None})
-    _insert(connection, (tables.data_sets, heads), (tables.sample_blocks, packed))
-
-
-def _add_environment(connection: sa.Connection, recording: int, source: Recording) -> None:
-    if source.environment is None:
-        return
-    known = ("t_s", "run", "temperature_c", "chamber_c", "chamber_setpoint_c")
-    columns = {name: np.asarray(source.environment[name]).tolist() for name in known if name in source.environment}
-    rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
-    _insert(connection, (tables.environment, [{"recording_id": recording, **row} for row in rows]))
-
-
-def _insert(connection: sa.Connection, *pieces: tuple[sa.Table, list[dict[str, Any]]]) -> None:
-    for table, rows in pieces:
-        if rows:
-            connection.execute(sa.insert(table), rows)
+def _delete_blocks(connection: sa.Connection, recording: int) -> bool:
+    """Delete some blocks of a recording, as many as a part may have bytes; returns whether any were there."""
+    b = tables.sample_blocks.c
+    query = sa.select(b.id, sa.func.length(b.data)).where(b.recording_id == recording)
+    chosen: list[int] = []
+    size = 0
+    for block, length in connection.execute(query.order_by(b.number, b.seq).limit(MOST_ROWS)).all():
+        size += length
+        if chosen and size > MOST_BYTES:
+            break
+        chosen.append(block)
+    if chosen:
+        connection.execute(sa.delete(tables.sample_blocks).where(b.id.in_(chosen)))
+    return bool(chosen)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from datetime import datetime
 from typing import Any
 
@@ -12,15 +13,14 @@ import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
-from labctl.errors import NotFound
-from labctl.recording import Recording, RecordingInfo
+from labctl.errors import LabctlError, NotFound
+from labctl.recording import Recording, RecordingInfo, refuse_too_many_data_sets
 from labctl.store.connection.database import Database
-from labctl.store.connection.transactions import transaction
+from labctl.store.import_parts import WHOLE_TABLE, import_parts
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
-from labctl.store.repositories.audit import append
 from labctl.store.repositories.points import points_columns
-from labctl.store.repositories.recording_writer import write_recording
-from labctl.store.repositories.sample_blocks import WHOLE_TABLE, blocks_of, channels_of, readings_in_units
+from labctl.store.repositories.recording_writer import Imports
+from labctl.store.repositories.sample_blocks import blocks_of, channels_of, join_blocks, readings_in_units
 from labctl.store.schema import tables
 
 
@@ -30,19 +30,24 @@ class Recordings:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    @transaction
     def add_import(self, recording: Recording, at: datetime, simulated: Mapping[str, Any] | None = None) -> int:
-        """Take in a recording made elsewhere; returns its number. All of it is kept, or nothing.
+        """Take in a recording made elsewhere; returns its number. All of it is kept, or nothing. Raises BadRecording.
 
-        `simulated` says, for the audit trail, what a simulated recording was made from.
+        It is no transaction, but a sequence of short ones; what takes time is done between them. `simulated` says,
+        for the audit trail, what a simulated recording was made from.
         """
-        info = recording.info
-        with self._database.writing() as connection:
-            number = write_recording(connection, recording, at)
-            what = {"serial": info.serial, "kind": info.kind, "rows": len(recording)}
-            act = "import" if simulated is None else "simulate"
-            append(connection, at, act, f"recording {number}", {**what, **(simulated or {})})
-        return number
+        refuse_too_many_data_sets("the recording", recording.info, recording.columns)
+        info, imports = recording.info, Imports(self._database)
+        ticket = imports.begin(info, at)
+        try:
+            for part in import_parts(ticket.recording, recording):
+                imports.add_part(ticket, part)
+            what = {"serial": info.serial, "kind": info.kind, "rows": len(recording), **(simulated or {})}
+            return imports.finish(ticket, at, "import" if simulated is None else "simulate", what)
+        except BaseException:
+            with suppress(LabctlError):  # what cannot be discarded now is, when the database is opened for writing
+                imports.discard(ticket)
+            raise
 
     def get(self, recording: int) -> RecordingRow:
         """Return one recording's head; raises NotFound."""
@@ -84,7 +89,7 @@ class Recordings:
                 counts.c.readings,
             )
             .outerjoin(counts, counts.c.recording_id == r.id)
-            .where(condition)
+            .where(condition, r.importing.is_(None))
             .order_by(r.id.desc())
         )
         with self._database.reading() as connection:
@@ -123,7 +128,7 @@ class Recordings:
         with self._database.reading() as connection:
             environment = _environment(connection, recording)
             if head.kind != "samples":
-                return Recording(info, blocks_of(connection, recording, WHOLE_TABLE)[0], environment)
+                return Recording(info, join_blocks(blocks_of(connection, recording, WHOLE_TABLE)), environment)
             columns = points_columns(connection, recording)
         return Recording(info.model_copy(update={"kind": "points"}), columns, environment)
 
@@ -144,7 +149,9 @@ class Recordings:
         d = tables.data_sets.c
         with self._database.reading() as connection:
             heads = connection.execute(
-                sa.select(tables.data_sets).where(d.recording_id == recording, d.state == "complete").order_by(d.number)
+                sa.select(tables.data_sets)
+                .where(d.recording_id == recording, d.state == "complete", _whole(recording))
+                .order_by(d.number)
             )
             rows = [dict(head) for head in heads.mappings()]
             channels = channels_of(connection, recording)
@@ -162,13 +169,13 @@ class Recordings:
             d.gate_until_s.label("t_until_s"), d.n, d.lost, d.damaged,
         )  # fmt: skip
         with self._database.reading() as connection:
-            rows = connection.execute(query.where(d.recording_id == recording).order_by(d.number))
+            rows = connection.execute(query.where(d.recording_id == recording, _whole(recording)).order_by(d.number))
             return [DataSetRow(**dict(row)) for row in rows.mappings()]
 
     def means(self, recording: int) -> list[MeanRow]:
         """Return mean and standard deviation of every data set and channel, as far as they are kept as rows."""
         m = tables.data_set_means.c
-        query = sa.select(m.number, m.channel, m.mean, m.std).where(m.recording_id == recording)
+        query = sa.select(m.number, m.channel, m.mean, m.std).where(m.recording_id == recording, _whole(recording))
         with self._database.reading() as connection:
             return [MeanRow(*row) for row in connection.execute(query.order_by(m.channel, m.number))]
 
@@ -176,12 +183,18 @@ class Recordings:
         """Return the readings of one data set, column by column, in the interchange format's units."""
         with self._database.reading() as connection:
             chosen = sa.select(tables.data_sets).where(
-                tables.data_sets.c.recording_id == recording, tables.data_sets.c.number == number
+                tables.data_sets.c.recording_id == recording, tables.data_sets.c.number == number, _whole(recording)
             )
             head = connection.execute(chosen).mappings().first()
             if head is None:
                 raise NotFound(f"recording {recording} has no data set {number}")
             return readings_in_units(connection, dict(head), channels_of(connection, recording))
+
+
+def _whole(recording: int) -> sa.ColumnElement[bool]:
+    """Return the condition that a recording is not being imported."""
+    r = tables.recordings.c
+    return sa.exists().where(r.id == recording, r.importing.is_(None))
 
 
 def _environment(connection: sa.Connection, recording: int) -> dict[str, NDArray[Any]] | None:

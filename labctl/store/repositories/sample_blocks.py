@@ -10,9 +10,8 @@ import sqlalchemy as sa
 from numpy.typing import NDArray
 
 from labctl.store import sample_codec
+from labctl.store.import_parts import block_row
 from labctl.store.schema import tables
-
-WHOLE_TABLE = 0  #: number of the block that holds a whole table of points or coefficients
 
 
 def _blocks_query() -> sa.Select[int, int, int, bytes]:
@@ -24,19 +23,6 @@ def _blocks_query() -> sa.Select[int, int, int, bytes]:
 #: Made once: each data set of a recording asks them.
 _BLOCKS = _blocks_query()
 _ADD_BLOCK = sa.insert(tables.sample_blocks)
-
-
-def block_row(recording: int, number: int, seq: int, block: sample_codec.Block) -> dict[str, Any]:
-    """Return a row of sample_blocks."""
-    return {
-        "recording_id": recording,
-        "number": number,
-        "seq": seq,
-        "n": block.n,
-        "codec": block.codec,
-        "crc32": block.crc32,
-        "data": block.data,
-    }
 
 
 def write_block(connection: sa.Connection, recording: int, number: int, seq: int, block: sample_codec.Block) -> None:

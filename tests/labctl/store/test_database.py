@@ -83,6 +83,7 @@ def test_migrations_can_be_written_for_postgresql() -> None:
     assert "CREATE TABLE sample_blocks" in text
     assert "BYTEA" in text
     assert "ALTER TABLE certifications ADD COLUMN override BOOLEAN" in text
+    assert "ALTER TABLE recordings ADD COLUMN importing VARCHAR(32)" in text
     for table in tables.metadata.sorted_tables:
         assert str(sa.schema.CreateTable(table).compile(dialect=postgresql.dialect()))
 
@@ -150,7 +151,7 @@ def test_an_import_comes_back_exactly(location: str) -> None:
 
 def test_nothing_is_left_of_an_import_that_fails(location: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_store(location, write=True) as store:
-        monkeypatch.setattr("labctl.store.repositories.recording_writer._add_environment", lambda *_: 1 / 0)
+        monkeypatch.setattr("labctl.store.import_parts._environment", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             store.recordings.add_import(samples(), AT)
         assert store.units.all() == []
@@ -162,6 +163,11 @@ def _calibration(version: int) -> NewCalibration:
     return NewCalibration(None, None, "m", f"document {version}".encode(), "h" * 64, {"error": {}})
 
 
+def add_next(store: Store, at: datetime = AT) -> int:
+    version = store.calibrations.next_version("G-1")
+    return store.calibrations.add("G-1", at, version, _calibration(version)).version
+
+
 @pytest.fixture
 def store(location: str) -> Store:
     with open_store(location, write=True) as opened:
@@ -170,7 +176,7 @@ def store(location: str) -> Store:
 
 
 def test_versions_count_per_unit_and_never_change(store: Store) -> None:
-    assert [store.calibrations.add("G-1", AT, _calibration).version for _ in range(3)] == [1, 2, 3]
+    assert [add_next(store) for _ in range(3)] == [1, 2, 3]
     assert store.calibrations.document("G-1", 2) == (b"document 2", "h" * 64)
     with pytest.raises(NotFound, match="no calibration version 4"):
         store.calibrations.document("G-1", 4)
@@ -178,7 +184,7 @@ def test_versions_count_per_unit_and_never_change(store: Store) -> None:
 
 def test_certifying_an_older_version_is_a_rollback(store: Store) -> None:
     for _ in range(2):
-        store.calibrations.add("G-1", AT, _calibration)
+        add_next(store)
     with pytest.raises(NotCertified):
         store.calibrations.certified_version("G-1")
     act: Callable[..., object] = store.calibrations.certify
@@ -195,7 +201,7 @@ def test_certifying_an_older_version_is_a_rollback(store: Store) -> None:
 
 def test_acts_of_before_verdicts_were_kept_have_none(store: Store, location: str) -> None:
     """A database that stood at step 0005 is migrated; its acts have null where later ones have a verdict."""
-    store.calibrations.add("G-1", AT, _calibration)
+    add_next(store)
     store.calibrations.certify("G-1", 1, "certify", by="A", reason="fits", at=AT)
     with store.calibrations._database.writing() as connection:
         command.downgrade(migrate.configuration(connection), "0005")
@@ -217,7 +223,7 @@ def test_acts_of_before_verdicts_were_kept_have_none(store: Store, location: str
 
 def test_naive_instants_are_refused(store: Store) -> None:
     with pytest.raises(sa.exc.StatementError, match="needs a time zone"):
-        store.calibrations.add("G-1", datetime(2026, 1, 1), _calibration)  # noqa: DTZ001  that is the point
+        add_next(store, datetime(2026, 1, 1))  # noqa: DTZ001  that is the point
 
 
 @pytest.mark.parametrize("url", [

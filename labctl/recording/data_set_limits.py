@@ -1,0 +1,48 @@
+"""How many data sets one recording may have, and how large their numbers may be: refused before anything is written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadRecording
+from labctl.recording.info import RecordingInfo
+from labctl.recording.points import dataset_starts
+
+#: Each takes some 0.3 ms to take in, and a row for every channel. The published schedules have up to 630.
+MOST_DATA_SETS = 50_000
+#: The largest number that every database keeps in such a column: 2^31 - 1.
+LARGEST_NUMBER = (1 << 31) - 1
+NUMBERS = ("dataset", "run", "mounting", "n")
+
+
+def refuse_too_many_data_sets(where: Path | str, info: RecordingInfo, columns: Mapping[str, NDArray[Any]]) -> None:
+    """Raise BadRecording for a recording of more data sets than are taken in at once."""
+    if info.kind == "coefficients":
+        return
+    numbers = np.asarray(columns["dataset"])
+    found = len(numbers) if info.kind == "points" else len(dataset_starts(numbers)) if len(numbers) else 0
+    if found > MOST_DATA_SETS:
+        raise BadRecording(
+            f"{where}: {found} data sets; at most {MOST_DATA_SETS} are taken in at once; divide the recording, or give "
+            "readings at one rate and temperature one number (a data set is a stretch, not a reading)"
+        )
+
+
+def refuse_large_numbers(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
+    """Raise BadRecording for a number of a data set, run or mounting, or of readings, that not every database keeps."""
+    for name in NUMBERS:
+        values = columns.get(name)
+        if values is None or values.dtype.kind not in "iu":
+            continue
+        wrong = (values > LARGEST_NUMBER) | (values < -LARGEST_NUMBER)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise BadRecording(
+                f"{path}: column {name!r}, row {row + 1}: {values[row]} is beyond {LARGEST_NUMBER} (2^31 - 1), the "
+                "largest that every database keeps; count from 1"
+            )

@@ -1,0 +1,147 @@
+"""A recording in parts, rows and packed blocks ready to insert: each small enough for one short transaction.
+
+All that takes time (means, packing) is done here, outside of any transaction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.recording import Recording, dataset_starts
+from labctl.store import sample_codec
+from labctl.store.dataset_statistics import means_rows
+
+#: Number of the blocks that hold a whole table of points or coefficients.
+WHOLE_TABLE = 0
+#: What one part holds at most: measured, a transaction of either takes some 20 ms on one core.
+MOST_ROWS, MOST_BYTES = 2000, 1 << 21
+#: Readings of one block, before they are packed: of a long data set several blocks are made.
+BLOCK_BYTES = 2 << 20
+
+#: The tables that a part has rows of, in the order in which they refer to each other.
+TABLES = ("data_sets", "data_set_means", "sample_blocks", "environment")
+ENVIRONMENT = ("t_s", "run", "temperature_c", "chamber_c", "chamber_setpoint_c")
+
+Row = dict[str, Any]
+Columns = Mapping[str, NDArray[Any]]
+
+
+@dataclass
+class ImportPart:
+    """Rows to insert in one transaction, by the name of their table."""
+
+    rows: dict[str, list[Row]] = field(default_factory=lambda: {name: [] for name in TABLES})
+    n: int = 0
+    bytes: int = 0  #: of packed blocks
+
+    def takes(self, n: int, size: int) -> bool:
+        """Whether so many rows more, with blocks of so many bytes, still fit; an empty part takes anything."""
+        return not self.n or (self.n + n <= MOST_ROWS and self.bytes + size <= MOST_BYTES)
+
+
+def import_parts(number: int, recording: Recording) -> Iterator[ImportPart]:
+    """Yield the parts of the recording of this number, in the order in which they are to be inserted."""
+    part = ImportPart()
+    for rows in _pieces(number, recording):
+        n = sum(map(len, rows.values()))
+        size = sum(len(row["data"]) for row in rows.get("sample_blocks", ()))
+        if not part.takes(n, size):
+            yield part
+            part = ImportPart()
+        for name, some in rows.items():
+            part.rows[name] += some
+        part.n, part.bytes = part.n + n, part.bytes + size
+    if part.n:
+        yield part
+
+
+def block_row(recording: int, number: int, seq: int, block: sample_codec.Block) -> Row:
+    """Return a row of sample_blocks."""
+    return {
+        "recording_id": recording,
+        "number": number,
+        "seq": seq,
+        "n": block.n,
+        "codec": block.codec,
+        "crc32": block.crc32,
+        "data": block.data,
+    }
+
+
+def _pieces(number: int, recording: Recording) -> Iterator[dict[str, list[Row]]]:
+    """Yield rows that stand together: a data set with its means, a block, some of the environment."""
+    columns = {name: np.asarray(values) for name, values in recording.columns.items()}
+    if recording.info.kind == "samples":
+        yield from _data_sets(number, columns)
+    else:
+        if recording.info.kind == "points":
+            yield from _points(number, columns)
+        yield from _blocks(number, WHOLE_TABLE, columns)
+    if recording.environment is not None:
+        yield from _environment(number, recording.environment)
+
+
+def _data_sets(recording: int, columns: Columns) -> Iterator[dict[str, list[Row]]]:
+    starts = dataset_starts(columns["dataset"])
+    ends = np.append(starts[1:], len(columns["dataset"]))
+    for start, end in zip(starts, ends, strict=True):
+        part = {name: values[start:end] for name, values in columns.items()}
+        number = int(part["dataset"][0])
+        valid = part["valid"] != 0 if "valid" in part else np.ones(end - start, dtype=bool)
+        counted = {name: values[valid] for name, values in part.items()} if valid.any() else part
+        yield {
+            "data_sets": [_head(recording, number, counted, int(valid.sum()))],
+            "data_set_means": means_rows(recording, number, part, valid),
+        }
+        yield from _blocks(recording, number, part)
+
+
+def _points(recording: int, columns: Columns) -> Iterator[dict[str, list[Row]]]:
+    for row in range(len(columns["dataset"])):
+        part = {name: values[row : row + 1] for name, values in columns.items()}
+        n = int(part["n"][0]) if "n" in part else 1
+        yield {"data_sets": [{**_head(recording, int(part["dataset"][0]), part, n), "power_on_s": None}]}
+
+
+def _head(recording: int, number: int, part: Columns, n: int) -> Row:
+    angle, setpoint = part.get("table_angle_deg"), part.get("chamber_setpoint_c")
+    power = part.get("power_s")
+    return {
+        "recording_id": recording,
+        "number": number,
+        "state": "complete",
+        "reason": "",
+        "position": str(part["position"][0]),
+        "run": int(part["run"][0]) if "run" in part else 1,
+        "mounting": int(part["mounting"][0]) if "mounting" in part else 1,
+        "table_rate_dps": float(part["table_rate_dps"].mean()),
+        "table_angle_deg": None if angle is None else float(angle[0]),
+        "chamber_setpoint_c": None if setpoint is None else float(setpoint[0]),
+        "gate_from_s": float(part["t_s"][0]) if "t_s" in part else None,
+        "gate_until_s": float(part["t_s"][-1]) if "t_s" in part else None,
+        "power_on_s": None if power is None else float(part["t_s"][0] - power[0]),
+        "n": n,
+    }
+
+
+def _blocks(recording: int, number: int, columns: Columns) -> Iterator[dict[str, list[Row]]]:
+    """Yield the packed blocks of a data set, or of a whole table; one at least."""
+    rows = len(next(iter(columns.values()), ()))
+    row_bytes = sum(max(values.dtype.itemsize, 1) for values in columns.values())
+    at_once = max(BLOCK_BYTES // max(row_bytes, 1), 1)
+    for seq, start in enumerate(range(0, max(rows, 1), at_once)):
+        block = {name: values[start : start + at_once] for name, values in columns.items()}
+        yield {
+            "sample_blocks": [block_row(recording, number, seq, sample_codec.pack(block, sample_codec.FINAL))],
+        }
+
+
+def _environment(recording: int, environment: Columns) -> Iterator[dict[str, list[Row]]]:
+    columns = {name: np.asarray(environment[name]).tolist() for name in ENVIRONMENT if name in environment}
+    for values in zip(*columns.values(), strict=True):
+        yield {"environment": [{"recording_id": recording, **dict(zip(columns, values, strict=True))}]}

@@ -1,0 +1,100 @@
+"""A writer that is held by another: the table stops, it is said, and an abort waits for nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from instruments.clock import SystemClock, VirtualClock
+from labctl.errors import StoreError
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.preparation import prepare
+from labctl.services.campaigns.status import campaign_status
+from labctl.services.commands.context import CommandContext
+from labctl.services.commands.requests import ToCampaign
+from labctl.services.commands.service_control import ServiceControl
+from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ReasonRequest
+from labctl.store import Store, open_store
+from labctl.store.connection import writer_turn
+from procedures.execution import shutdown
+from tests.helpers.held_writer import held_writer
+
+BENCH = load_bench("single-axis-sim")
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as opened:
+        yield opened
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_engine_that_cannot_write_stops_its_table(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writer_turn, "WRITER_DEADLINE_S", 0.2)
+    monkeypatch.setattr(writer_turn, "OVERDUE_DEADLINE_S", 0.05)
+    real, left = shutdown.make_safe, []
+
+    def make_safe(bench: Any, clock: Any) -> tuple[str, ...]:
+        complaints = real(bench, clock)
+        left.append((complaints, bench.table.is_moving()))
+        return complaints
+
+    monkeypatch.setattr(shutdown, "make_safe", make_safe)
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    with held_writer(store) as hold:
+
+        def at_the_first_data_set() -> None:
+            job = runner._job
+            if job is not None and job.progress is not None and job.progress.step_text.startswith("data set"):
+                hold()
+
+        stop = runner.listen(at_the_first_data_set)
+        campaign = runner.start(CampaignRequest(recipe="short")).id
+        job = runner._job
+        assert job is not None
+        assert job.thread is not None
+        job.thread.join()
+        stop()
+        assert left == [((), False)]
+        assert job.progress is not None
+        assert job.progress.state.value == "failed"
+        assert "hold in thread 'the-holder'" in job.progress.reason
+        assert store.campaigns.get(campaign).state == "running"  # its end could not be written
+    runner.resume_interrupted()
+    row = store.campaigns.get(campaign)
+    assert (row.state, "no turn to write within" in row.reason) == ("failed", True)
+    assert runner.free
+
+
+def test_an_abort_is_written_down_after_it_is_done(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
+    prepared.bench.close()
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    done: list[str] = []
+
+    def abort(campaign: int, reason: str) -> CampaignResponse:
+        done.append(f"aborted: {reason}")
+        return campaign_status(store, campaign)
+
+    monkeypatch.setattr(runner, "runs", lambda _: True)
+    monkeypatch.setattr(runner, "abort", abort)
+    real = store.audit.record
+    monkeypatch.setattr(store.audit, "record", lambda *given: (done.append(given[1]), real(*given)))
+    context = CommandContext(lambda: store, SystemClock(), ServiceControl(runner))
+    asked = ToCampaign(prepared.id, ReasonRequest(reason="smoke", by="Ada"))
+    assert context.control.abort(context, asked).unrecorded == ""
+    assert done == ["aborted: smoke (Ada)", "campaign abort"]
+    last = store.audit.rows()[-1]
+    assert (last.action, last.detail["reason"]) == ("campaign abort", "smoke (Ada)")
+
+    def unwritable(*_: Any) -> None:
+        raise StoreError("the disk is full; nothing of this act was kept", cause="the disk is full")
+
+    monkeypatch.setattr(store.audit, "record", unwritable)
+    answer = context.control.abort(context, asked)
+    assert done[-1] == "aborted: smoke (Ada)"
+    assert answer.unrecorded == "it was aborted, but who did it and why is not in the audit trail: the disk is full"
