@@ -16,7 +16,7 @@ from labctl.api import systemd
 from labctl.api.access_policy import LOOPBACK_NAMES, MIB, AccessPolicy
 from labctl.api.app import create_app
 from labctl.config import default_database
-from labctl.errors import BadInput
+from labctl.errors import BadInput, BenchInDoubt
 from labctl.services.admin.api_keys import require_an_api_key
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
@@ -73,7 +73,8 @@ def create_service(request: ServeRequest, url: str | None) -> LabService:
 def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> str:
     """Serve until interrupted; returns how the bench was left, nothing where there is none.
 
-    Raises BadInput for an address that others can reach while there is no key to ask them for, Conflict, BadBench.
+    Raises BadInput for an address that others can reach while there is no key to ask them for, Conflict, BadBench, and
+    BenchInDoubt for a bench that at the end is not known to be safe.
     """
     if not 0 <= request.speed < float("inf"):
         raise BadInput(f"--speed {request.speed}: a positive number, or 0 for as fast as it can")
@@ -111,6 +112,8 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> str:
                     server.run(sockets=[listener])
             finally:
                 service.close()  # a second Ctrl-C makes the server skip it
+        if service.left_in_doubt:
+            raise BenchInDoubt(f"stopped; {service.left}")
         return service.left
 
 

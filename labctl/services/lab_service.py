@@ -12,13 +12,14 @@ from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.acting_user import ITSELF, acting
 from labctl.errors import StoreError
+from labctl.services.benches.confirmation import describe_bench, describe_safe_state
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
-from labctl.services.campaigns.execution import describe_safe_state
 from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses_of
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.service_control import ServiceControl
+from labctl.services.recordings.staging import remove_abandoned
 from labctl.services.schedule.scheduler import Scheduler
 from labctl.services.schemas.campaigns import (
     CampaignResponse,
@@ -42,6 +43,7 @@ class LabService:
         self._stops = self._closed = False
         self._hooks = ExitStack()
         self.left = ""  #: once it is closed: how the bench was left
+        self.left_in_doubt = False  #: and whether it is not known to be safe
 
     @property
     def bench(self) -> BenchFile | None:
@@ -55,8 +57,10 @@ class LabService:
         requests before it closes the service, and a client may follow a campaign for hours.
         """
         self._hooks.enter_context(shutdown_hook(self.end_soon))
+        remove_abandoned()
         with acting(ITSELF):  # no request asked for it
             if self.bench_runner is not None:
+                self.bench_runner.safe_state.start()
                 self.bench_runner.resume_unfinished()
             if self.scheduler is not None:
                 self.scheduler.start()
@@ -85,11 +89,13 @@ class LabService:
     def _how_left(self, runner: BenchRunner) -> str:
         bench = runner.bench.name
         try:
-            unconfirmed = self.store.benches.unconfirmed(bench)
-            return (
-                describe_safe_state(bench, unconfirmed) if runner.used or unconfirmed else f"bench {bench} was not used"
-            )
+            row = self.store.benches.get(bench)
+            if row is not None and row.unconfirmed:
+                self.left_in_doubt = row.is_in_doubt
+                return describe_bench(row)
+            return describe_safe_state(bench, "") if runner.used else f"bench {bench} was not used"
         except StoreError as error:
+            self.left_in_doubt = True
             return f"whether bench {bench} is safe cannot be read ({error}); look at it"
 
     def execute(self, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
