@@ -31,5 +31,5 @@ def default_database() -> str:
     from platformdirs import user_data_path  # noqa: PLC0415  the command line starts in a tenth of a second
 
     folder = user_data_path("labctl")
-    folder.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     return str(Path(folder) / "labctl.sqlite")

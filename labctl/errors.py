@@ -6,6 +6,7 @@ LabctlError              exit 2, HTTP 400
 │   ├── DataRefused      the data are certainly wrong, or a fit makes them worse     HTTP 422
 │   ├── BadBench         in a bench file
 │   └── BadCalibrationFile   edited, truncated or of an unknown format
+├── BenchInDoubt         a service has ended and its bench is not known to be safe      exit 1
 ├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
 │   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
@@ -88,6 +89,13 @@ class Stopped(LabctlError):
 
     exit_status = 130
     slug = "stopped"
+
+
+class BenchInDoubt(LabctlError):
+    """A service has ended and it is not known that its bench is in the safe state; the text says what is not."""
+
+    exit_status = 1
+    slug = "bench-in-doubt"
 
 
 class NotFound(LabctlError):

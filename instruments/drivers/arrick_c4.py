@@ -137,7 +137,7 @@ class ArrickC4:
         Raises NoReply, LinkError.
         """
         if self._active is None:
-            if self._link.is_open and self.is_moving():
+            if self.is_moving():  # an earlier process may have left it turning: this link need not be open yet
                 self._abort()
             return
         active, move = self._active, self._active.move

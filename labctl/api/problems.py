@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import tempfile
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -75,7 +76,8 @@ def _of_a_text(request: Request, error: UnicodeEncodeError) -> JSONResponse:
 def _of_the_system(request: Request, error: OSError) -> JSONResponse:
     if error.errno not in {errno.ENOSPC, errno.EDQUOT}:
         raise error
-    text = "the disk is full; nothing of this act was kept. Make room, then send it again"
+    place = error.filename or f"the folder for temporary files, {tempfile.gettempdir()}"
+    text = f"{place}: the disk is full; nothing of this act was kept. Make room, then send it again"
     return as_problem(DiskFull(text), request.url.path)
 
 

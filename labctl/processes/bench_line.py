@@ -13,7 +13,7 @@ from labctl.processes.calls import Call, Caller
 from labctl.processes.children import Child
 from labctl.processes.elapsed import Elapsed
 from labctl.processes.settings import CALLS, BenchSettings
-from labctl.processes.supervision import Left
+from labctl.services.benches.bench_left import BenchLeft
 
 ANSWER_S = 10.0
 
@@ -25,7 +25,7 @@ class BenchLine:
         """Take charge. Raises Conflict while another supervisor is, or for another bench; BenchSilent."""
         self.pid, self._child = pid, child
         self._handle = os.pidfd_open(pid)
-        self.left: str | None = None  #: how the bench was left, once the process has said so
+        self.left: BenchLeft | None = None  #: how the bench was left, once the process has said so
         self._line = self._take_charge(settings)
         self._heard = Elapsed()
         self._thread = threading.Thread(target=self._hear, name="bench-line", daemon=True)
@@ -45,8 +45,8 @@ class BenchLine:
             while True:
                 said = self._line.recv()
                 self._heard.restart()
-                if isinstance(said, Left):
-                    self.left = said.text
+                if isinstance(said, BenchLeft):
+                    self.left = said
 
     @property
     def heard_s(self) -> float:

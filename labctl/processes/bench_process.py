@@ -20,6 +20,7 @@ from labctl.processes.children import line_to_parent, tell
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.processes.waker import Waker
+from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import clock_for
@@ -105,7 +106,7 @@ class BenchProcess:
                 return
 
     def _close(self) -> None:
-        left = f"how bench {self._local.bench.name} was left is not known" if self._local.bench else ""
+        left = BenchLeft("how the bench was left is not known; look at it", in_doubt=True)
         try:
             left = self._local.close()
         finally:

@@ -14,6 +14,7 @@ from labctl.processes.bench_calls import Beat
 from labctl.processes.calls import Call, Caller
 from labctl.processes.elapsed import Elapsed
 from labctl.processes.settings import CALLS, STOP
+from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
@@ -205,11 +206,11 @@ class RemoteBench:
     def end_soon(self) -> None:
         """Nothing: the supervisor ends the bench process, not the web process."""
 
-    def close(self) -> str:
-        """Let the bench process go on without this one; returns nothing, for it says itself how the bench was left."""
+    def close(self) -> BenchLeft:
+        """Let the bench process go on without this one; it says itself how it leaves the bench."""
         self._over.set()
         self._caller.close()
         self.control.close()
         if self._watch is not None:
             self._watch.join()
-        return ""
+        return BenchLeft()

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from labctl.errors import Conflict
 from labctl.processes.elapsed import Elapsed
 from labctl.processes.settings import BenchSettings
 from labctl.processes.waker import Waker
+from labctl.services.benches.bench_left import BenchLeft
 from labctl.store import ServiceAddress, Store
 
 BEAT_S = 1.0
-
-
-@dataclass(frozen=True)
-class Left:
-    """How a bench was left, the last word of a bench process."""
-
-    text: str
 
 
 class Supervision:
@@ -79,9 +72,9 @@ class Supervision:
                 self._line = None
                 self._alone.restart()
 
-    def say_left(self, text: str) -> None:
+    def say_left(self, left: BenchLeft) -> None:
         """Tell the supervisor, if there is one, how the bench was left."""
         line, self._line = self._line, None
         if line is not None:
             with contextlib.suppress(OSError):
-                line.send(Left(text))
+                line.send(left)

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from labctl.errors import BenchSilent, LabctlError
+from labctl.errors import BenchInDoubt, BenchSilent, LabctlError
 from labctl.processes import systemd
 from labctl.processes.bench_line import BenchLine
 from labctl.processes.children import Child
@@ -24,6 +24,7 @@ from labctl.processes.elapsed import Elapsed
 from labctl.processes.listening import Listening, listening
 from labctl.processes.settings import BenchSettings, ServeRequest, WebSettings
 from labctl.processes.waker import Waker
+from labctl.services.benches.bench_left import BenchLeft
 from labctl.store.connection.writer_lock import holder_of
 from procedures.execution.signals import ENDING, restore
 
@@ -63,11 +64,15 @@ class _Restarts:
 def serve_forever(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
     """Serve until interrupted; returns how the bench was left, nothing where there is none.
 
-    Raises BadInput for an address that others can reach while there is no key to ask them for, Conflict, BadBench.
+    Raises BadInput for an address that others can reach while there is no key to ask them for, Conflict, BadBench, and
+    BenchInDoubt for a bench that at the end is not known to be safe.
     """
     request.check()
     with listening(request.host, request.port) as at, ending_signals() as waker:
-        return Supervisor(request, at, waker).run(ready)
+        left = Supervisor(request, at, waker).run(ready)
+    if left.in_doubt:
+        raise BenchInDoubt(f"stopped; {left.text}")
+    return left.text
 
 
 @contextmanager
@@ -90,7 +95,7 @@ class Supervisor:
         self._request, self._at, self._waker = request, at, waker
         self._restarts = _Restarts()
 
-    def run(self, ready: Callable[[Ready], None]) -> str:
+    def run(self, ready: Callable[[Ready], None]) -> BenchLeft:
         """Serve until asked to end; returns how the bench was left."""
         self._web = self._new_web()  # both load their modules at the same time
         try:
@@ -148,7 +153,7 @@ class Supervisor:
             shutil.rmtree(self._folder, ignore_errors=True)
             raise
 
-    def _end_bench(self, bench: BenchLine) -> str:
+    def _end_bench(self, bench: BenchLine) -> BenchLeft:
         """Let the bench process leave its bench safe, however long that takes; returns how it was left."""
         bench.tell("end")
         while not bench.wait(LOOK_S):
@@ -159,7 +164,8 @@ class Supervisor:
         shutil.rmtree(self._folder, ignore_errors=True)
         if bench.left is not None:
             return bench.left
-        return "the bench process ended without a word: how the bench was left is not known; look at it"
+        text = "the bench process ended without a word: how the bench was left is not known; look at it"
+        return BenchLeft(text, in_doubt=self._request.bench_name is not None)
 
     # -- the web process
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from instruments.bench_config import BenchFile
+from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.commands.context import CampaignControl
 from labctl.services.schemas.campaigns import CampaignResponse
 
@@ -67,6 +68,6 @@ class BenchAccess(Protocol):
         """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
         ...
 
-    def close(self) -> str:
-        """End what runs, in the safe state; returns how the bench was left, empty where there is none."""
+    def close(self) -> BenchLeft:
+        """End what runs, in the safe state; returns how the bench was left."""
         ...

@@ -22,6 +22,7 @@ from platformdirs import user_cache_path
 
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.single_flight import single_flight
+from labctl.store.connection.private_files import make_private_folder
 
 ResponseT = TypeVar("ResponseT", bound=ResponseModel)
 ResultT = TypeVar("ResultT")
@@ -54,7 +55,8 @@ class FileCache:
     def save(self, file: Path, content: bytes) -> None:
         """Write a file whole or not at all, and remove the oldest; nothing where the folder cannot be written."""
         with suppress(OSError):
-            file.parent.mkdir(parents=True, exist_ok=True)
+            make_private_folder(file.parent.parent)
+            make_private_folder(file.parent)
             with NamedTemporaryFile("wb", dir=file.parent, suffix=".part", delete=False) as part:
                 part.write(content)
             Path(part.name).replace(file)

@@ -11,12 +11,14 @@ from typing import Any
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.services.bench_access import BenchAccess
+from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.status import ENDED, from_rows, mark_abandoned, statuses_of
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
 from labctl.services.local_bench import LocalBench
+from labctl.services.recordings.staging import remove_abandoned
 from labctl.services.schemas.campaigns import (
     CampaignResponse,
     EventResponse,
@@ -39,7 +41,7 @@ class LabService:
         self._opened_at = clock.utc()
         self._closed = False
         self._hooks = ExitStack()
-        self.left = ""  #: once it is closed: how the bench was left
+        self.left = BenchLeft()  #: once it is closed
 
     @property
     def bench(self) -> BenchFile | None:
@@ -53,6 +55,7 @@ class LabService:
         a client may follow a campaign for hours.
         """
         self._hooks.enter_context(shutdown_hook(self.end_soon))
+        remove_abandoned()
         self.bench_access.start()
 
     def end_soon(self) -> None:

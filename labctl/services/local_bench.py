@@ -9,8 +9,9 @@ from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.acting_user import ITSELF, acting
 from labctl.errors import StoreError
+from labctl.services.benches.bench_left import BenchLeft
+from labctl.services.benches.confirmation import describe_bench, describe_safe_state
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.execution import describe_safe_state
 from labctl.services.commands.service_control import ServiceControl
 from labctl.services.schedule.scheduler import Scheduler
 from labctl.services.schemas.campaigns import CampaignResponse
@@ -67,6 +68,7 @@ class LocalBench:
         """
         with acting(ITSELF):  # no request asked for it
             if self.runner is not None:
+                self.runner.safe_state.start()
                 self.runner.resume_unfinished()
             if self.scheduler is not None:
                 self.scheduler.start()
@@ -86,22 +88,22 @@ class LocalBench:
         if self.runner is not None:
             self.runner.end_soon()
 
-    def close(self) -> str:
-        """End what runs, in the safe state; returns how the bench was left, empty where there is none."""
+    def close(self) -> BenchLeft:
+        """End what runs, in the safe state; returns how the bench was left."""
         self.end_soon()
         if self.scheduler is not None:
             self.scheduler.close()
         if self.runner is None:
-            return ""
+            return BenchLeft()
         self.runner.close()
         return self._how_left(self.runner)
 
-    def _how_left(self, runner: BenchRunner) -> str:
+    def _how_left(self, runner: BenchRunner) -> BenchLeft:
         bench = runner.bench.name
         try:
-            unconfirmed = self._store.benches.unconfirmed(bench)
+            row = self._store.benches.get(bench)
         except StoreError as error:
-            return f"whether bench {bench} is safe cannot be read ({error}); look at it"
-        if runner.used or unconfirmed:
-            return describe_safe_state(bench, unconfirmed)
-        return f"bench {bench} was not used"
+            return BenchLeft(f"whether bench {bench} is safe cannot be read ({error}); look at it", in_doubt=True)
+        if row is not None and row.unconfirmed:
+            return BenchLeft(describe_bench(row), row.is_in_doubt)
+        return BenchLeft(describe_safe_state(bench, "") if runner.used else f"bench {bench} was not used")

@@ -7,6 +7,7 @@ ProcedureError
 │   ├── SoakFailed       a temperature was not reached or did not settle in time
 │   ├── BadData          a unit's readings are missing, damaged or too few
 │   ├── GuardTripped     a limit that is watched was passed
+│   ├── TableStopped     the table does not move as it was told to, in the middle of a data set
 │   └── Unanswered       nobody answered a question in time
 ├── Aborted              a person asked for the end
 │   └── Interrupted      the bench had to be released; the campaign is to be resumed
@@ -62,6 +63,10 @@ class GuardTripped(StepFailed):
         self.kind = kind
         self.action = action
         self.device = device
+
+
+class TableStopped(StepFailed):
+    """The table does not move as it was told to, in the middle of a data set."""
 
 
 class Unanswered(StepFailed):

@@ -15,6 +15,7 @@ from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.event_recorder import warning
+from procedures.monitoring.table_watch import TableWatch
 
 LEAD_S = 0.5  #: streams are cleared this long before the gate opens
 BLOCK_S = 1.0  #: readings are written down this often
@@ -71,16 +72,17 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     if context.monitor.is_due(within_s=ramp_s):
         context.poll()
     spin = context.bench.table.spin(step.rate_dps, _steady_s(context, step))
+    watch = TableWatch(context.bench.table, context.clock, spin)
     gate = _gate(spin, step)
     counts = {
         name: ReadingCounts(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in context.bench.gyros.items()
     }
     with context.monitor.taking_readings(spin, counts):
         context.poll()
-        _wait_for_gate(context, gate[0])
+        _wait_for_gate(context, watch, gate[0])
         number = context.recorder.journal.dataset_opened(_header(context, step, spin, gate))
         try:
-            _read_gate(context, number, gate, counts)
+            _read_gate(context, watch, number, gate, counts)
             if context.monitor.is_due(within_s=ramp_s + LEAD_S):
                 context.poll(read_latest=False)
             context.bench.table.settle(spin)  # a run that does not end as computed was not the run it was taken for
@@ -113,8 +115,11 @@ def _gate(spin: Spin, step: Acquire) -> tuple[float, float]:
     return from_s, until_s
 
 
-def _wait_for_gate(context: ExecutionContext, from_s: float) -> None:
+def _wait_for_gate(context: ExecutionContext, watch: TableWatch, from_s: float) -> None:
     """Let the table settle, then drop what the streams have buffered meanwhile, unless the gate is open already."""
+    while watch.next_s < from_s - LEAD_S:
+        pass_time(context, watch.next_s - context.clock.now_s(), pausing=False)
+        watch.ask()
     pass_time(context, from_s - LEAD_S - context.clock.now_s(), pausing=False)
     if context.clock.now_s() >= from_s:
         return
@@ -137,11 +142,16 @@ def _header(context: ExecutionContext, step: Acquire, spin: Spin, gate: tuple[fl
 
 
 def _read_gate(
-    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts]
+    context: ExecutionContext,
+    watch: TableWatch,
+    number: int,
+    gate: tuple[float, float],
+    counts: dict[str, ReadingCounts],
 ) -> None:
     gyros = context.bench.gyros
     block_s = BLOCK_S if len(gyros) == 1 else SHARED_BLOCK_S
     while (left_s := gate[1] - context.clock.now_s()) > 0:
+        watch.ask()
         _read_round(context, number, gate, counts, min(block_s, left_s) / len(gyros))
         if context.monitor.is_due(within_s=block_s):
             context.poll(read_latest=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from instruments.clock import Clock
@@ -16,14 +16,14 @@ STANDSTILL_TIMEOUT_S = 30.0
 PAUSES_S = (2.0, 10.0, 30.0)
 
 
-def make_safe(bench: Bench, clock: Clock) -> tuple[str, ...]:
+def make_safe(bench: Bench, clock: Clock, pauses_s: Sequence[float] = PAUSES_S) -> tuple[str, ...]:
     """Bring the bench to its safe state; returns what could not be confirmed, empty when all is well.
 
-    Every part is tried even when another fails; what failed is tried again, after all the others, with growing pauses.
-    An interrupt (Ctrl-C) during a part makes it be tried once more.
+    Every part is tried even when another fails; what failed is tried again after each of the pauses, after all the
+    others. An interrupt (Ctrl-C) during a part makes it be tried once more.
     """
     open_parts = [(what, part, "") for what, part in _parts(bench, clock)]
-    for pause_s in (0.0, *PAUSES_S):
+    for pause_s in (0.0, *pauses_s):
         with contextlib.suppress(KeyboardInterrupt):  # without the pause the next try only comes earlier
             clock.sleep(pause_s)
         tried = [(what, part, _tried(what, part)) for what, part, _ in open_parts]

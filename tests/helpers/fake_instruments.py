@@ -80,6 +80,8 @@ class FakeTable(Fake):
         self.moving, self.rate_dps = False, 0.0
 
     def is_moving(self) -> bool:
+        if fault := self.faults.get("is_moving"):  # not traced: it is asked by the clock, not by the order of a step
+            fault()
         return self.moving
 
     def angle_deg(self) -> float:

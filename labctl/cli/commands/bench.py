@@ -48,6 +48,10 @@ def status(as_json: Json = False, database: Database = None) -> None:
     else:
         for bench in benches:
             said = [bench.unconfirmed, *(f"nobody has made it safe: {left}" for left in bench.left)]
+            if bench.attempts:
+                said.insert(1, f"the safe state was tried again {bench.attempts} times, last at {bench.attempted_at}")
+            if bench.confirmed_at:
+                said.insert(2, f"labctl confirmed it at {bench.confirmed_at}; a person has still to look, then `clear`")
             for line in filter(None, said if any(said) else ["nothing is unconfirmed"]):
                 console.print(f"{bench.name:18} {line}", markup=False, soft_wrap=True)
     if any(bench.unconfirmed or bench.left for bench in benches):

@@ -61,15 +61,16 @@ def serve(
 
 def _found(source: str, database: str | None) -> tuple[str, str]:
     """Say what is wrong with a bench when its service starts, and which campaign was left there; empty for nothing."""
-    from labctl.services.campaigns.execution import describe_safe_state
+    from labctl.services.benches.confirmation import describe_bench
     from labctl.services.campaigns.recovery import describe_recovery
     from labctl.services.commands.open import open_readonly
     from labctl.services.planning.loading import load_bench
 
     name = load_bench(source).name
     with open_readonly(database) as store:
-        unconfirmed = store.benches.unconfirmed(name)
-        return describe_safe_state(name, unconfirmed) if unconfirmed else "", describe_recovery(store, name)
+        row = store.benches.get(name)
+        unconfirmed = describe_bench(row) if row is not None and row.unconfirmed else ""
+        return unconfirmed, describe_recovery(store, name)
 
 
 def simulator(

@@ -10,6 +10,7 @@ from typing import Any
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.errors import BenchBusy, Conflict, StoreError
+from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import BenchHold
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.listeners import ChangeListeners
@@ -72,6 +73,8 @@ class BenchRunner:
         self._stops = False
         self.used = False  #: whether anything was asked of the bench here
         self._listeners = ChangeListeners()
+        #: Tries the safe state again while it is in doubt; whoever serves the bench starts it.
+        self.safe_state = SafeStateRetry(store, bench, make_clock, self._guard, self._is_idle)
 
     @property
     def bench(self) -> BenchFile:
@@ -91,6 +94,9 @@ class BenchRunner:
     @property
     def _may_drive(self) -> bool:
         return self._hold is None or self._hold.held
+
+    def _is_idle(self) -> bool:
+        return self._job is None and self._may_drive
 
     def runs(self, campaign: int) -> bool:
         """Whether this campaign runs here now."""
@@ -273,5 +279,6 @@ class BenchRunner:
                 job = self._job
             if job is not None and job.thread is not None:
                 job.thread.join()
+            self.safe_state.close()
             if self._hold is not None:
                 self._hold.close()

@@ -7,7 +7,8 @@ from contextlib import closing, suppress
 
 from instruments.bench_config import BenchFile
 from labctl.config import default_database
-from labctl.errors import Conflict, Stopped, StoreError
+from labctl.errors import Conflict, DiskFull, Stopped, StoreError
+from labctl.services.benches.confirmation import SafeStateRetry, describe_safe_state
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.campaigns.preparation import Prepared, clock_for, prepare, seeded
 from labctl.services.campaigns.status import ENDED, answer_of, describe_interrupted, from_rows
@@ -65,15 +66,6 @@ def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
 
 
-def describe_safe_state(bench: str, unconfirmed: str) -> str:
-    """Say how a bench was left, and what to do where it could not be confirmed safe."""
-    if not unconfirmed:
-        return f"bench {bench} is safe"
-    return (
-        f"bench {bench} is NOT confirmed safe: {unconfirmed}; look at it, then `labctl bench clear {bench} --by NAME`"
-    )
-
-
 def _stopped(store: Store, prepared: Prepared, engine: Engine) -> str:
     left = describe_safe_state(store.campaigns.get(prepared.id).bench_name, "; ".join(engine.complaints))
     return f"campaign {prepared.id} was stopped; {left}; `labctl campaign resume {prepared.id}` goes on with it"
@@ -89,9 +81,10 @@ def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: S
         left = f"bench {bench} is NOT confirmed safe, and that could not be written down: {complaints}; look at it"
     elif not complaints and not ended:
         left += ", but that could not be written down"
+    again = "there is room again" if isinstance(error, DiskFull) else "the database can be written again"
     return (
-        f"campaign {campaign} was cut short: {error.cause}; what was measured before is kept; {left}; once there is "
-        f"room again, `labctl campaign resume {campaign}` goes on with it"
+        f"campaign {campaign} was cut short: {error.cause}; what was measured before is kept; {left}; once {again}, "
+        f"`labctl campaign resume {campaign}` goes on with it"
     )
 
 
@@ -119,6 +112,7 @@ def run_here(
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
     with open_for(bench_file, database or default_database()) as store, holding(store, bench_file) as control:
         clock = clock_for(bench_file, request.speed)
+        SafeStateRetry(store, bench_file, lambda: clock).attempt()
         for text in _left_on(store, bench_file):
             if not bench_file.is_simulated:
                 raise Conflict(f"bench {bench_file.name}: {text}; nothing is begun there before")

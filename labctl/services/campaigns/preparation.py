@@ -12,6 +12,7 @@ from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
 from labctl.errors import BadInput, Conflict
 from labctl.recording import OutputUnit, RecordingInfo
+from labctl.services.benches.confirmation import describe_bench
 from labctl.services.benches.power_failure import boot_id
 from labctl.services.planning.loading import load_recipe
 from labctl.store import NewCampaign, NewUnit, Store
@@ -47,11 +48,17 @@ def operator_of(bench: Bench) -> Operator:
 
 
 def refuse_unconfirmed(store: Store, bench: str) -> None:
-    """Raise Conflict while nobody has looked at a bench whose safe state was not confirmed."""
-    if text := store.benches.unconfirmed(bench):
-        raise Conflict(
-            f"bench {bench} was not confirmed safe: {text}. Look at it, then `labctl bench clear {bench} --by NAME`"
-        )
+    """Raise Conflict while nobody has looked at a bench whose safe state was not confirmed when it was due."""
+    row = store.benches.get(bench)
+    if row is None or not row.unconfirmed:
+        return
+    if row.confirmed_at is not None:
+        raise Conflict(describe_bench(row))
+    tried = f" (tried again {row.attempts} times)" if row.attempts else ""
+    raise Conflict(
+        f"bench {bench} was not confirmed safe{tried}: {row.unconfirmed}. Look at it, then `labctl bench clear {bench} "
+        "--by NAME`"
+    )
 
 
 def seeded(bench: BenchFile, seed: int | None) -> BenchFile:

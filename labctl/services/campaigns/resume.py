@@ -11,6 +11,7 @@ from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, VirtualClock
 from labctl.config import default_database
 from labctl.errors import Conflict
+from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed
 from labctl.services.campaigns.execution import Attend, Observe, run_attended
@@ -132,6 +133,7 @@ def resume_here(
             clock = clock_for(bench_file, speed)
             return VirtualClock(standing.last_at) if isinstance(clock, VirtualClock) else clock
 
+        SafeStateRetry(store, bench_file, lambda: clock_for(bench_file, speed)).attempt()
         prepared = prepare_resume(store, row.id, bench_file, make_clock, request)
         return run_attended(store, prepared, control, observe, attend)
 

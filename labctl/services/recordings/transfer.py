@@ -14,6 +14,7 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 from labctl.errors import BadRecording
 from labctl.recording import RecordingInfo, read_recording, write_recording
 from labctl.services.recordings.inspection import inspect_stored
+from labctl.services.recordings.staging import staging_folder
 from labctl.services.schemas.recordings import ImportResponse
 from labctl.store import Store
 
@@ -61,12 +62,12 @@ def import_files(
             raise BadRecording(f"file {name!r} is not part of a recording (expected {', '.join(sorted(FILE_NAMES))})")
         if names.count(name) > 1:
             raise BadRecording(f"file {name!r} came more than once")
-    with tempfile.TemporaryDirectory(prefix="labctl-import-") as folder:
+    with staging_folder() as folder:
         for name, content in files:
-            with (Path(folder) / name).open("wb") as target:
+            with (folder / name).open("wb") as target:
                 shutil.copyfileobj(content, target)
         try:
-            return import_from(Path(folder))
+            return import_from(folder)
         except BadRecording as error:
             raise BadRecording(str(error).replace(f"{folder}/", "")) from None
 
@@ -97,8 +98,8 @@ class Download:
 def zip_recording(store: Store, recording: int, file_format: Literal["parquet", "csv"]) -> Download:
     """Return a recording in the interchange format as a zip with one folder. Raises NotFound."""
     name = f"recording-{recording}"
-    with tempfile.TemporaryDirectory(prefix="labctl-export-") as made:
-        folder = Path(made) / name
+    with staging_folder() as made:
+        folder = made / name
         written = export_recording(store, recording, folder, file_format)
         target = tempfile.TemporaryFile(prefix="labctl-export-")  # noqa: SIM115  closed by whoever sends it
         try:

@@ -23,6 +23,12 @@ class BenchStatus(ResponseModel):
     last_used_at: datetime
     unconfirmed: str = Field(default="", description="Until a person has looked and clears it; empty when all is well.")
     unconfirmed_at: datetime | None = None
+    attempts: int = Field(default=0, description="How often the safe state was tried again since.")
+    attempted_at: datetime | None = None
+    confirmed_at: datetime | None = Field(
+        default=None,
+        description="When such an attempt confirmed the safe state; a person has still to look and clear it.",
+    )
     left: list[str] = Field(
         default_factory=list, description="Campaigns that no process runs any more and nobody has ended."
     )

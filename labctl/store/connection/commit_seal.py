@@ -13,6 +13,8 @@ from pathlib import Path
 
 import sqlalchemy as sa
 
+from labctl.store.connection.private_files import make_private
+
 WIDTH = 12
 
 
@@ -35,7 +37,8 @@ def seal(location: str, commits: int) -> None:
     A seal that cannot be written fails no commit: it only guards less.
     """
     with contextlib.suppress(OSError):
-        handle = os.open(seal_path(location), os.O_WRONLY | os.O_CREAT, 0o644)
+        make_private(seal_path(location))
+        handle = os.open(seal_path(location), os.O_WRONLY)
         try:
             os.pwrite(handle, f"{commits:0{WIDTH}d}\n".encode(), 0)
         finally:

@@ -18,7 +18,10 @@ from labctl.errors import DiskFull, StoreError
 from labctl.store import migrate
 from labctl.store.connection.commit_seal import count_commit, missing, seal
 from labctl.store.connection.engines import make_engine
+from labctl.store.connection.file_identity import FileIdentity
 from labctl.store.connection.location import is_url, shown
+from labctl.store.connection.private_files import close_to_others, make_private
+from labctl.store.connection.start_check import first_damage
 from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress, WriterLock
 from labctl.store.connection.writer_turn import WriterTurn
 
@@ -59,6 +62,7 @@ class Database:
         self._lock: WriterLock | None = None
         self._sqlite = not is_url(location)
         self._synced = True
+        self._identity: FileIdentity | None = None
         if self._sqlite and not as_it_is:
             Path(location).parent.mkdir(parents=True, exist_ok=True)
         if write and self._sqlite:
@@ -70,20 +74,32 @@ class Database:
         try:
             if write and self._sqlite and not Path(location).exists():
                 self._refuse_loss(None)
+            if write and self._sqlite:
+                self._make_private()
             self._engine = make_engine(location, write=write)
             if not as_it_is:
                 self._migrate(write=write)
             #: Reading has connections of its own: it neither waits for the writer nor makes it wait.
             self._reader = make_engine(location, write=False) if write and self._sqlite else self._engine
+            if write and self._sqlite:
+                self._make_private()
+                self._identity = identity = FileIdentity(location)
+                sa.event.listen(self._engine, "connect", lambda *_: identity.forget_log())
         except BaseException:
             self._release()
             raise
+
+    def _make_private(self) -> None:
+        """Give the files of the database to their owner alone; SQLite makes its log as it finds the database."""
+        make_private(Path(self.location))
+        close_to_others(*(Path(f"{self.location}{end}") for end in ("", "-wal", "-shm", ".lock", ".seal")))
 
     def _migrate(self, *, write: bool) -> None:
         try:
             with self._engine.connect() as connection:
                 if write:
                     self._refuse_loss(connection)
+                    self._refuse_damage(connection)
                 found = migrate.revision_of(connection)
             if found == migrate.HEAD:
                 return
@@ -94,6 +110,8 @@ class Database:
             with self._engine.begin() as connection:
                 migrate.upgrade(connection)
         except DatabaseError as error:
+            if (full := self._trouble(error)) and isinstance(full, DiskFull):
+                raise full from error
             raise StoreError(
                 f"{self._shown}: not a labctl database, or damaged ({error.orig}); "
                 "restore a backup, or name another file with --database"
@@ -103,6 +121,19 @@ class Database:
         """Raise StoreError when commits are missing: nothing is written to an archive that lost some."""
         if self._sqlite and (text := missing(connection, self.location)):
             raise StoreError(f"{self.location}: {text}")
+
+    def _refuse_damage(self, connection: sa.Connection) -> None:
+        """Raise StoreError for a file whose pages do not fit together."""
+        if self._sqlite and (text := first_damage(connection)):
+            raise StoreError(
+                f"{self.location}: damaged ({text}); nothing was changed. Restore the newest backup, or save what can "
+                "be read with `sqlite3 FILE .recover`; `labctl check` lists what is found"
+            )
+
+    def _refuse_other_file(self) -> None:
+        """Raise StoreError when the database was deleted or replaced since it was opened."""
+        if self._identity is not None and (text := self._identity.changed()):
+            raise StoreError(f"{text}. Nothing of this act was kept", cause=text)
 
     @contextmanager
     def writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
@@ -122,10 +153,12 @@ class Database:
                 self._sync(synced)
                 with self._engine.begin() as connection:
                     yield connection
+                    self._refuse_other_file()
                     commits = count_commit(connection) if counted else 0
             except sa.exc.DatabaseError as error:
                 if isinstance(error, sa.exc.IntegrityError | sa.exc.ProgrammingError):
                     raise
+                self._refuse_other_file()
                 raise self._trouble(error) from error
             if counted:
                 seal(self.location, commits)
@@ -150,7 +183,8 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:
-        """Give a connection to read with."""
+        """Give a connection to read with. Raises StoreError."""
+        self._refuse_other_file()  # a new connection would make an empty file, or read another one's rows
         try:
             with self._reader.connect() as connection:
                 yield connection

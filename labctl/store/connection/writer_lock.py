@@ -12,6 +12,7 @@ from filelock import FileLock, Timeout
 
 from labctl.errors import Conflict
 from labctl.store.connection.location import is_url
+from labctl.store.connection.private_files import FILE, write_private
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def holder_of(location: str) -> Holder | None:
     """Return who holds a database file for writing; None when it is free."""
     if is_url(location):
         return None
-    lock = FileLock(_lock_path(location))
+    lock = FileLock(_lock_path(location), mode=FILE)
     try:
         with lock.acquire(timeout=0):
             return None
@@ -79,7 +80,7 @@ def note_campaign(location: str, campaign: int) -> None:
         return
     with suppress(OSError):  # a full disk: the note is only a hint
         note = {"pid": os.getpid(), "url": None, "campaign": campaign}
-        _note_path(location).write_text(json.dumps(note), encoding="utf-8")
+        write_private(_note_path(location), json.dumps(note))
 
 
 class WriterLock:
@@ -88,10 +89,10 @@ class WriterLock:
     def __init__(self, location: str, address: ServiceAddress = NO_SERVICE) -> None:
         """Take the lock and note at which address this process can be asked to write.
 
-        Raises Conflict naming the holder, and OSError when the note cannot be written.
+        Raises Conflict naming the holder, and OSError, which names the file, when the note cannot be written.
         """
         self._location = location
-        self._lock = FileLock(_lock_path(location))
+        self._lock = FileLock(_lock_path(location), mode=FILE)
         try:
             self._lock.acquire(timeout=0)
         except Timeout:
@@ -105,7 +106,7 @@ class WriterLock:
     def note(self, address: ServiceAddress) -> None:
         """Write down at which address this process is reached. Raises OSError."""
         note = {"pid": os.getpid(), **asdict(address)}
-        _note_path(self._location).write_text(json.dumps(note), encoding="utf-8")
+        write_private(_note_path(self._location), json.dumps(note))
 
     def release(self) -> None:
         """Let the next writer in. Safe to call twice."""

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from labctl.errors import BadInput, StoreError
 from labctl.store.connection.location import is_url
+from labctl.store.connection.private_files import FILE
 
 CHUNK = 1 << 20
 
@@ -39,6 +40,7 @@ def copy_database(location: str, target: Path) -> Copy:
     if not target.absolute().parent.is_dir():
         raise BadInput(f"{target}: the folder does not exist; make it first")
     handle, name = tempfile.mkstemp(dir=target.absolute().parent, prefix=f".{target.name}-")
+    os.fchmod(handle, FILE)
     os.close(handle)
     made = Path(name)
     try:

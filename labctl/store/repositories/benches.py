@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 import sqlalchemy as sa
 
@@ -22,6 +23,21 @@ class BenchRow:
     last_used_at: datetime
     unconfirmed: str  #: what the safe state could not confirm; empty when all is well
     unconfirmed_at: datetime | None
+    attempts: int = 0  #: how often the safe state was tried again since
+    attempted_at: datetime | None = None
+    confirmed_at: datetime | None = None  #: by such an attempt; `unconfirmed` stays until a person clears it
+
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether it is not known that the bench is in its safe state."""
+        return bool(self.unconfirmed) and self.confirmed_at is None
+
+
+_B = tables.benches.c
+_ROWS = sa.select(
+    _B.name, _B.last_used_at, _B.unconfirmed, _B.unconfirmed_at, _B.attempts, _B.attempted_at, _B.confirmed_at
+).order_by(_B.name)
+_UNTRIED: dict[str, Any] = {"unconfirmed": "", "attempts": 0, "attempted_at": None, "confirmed_at": None}
 
 
 class Benches:
@@ -32,14 +48,17 @@ class Benches:
 
     def all(self) -> list[BenchRow]:
         """Return every bench, by name."""
-        b = tables.benches.c
-        query = sa.select(b.name, b.last_used_at, b.unconfirmed, b.unconfirmed_at).order_by(b.name)
         with self._database.reading() as connection:
-            return [BenchRow(*row) for row in connection.execute(query)]
+            return [BenchRow(*row) for row in connection.execute(_ROWS)]
+
+    def get(self, name: str) -> BenchRow | None:
+        """Return a bench; None for one that was never used with this database."""
+        return next((row for row in self.all() if row.name == name), None)
 
     def unconfirmed(self, name: str) -> str:
         """Return what the last safe state of a bench did not confirm; empty for nothing, or a bench never used."""
-        return next((row.unconfirmed for row in self.all() if row.name == name), "")
+        found = self.get(name)
+        return "" if found is None else found.unconfirmed
 
     @transaction
     def mark(self, name: str, unconfirmed: str, at: datetime) -> None:
@@ -48,16 +67,36 @@ class Benches:
             mark(connection, name, unconfirmed, at)
 
     @transaction
+    def attempted(self, name: str, unconfirmed: str, at: datetime) -> None:
+        """Write down an attempt at the safe state of an unconfirmed bench, and what is unconfirmed after it.
+
+        Every attempt is counted and dated on the bench. The audit trail gets a row for the first one, for one with
+        another result than before, and for the one that confirms the safe state (`unconfirmed` is empty).
+        """
+        b = tables.benches
+        with self._database.writing() as connection:
+            found = connection.execute(_ROWS.where(b.c.name == name)).one_or_none()
+            if found is None or not BenchRow(*found).is_in_doubt:  # a person was quicker
+                return
+            was, attempts = found.unconfirmed, found.attempts + 1
+            values = {"attempts": attempts, "attempted_at": at}
+            values |= {"unconfirmed": unconfirmed} if unconfirmed else {"confirmed_at": at}
+            connection.execute(sa.update(b).where(b.c.name == name).values(values))
+            if attempts == 1 or unconfirmed != was:
+                detail = {"attempt": attempts, "confirmed": not unconfirmed, "unconfirmed": unconfirmed, "was": was}
+                audit.append(connection, at, "bench safe state", f"bench {name}", detail)
+
+    @transaction
     def clear(self, name: str, by: str, reason: str, at: datetime) -> BenchRow:
         """Take in that a person has looked. Raises NotFound, and Conflict when there is nothing to clear."""
-        found = next((row for row in self.all() if row.name == name), None)
+        found = self.get(name)
         if found is None:
             raise NotFound(f"bench {name!r} was never used with this database; `labctl bench status` lists them")
         if not found.unconfirmed:
             raise Conflict(f"bench {name}: nothing is unconfirmed")
         b = tables.benches
         with self._database.writing() as connection:
-            connection.execute(sa.update(b).where(b.c.name == name).values(unconfirmed="", unconfirmed_at=None))
+            connection.execute(sa.update(b).where(b.c.name == name).values({**_UNTRIED, "unconfirmed_at": None}))
             detail = {"reason": reason, "was": found.unconfirmed}
             audit.append(connection, at, "bench clear", f"bench {name}", detail, who=by)
         return next(row for row in self.all() if row.name == name)
@@ -66,4 +105,5 @@ class Benches:
 def mark(connection: sa.Connection, name: str, unconfirmed: str, at: datetime) -> None:
     """Write down, with whatever else the transaction does, what could not be confirmed of a bench."""
     b = tables.benches
-    connection.execute(sa.update(b).where(b.c.name == name).values(unconfirmed=unconfirmed, unconfirmed_at=at))
+    values = {**_UNTRIED, "unconfirmed": unconfirmed, "unconfirmed_at": at}
+    connection.execute(sa.update(b).where(b.c.name == name).values(values))

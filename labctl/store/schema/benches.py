@@ -16,6 +16,9 @@ benches = sa.Table(
         "unconfirmed", sa.Text, nullable=False, server_default=""
     ),  #: of the safe state; until a person clears it
     sa.Column("unconfirmed_at", Instant),
+    sa.Column("attempts", sa.Integer, nullable=False, server_default="0"),  #: of the safe state, since then
+    sa.Column("attempted_at", Instant),
+    sa.Column("confirmed_at", Instant),  #: by such an attempt; a person has still to look
 )
 
 leases = sa.Table(

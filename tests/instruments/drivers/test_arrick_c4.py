@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from instruments.bench import open_bench
 from instruments.errors import LimitError, LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.table import Spin
 
@@ -104,6 +105,16 @@ def test_abort_ramps_down_and_says_when_it_is_at_rest(c4: Any) -> None:
     assert not c4.world.table.moving(c4.clock.now_s())
     c4.table.stop()  # again: nothing is there to stop
     c4.table.home()
+
+
+def test_a_driver_that_is_new_stops_what_an_earlier_process_left_turning(c4: Any) -> None:
+    c4.table.home()
+    c4.table.spin(20.0, 3600.0)
+    again = open_bench(c4.file, c4.clock, c4.bench.simulation).table
+    again.stop()
+    c4.clock.sleep(1.0)
+    assert not again.is_moving()
+    again.close()
 
 
 def test_rest_is_a_rate_too(c4: Any) -> None:

@@ -49,5 +49,6 @@ function watchForStart(signal) {
 function unconfirmedNotice(bench) {
   return notice("bad", h("p", { class: "lead" }, `Bench ${bench.name} was not confirmed safe`),
     h("p", {}, `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${instant(bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`),
+    bench.attempts ? h("p", {}, bench.confirmed_at ? `labctl confirmed the safe state at ${instant(bench.confirmed_at)}, at attempt ${bench.attempts}. Look all the same before you clear it.` : `The safe state was tried again ${bench.attempts} times, last at ${instant(bench.attempted_at)}; it is tried every 30 s.`) : null,
     h("div", { class: "row" }, clearButton(bench.name, show)));
 }

@@ -1,0 +1,44 @@
+"""Files that only their owner may read and write, whatever the umask is."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+FILE, FOLDER = 0o600, 0o700
+
+
+def make_private(path: Path) -> None:
+    """Make an empty file where there is none. Raises OSError, which names the path."""
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, FILE)
+    except FileExistsError:
+        return
+    with os.fdopen(handle) as made:
+        os.fchmod(made.fileno(), FILE)
+
+
+def write_private(path: Path, text: str) -> None:
+    """Write a file over the one before. Raises OSError, which names the path."""
+    make_private(path)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:  # a write that fails does not say where
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def close_to_others(*paths: Path) -> None:
+    """Take the rights of others off files that an earlier version made; those of another owner stay as they are."""
+    for path in paths:
+        with suppress(OSError):
+            if path.stat().st_mode & 0o777 != FILE:
+                path.chmod(FILE)
+
+
+def make_private_folder(folder: Path) -> None:
+    """Make a folder, and those above it, where there is none; it is the owner's alone. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True, mode=FOLDER)
+    with suppress(OSError):
+        if folder.stat().st_mode & 0o777 != FOLDER:
+            folder.chmod(FOLDER)
