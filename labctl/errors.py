@@ -15,6 +15,7 @@ LabctlError              exit 2, HTTP 400
 ├── NotAllowed           the key's role may not do this, or the request came a way it may not    HTTP 403
 │   └── NotIdentified    no key was given, or it is not one in force                             HTTP 401
 ├── TooLarge             a request carries more than this service takes              HTTP 413
+├── TooBusy              there is no room for a request now; it may come again soon              HTTP 503
 └── StoreError           the database cannot be used: newer, damaged, locked         HTTP 503
     └── DiskFull         nothing of the act was kept                                 HTTP 507
 """
@@ -168,3 +169,11 @@ class TooLarge(LabctlError):
 
     status = 413
     slug = "too-large"
+
+
+class TooBusy(LabctlError):
+    """There is no room for a request now; it may come again soon."""
+
+    status = 503
+    slug = "too-busy"
+    retry_after_s = 5

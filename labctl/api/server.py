@@ -15,6 +15,8 @@ from instruments.clock import Clock, WallClock
 from labctl.api import systemd
 from labctl.api.access_policy import LOOPBACK_NAMES, MIB, AccessPolicy
 from labctl.api.app import create_app
+from labctl.api.connection_limits import limits_for, raise_open_files
+from labctl.api.http_protocol import bounded_http
 from labctl.config import default_database
 from labctl.errors import BadInput
 from labctl.services.admin.api_keys import require_an_api_key
@@ -97,9 +99,11 @@ def serve_forever(request: ServeRequest, ready: Callable[[str], None]) -> str:
         except BaseException:
             service.close()
             raise
+        limits = limits_for(raise_open_files())
         settings = uvicorn.Config(
             app, log_level="warning", lifespan="on", callback_notify=systemd.alive, timeout_notify=systemd.period_s(),
-            proxy_headers=False,
+            proxy_headers=False, http=bounded_http(limits), ws="none", backlog=limits.backlog,
+            timeout_keep_alive=limits.idle_s,
         )  # fmt: skip
         server = uvicorn.Server(settings)
         listener.listen(server.config.backlog)  # whoever reads the address may connect at once
