@@ -72,6 +72,7 @@ class ConnectionTable:
         self._all: dict[Connection, None] = {}  #: in the order in which they came
         self._by_source: defaultdict[str, dict[Connection, None]] = defaultdict(dict)
         self._look: asyncio.TimerHandle | None = None
+        self._late = False  #: the last look came late, and was left out
 
     def __len__(self) -> int:
         return len(self._all)
@@ -90,7 +91,7 @@ class ConnectionTable:
             self.release(connection)
             return False
         if self._look is None:
-            self._look = loop.call_later(self.limits.look_s, self._check, loop)
+            self._look_later(loop)
         return True
 
     def on_reserve(self, connection: Connection) -> bool:
@@ -125,8 +126,14 @@ class ConnectionTable:
         self.release(oldest)
         oldest.cut()
 
-    def _check(self, loop: asyncio.AbstractEventLoop) -> None:
+    def _look_later(self, loop: asyncio.AbstractEventLoop) -> None:
+        due = loop.time() + self.limits.look_s
+        self._look = loop.call_at(due, self._check, loop, due) if self._all else None
+
+    def _check(self, loop: asyncio.AbstractEventLoop, due: float) -> None:
+        """Compare times; not right after the loop stood still, when what clients have sent is not read yet."""
         now = loop.time()
-        for each in list(self._all):
+        self._late = not self._late and now - due > self.limits.look_s
+        for each in () if self._late else tuple(self._all):
             each.check(now)
-        self._look = loop.call_later(self.limits.look_s, self._check, loop) if self._all else None
+        self._look_later(loop)
