@@ -18,6 +18,7 @@ LabctlError              exit 2, HTTP 400
 │   └── NotIdentified    no key was given, or it is not one in force                             HTTP 401
 ├── TooLarge             a request carries more than this service takes              HTTP 413
 ├── BenchSilent          the bench process does not answer; the bench may move       HTTP 503
+├── Overloaded           there is no room for a request now; it may come again soon              HTTP 503
 └── StoreError           the database cannot be used: newer, damaged, locked         HTTP 503
     └── DiskFull         nothing of the act was kept                                 HTTP 507
 """
@@ -191,3 +192,11 @@ class TooLarge(LabctlError):
 
     status = 413
     slug = "too-large"
+
+
+class Overloaded(LabctlError):
+    """There is no room for a request now; it may come again soon."""
+
+    status = 503
+    slug = "overloaded"
+    retry_after_s = 5

@@ -9,14 +9,18 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from labctl.acting_user import Actor, acting
-from labctl.api.access_policy import API, OPEN, READING, AccessPolicy, role_needed
+from labctl.api.access_policy import API, OPEN, READING, UPLOAD, AccessPolicy, role_needed
+from labctl.api.connection_limits import RESERVED
 from labctl.api.problems import as_problem
-from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, TooLarge
+from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, Overloaded, TooLarge
 from labctl.services.admin.api_keys import identify, require_role
 from labctl.services.commands.remote import USER_HEADER
 from labctl.services.lab_service import LabService
 from labctl.services.schemas.admin import Caller, Role
 from labctl.web import is_page
+
+#: Uploads at once: while one comes, each of its files is a file here.
+MOST_UPLOADS = 8
 
 
 class AccessMiddleware:
@@ -26,6 +30,7 @@ class AccessMiddleware:
         self._app = app
         self._service = service
         self._access = access
+        self._uploads = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer it with a problem document."""
@@ -37,13 +42,33 @@ class AccessMiddleware:
             return
         try:
             caller = self._admit(scope)
+            uploads = self._refuse_crowd(scope)
             bounded = _bounded(receive, _declared(scope), self._access.largest_body(scope["path"]))
         except LabctlError as error:
             await as_problem(error, scope["path"])(scope, receive, send)
             return
         scope.setdefault("state", {})["caller"] = caller
-        with acting(Actor(caller.name, caller.via) if caller else Actor("nobody")):
-            await self._app(scope, bounded, send)
+        self._uploads += uploads
+        try:
+            with acting(Actor(caller.name, caller.via) if caller else Actor("nobody")):
+                await self._app(scope, bounded, send)
+        finally:
+            self._uploads -= uploads
+
+    def _refuse_crowd(self, scope: Scope) -> bool:
+        """Return whether a request uploads files. Raises Overloaded where it has to wait for others.
+
+        A connection of the reserve is kept for an admitted request that acts, and for `/health`.
+        """
+        reads = role_needed(scope["method"], scope["path"]) is Role.VIEWER
+        if scope.get("state", {}).get(RESERVED) and reads and scope["path"] not in OPEN:
+            raise Overloaded("as many connections are open as this service answers at once; ask again in a moment")
+        uploads = bool(scope["path"] == UPLOAD and not reads)
+        if uploads and self._uploads >= MOST_UPLOADS:
+            raise Overloaded(
+                f"{MOST_UPLOADS} recordings are being sent already; send this one when one of them is done"
+            )
+        return uploads
 
     def _admit(self, scope: Scope) -> Caller | None:
         """Return the caller; None at a path that is open without a key. Raises NotIdentified, NotAllowed, BadInput."""

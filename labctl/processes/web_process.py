@@ -16,6 +16,8 @@ import uvicorn
 from instruments.clock import WallClock
 from labctl.api.access_policy import LOOPBACK_NAMES, MIB, AccessPolicy
 from labctl.api.app import create_app
+from labctl.api.connection_limits import limits_for, raise_open_files
+from labctl.api.http_protocol import bounded_http
 from labctl.processes.children import line_to_parent, tell
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
 from labctl.processes.settings import ServeRequest, WebSettings
@@ -72,9 +74,11 @@ def serve(line: Connection, settings: WebSettings) -> None:
     async def beat() -> None:
         tell(line, "beat")
 
+    limits = limits_for(raise_open_files())
     server = uvicorn.Server(
         uvicorn.Config(
             app, log_level="warning", lifespan="on", callback_notify=beat, timeout_notify=BEAT_S, proxy_headers=False,
+            http=bounded_http(limits), ws="none", backlog=limits.backlog, timeout_keep_alive=limits.idle_s,
             timeout_graceful_shutdown=GRACE_S,
         )
     )  # fmt: skip

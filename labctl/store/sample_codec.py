@@ -77,12 +77,17 @@ def unpack(block: Block) -> dict[str, NDArray[Any]]:
     return {head[0]: _restore(head, next(stacks[head[1]]) if head[1] else None, block.n) for head in heads}
 
 
+def load_compressor() -> None:
+    """Import what packs readings, for a process that may have no file left to open once they come."""
+    import blosc2  # noqa: F401, PLC0415  0.1 s that only readings need
+
+
 def _compress(stack: NDArray[Any], effort: int) -> bytes:
     if stack.size == 0:
         return b""
     if effort == 0:
         return stack.tobytes()
-    import blosc2  # noqa: PLC0415  0.1 s that only readings need
+    import blosc2  # noqa: PLC0415  as above
 
     packed: bytes = blosc2.compress2(
         np.ascontiguousarray(stack),

@@ -55,10 +55,11 @@ def end_of(database: Path, campaign: int = 1) -> tuple[str, str]:
 class ServiceProcess:
     """`labctl serve` in a process of its own, and other commands beside it on the same database."""
 
-    def __init__(self, database: Path, *options: str) -> None:
+    def __init__(self, database: Path, *options: str, open_files: int | None = None) -> None:
         self.database = database
         command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json", *options]
-        self.process = begin(labctl(database, *command))
+        limit = [] if open_files is None else ["prlimit", f"--nofile={open_files}:{open_files}"]
+        self.process = begin([*limit, *labctl(database, *command)])
         told = json.loads(first_line(self.process))
         self.url = told["url"]
         self.bench_pid, self.web_pid = told["bench_pid"], told["web_pid"]
@@ -95,9 +96,9 @@ class ServiceProcess:
 
 
 @contextmanager
-def running(database: Path, *options: str) -> Iterator[ServiceProcess]:
-    """Serve a database while the block runs."""
-    made = ServiceProcess(database, *options)
+def running(database: Path, *options: str, open_files: int | None = None) -> Iterator[ServiceProcess]:
+    """Serve a database while the block runs; `open_files` is all that the process may open."""
+    made = ServiceProcess(database, *options, open_files=open_files)
     try:
         yield made
     finally:

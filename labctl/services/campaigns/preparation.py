@@ -16,6 +16,7 @@ from labctl.services.benches.confirmation import describe_bench
 from labctl.services.benches.power_failure import boot_id
 from labctl.services.planning.loading import load_recipe
 from labctl.store import NewCampaign, NewUnit, Store
+from labctl.store.sample_codec import load_compressor
 from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator
 from procedures.execution.resume import Restart
 from procedures.execution.safe_state import stop_table
@@ -82,6 +83,14 @@ def clock_for(bench: BenchFile, speed: float | None) -> Clock:
     return VirtualClock() if speed is None else ScaledClock(speed)
 
 
+def load_libraries() -> None:
+    """Import what is otherwise imported at first use: once a bench is open, a campaign depends on no further file."""
+    import numpy.fft  # noqa: PLC0415  numpy itself imports these two at first use,
+    import numpy.ma  # noqa: F401, PLC0415  this one in np.median
+
+    load_compressor()
+
+
 def prepare(
     store: Store, recipe_source: str, bench_file: BenchFile, clock: Clock, *, clip: bool, opened: Bench | None = None
 ) -> Prepared:
@@ -91,6 +100,7 @@ def prepare(
 
     Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe.
     """
+    load_libraries()
     recipe = load_recipe(recipe_source)
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)

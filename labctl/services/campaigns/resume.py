@@ -15,7 +15,13 @@ from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed
 from labctl.services.campaigns.execution import Attend, Observe, run_attended
-from labctl.services.campaigns.preparation import Prepared, clock_for, operator_of, refuse_unconfirmed
+from labctl.services.campaigns.preparation import (
+    Prepared,
+    clock_for,
+    load_libraries,
+    operator_of,
+    refuse_unconfirmed,
+)
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
 from labctl.store import CampaignRow, ResumePoint, Store, TakeUp, open_store
@@ -66,6 +72,7 @@ def prepare_resume(
     `opened` is the bench where it is open already. Raises Conflict when the campaign is done, when the bench carries
     other units, or when it waits to be looked at.
     """
+    load_libraries()
     row = store.campaigns.get(campaign)
     if row.state == "done":
         raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
