@@ -17,8 +17,10 @@ from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.execution import describe_safe_state
 from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses_of
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
+from labctl.services.commands.computed import carry_out
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.service_control import ServiceControl
+from labctl.services.computation import Computation, InThreads, Pending
 from labctl.services.schedule.scheduler import Scheduler
 from labctl.services.schemas.campaigns import (
     CampaignResponse,
@@ -31,8 +33,16 @@ from procedures.execution.signals import shutdown_hook
 class LabService:
     """What a running service serves."""
 
-    def __init__(self, store: Store, clock: Clock, runner: BenchRunner | None = None) -> None:
+    def __init__(
+        self,
+        store: Store,
+        clock: Clock,
+        runner: BenchRunner | None = None,
+        computation: Computation | None = None,
+    ) -> None:
+        """Serve a store; what takes long is done by `computation`, default: in the threads that ask for it."""
         self.store = store
+        self.computation = computation or InThreads(store)
         self.clock = clock
         self.bench_runner = runner
         self._executor = LocalExecutor(CommandContext(lambda: store, clock, ServiceControl(runner)))
@@ -68,6 +78,7 @@ class LabService:
             self.scheduler.end_soon()
         if self.bench_runner is not None:
             self.bench_runner.end_soon()
+        self.computation.end_soon()
 
     def close(self) -> None:
         """Begin nothing more, end what runs, leave the bench safe, close the store. Safe to call twice."""
@@ -80,6 +91,7 @@ class LabService:
             if self.bench_runner is not None:
                 self.bench_runner.close()
                 self.left = self._how_left(self.bench_runner)
+            self.computation.close()
             self.store.close()
 
     def _how_left(self, runner: BenchRunner) -> str:
@@ -94,7 +106,13 @@ class LabService:
 
     def execute(self, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
         """Execute a command on this service's store and bench. Raises LabctlError."""
+        if command.computes:
+            return self.computation.run(carry_out, command.handler, request, self.clock.utc(), writes=True)
         return self._executor.execute(command, request)
+
+    def submit(self, command: Command[RequestT, ResponseT], request: RequestT) -> Pending[ResponseT]:
+        """Begin to execute a command that computes; returns at once. Raises TooBusy."""
+        return self.computation.submit(carry_out, command.handler, request, self.clock.utc(), writes=True)
 
     def benches(self) -> list[dict[str, Any]]:
         """Describe the bench of this service."""

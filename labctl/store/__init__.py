@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from labctl.store.connection.database import Database
 from labctl.store.connection.location import is_url
@@ -77,6 +78,7 @@ __all__ = [
     "Starts",
     "StepRow",
     "Store",
+    "StoreAddress",
     "StoreJournal",
     "TakeUp",
     "Unit",
@@ -119,6 +121,11 @@ class Store:
         """Whether no other process can write to the database as long as this one holds it."""
         return self._database.writes and not is_url(self.location)
 
+    @property
+    def address(self) -> StoreAddress:
+        """By which another process opens the same database."""
+        return StoreAddress(self.location)
+
     def close(self) -> None:
         """Close the database."""
         self._database.close()
@@ -135,3 +142,22 @@ def open_store(location: str, *, write: bool, url: str | None = None) -> Iterato
         yield store
     finally:
         store.close()
+
+
+@dataclass(frozen=True)
+class StoreAddress:
+    """By which a process opens a store that another one has: picklable."""
+
+    location: str  #: path or URL
+    writer: str | None = None  #: of the process that writes to an SQLite file for others
+
+    @property
+    def can_write(self) -> bool:
+        """Whether a store opened by it can be written to while another process has the database."""
+        return self.writer is not None or is_url(self.location)
+
+    @contextmanager
+    def open(self) -> Iterator[Store]:
+        """Open the store; without a writer for reading. Raises StoreError."""
+        with open_store(self.location, write=False) as store:
+            yield store
