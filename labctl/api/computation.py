@@ -135,7 +135,7 @@ async def _result(request: Request, service: LabService, call: Call, progress: P
             return await anyio.to_thread.run_sync(_cached, call, service, limiter=looking)
         except NotCached as miss:
             pending = service.computation.submit(
-                call.work, *call.args, named=call.named, progress=progress, key=miss.question
+                call.work, *call.args, named=call.named, progress=progress, key=miss.question or repr(call)
             )
         try:
             with suppress(*(() if pending.same else (Exception,))):  # what fails there may be another question's

@@ -21,6 +21,7 @@ from labctl.services.admin.api_keys import require_an_api_key
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import clock_for
+from labctl.services.computation import InWorkers
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
@@ -29,6 +30,12 @@ from procedures.execution.signals import signal_handlers
 
 SIMULATED_BENCH = "triaxial-sim"
 LAST_PORT = 65535
+#: What a worker needs, loaded once for all of them.
+WORKER_MODULES = (
+    "blosc2", "pyarrow.csv", "pyarrow.parquet", "labctl.plots", "labctl.services.commands.computed",
+    "labctl.services.commands.registry", "labctl.services.criticism.next_experiment",
+    "labctl.services.criticism.evaluation", "labctl.services.lab_service", "labctl.services.simulation.visibility",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,7 @@ def create_service(request: ServeRequest, url: str | None) -> LabService:
                 return clock_for(bench, None if own_pace else request.speed)
 
             runner = BenchRunner(store, bench, make_clock, hold_bench(store, bench))
-        return LabService(store, WallClock(), runner)
+        return LabService(store, WallClock(), runner, InWorkers(store, preload=WORKER_MODULES))
     except BaseException:
         store.close()
         raise

@@ -32,6 +32,10 @@ LIBRARIES = ("numpy", "scipy")
 DAMAGED = (OSError, EOFError, ValueError, KeyError, BadZipFile)
 
 
+#: The question of what takes long and is cached by nobody: only the same request has the same one.
+UNNAMED = ""
+
+
 class NotCached(Exception):
     """The result is not cached, and computing it was not wanted; `question` is the same for all of one work's results.
 

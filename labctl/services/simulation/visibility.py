@@ -7,7 +7,7 @@ from dataclasses import asdict
 from instruments.bench_config import BenchFile
 from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.services.cache import compute
+from labctl.services.cache import UNNAMED, compute
 from labctl.services.planning.planner import plan_steps
 from labctl.services.schemas.plans import PlannedResponse, PlanRequest, Visibility
 from labctl.services.simulation.plan_simulation import hidden_recording
@@ -38,7 +38,7 @@ def planned(_: Store, request: PlanRequest, bench: BenchFile | None) -> PlannedR
     """
 
     def look(plan: Plan, on: BenchFile) -> list[Visibility]:
-        compute(f"visibility {plan.schedule_hash} {on.model_dump_json()}")
+        compute(UNNAMED)
         return visibility(plan, on)
 
     return plan_steps(request, bench, look)
