@@ -11,9 +11,12 @@ from pathlib import Path
 
 from labctl.acting_user import actor
 from labctl.progress import report_stage
+from labctl.services.cache import UNNAMED, compute
 from labctl.store import Store, StoreAddress, open_store
 
 BEGUN = b"begun\n"
+#: Variable of the environment that names the pipe of `hold_request`.
+PIPE = "HELD_BY_A_TEST"
 
 
 def who_asks(_: Store, answer: str, *, again: int = 1) -> tuple[str, str]:
@@ -41,6 +44,18 @@ def take_memory(_: Store, mib: int) -> int:
 def die(_: Store) -> None:
     """End this process as the system does where memory is short."""
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def die_in_a_worker(store: Store, *_: object, **__: object) -> None:
+    """In place of what a request asks for: end the process that computes it."""
+    compute(UNNAMED)
+    die(store)
+
+
+def hold_request(store: Store, *_: object, **__: object) -> None:
+    """In place of what a request asks for: hold the process that computes it, as `hold` does."""
+    compute(UNNAMED)
+    hold(store, os.environ[PIPE])
 
 
 def surroundings(_: Store) -> tuple[int, int, str | None, list[str]]:

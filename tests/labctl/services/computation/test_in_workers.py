@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from instruments.errors import NoReply
 from labctl.acting_user import Actor, acting
+from labctl.api.server import WORKER_MODULES
 from labctl.errors import ComputationEnded, DataRefused, TooBusy
 from labctl.progress import Cancelled, reporting_to
 from labctl.services.computation import InThreads, InWorkers, Limits
@@ -17,7 +19,7 @@ from labctl.store import Store, open_store
 from tests.helpers import computations as work
 
 WAIT_S = 60.0
-LIMITS = Limits(at_once=1, waiting=2, memory_mib=64)
+LIMITS = Limits(at_once=1, waiting=2, memory_mib=64, niceness=1)
 
 
 @pytest.fixture
@@ -28,7 +30,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 @pytest.fixture
 def workers(store: Store) -> Iterator[InWorkers]:
-    made = InWorkers(store, LIMITS)
+    made = InWorkers(store, LIMITS, preload=WORKER_MODULES)
     yield made
     made.close()
 
@@ -96,20 +98,37 @@ def test_a_client_that_leaves_ends_its_worker_at_once(workers: InWorkers, tmp_pa
     assert workers.run(work.who_asks, "yes")[0] == "yes"
 
 
+class Client:
+    """Hears stages."""
+
+    def __init__(self) -> None:
+        self.stages: list[str] = []
+        self._heard = threading.Event()
+
+    def __call__(self, stage: str) -> None:
+        self.stages.append(stage)
+        self._heard.set()
+
+    def wait(self) -> None:
+        assert self._heard.wait(WAIT_S)
+
+
 def test_one_of_two_that_ask_the_same_may_leave(workers: InWorkers, tmp_path: Path) -> None:
-    stages: tuple[list[str], list[str]] = ([], [])
+    clients = Client(), Client()
     held = work.Held(tmp_path)
-    one = workers.submit(work.hold, held.pipe, key="same", progress=stages[0].append)
+    one = workers.submit(work.hold, held.pipe, key="same", progress=clients[0])
     held.wait_for_begin()
-    two = workers.submit(work.hold, held.pipe, key="same", progress=stages[1].append)
+    two = workers.submit(work.hold, held.pipe, key="same", progress=clients[1])
     other = workers.submit(work.who_asks, "no", key="same")
     assert (two.same, other.same, other.future is one.future) == (True, False, True)
+    for client in clients:
+        client.wait()
     one.leave()
     other.leave()
     assert not two.future.done()
     two.leave()
     held.wait_for_end()
-    assert stages == (["held"], ["held"])
+    assert [client.stages for client in clients] == [["held"], ["held"]]
 
 
 def test_the_queue_is_bounded_and_in_order(workers: InWorkers, tmp_path: Path) -> None:
