@@ -85,6 +85,10 @@ class Held:
         self._told = Path(self.pipe).open("rb", buffering=0)  # noqa: SIM115  closed at its end
         assert self._told.read(len(BEGUN)) == BEGUN
 
+    def close(self) -> None:
+        """Look no more."""
+        self._told.close()
+
     def wait_for_end(self) -> None:
         """Return when the process has ended."""
         with self._told:

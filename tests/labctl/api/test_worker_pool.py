@@ -73,7 +73,7 @@ def test_of_many_at_once_so_many_are_computed_and_the_rest_told_when_to_come_bac
 
 
 def test_what_is_quick_never_waits_for_a_worker(service: Service, unit: str, tmp_path: Path) -> None:
-    fill(service, tmp_path)
+    held = fill(service, tmp_path)
     version = f"/api/units/{unit}/calibrations/1"
     with ThreadPoolExecutor(CLIENTS) as clients:
         for _ in range(CLIENTS):
@@ -87,6 +87,7 @@ def test_what_is_quick_never_waits_for_a_worker(service: Service, unit: str, tmp
         httpx.post(service.url + f"/api/units/{unit}/calibrations", json={}),
         httpx.post(service.url + "/api/plans", json={"recipe": "short", "visibility": True}),
     ]
+    held.close()
     assert [answer.status_code for answer in refused] == [429] * len(refused)
 
 
