@@ -11,6 +11,15 @@ InstrumentError
 
 from __future__ import annotations
 
+from typing import Any
+
+
+def copy_of(kind: type[Exception], args: tuple[Any, ...], attributes: dict[str, Any]) -> Exception:
+    """Return an error with this text and these attributes, whatever its constructor takes; for `__reduce__`."""
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(attributes)
+    return error
+
 
 class InstrumentError(Exception):
     """A failure of one device; `device` is its name in the bench file."""
@@ -18,6 +27,10 @@ class InstrumentError(Exception):
     def __init__(self, device: str, message: str) -> None:
         super().__init__(f"{device}: {message}")
         self.device = device
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle it whole: a subclass may take other arguments than its text."""
+        return copy_of, (type(self), self.args, self.__dict__)
 
 
 class LinkError(InstrumentError):

@@ -19,6 +19,8 @@ LabctlError              exit 2, HTTP 400
 ├── TooLarge             a request carries more than this service takes              HTTP 413
 ├── BenchSilent          the bench process does not answer; the bench may move       HTTP 503
 ├── Overloaded           there is no room for a request now; it may come again soon              HTTP 503
+├── TooBusy              as much is computed, and waits, as there is place for; says when to ask again   HTTP 429
+├── ComputationEnded     a worker process ended before its result: memory, time, a crash     HTTP 503
 └── StoreError           the database cannot be used: newer, damaged, locked         HTTP 503
     └── DiskFull         nothing of the act was kept                                 HTTP 507
 """
@@ -200,3 +202,24 @@ class Overloaded(LabctlError):
     status = 503
     slug = "overloaded"
     retry_after_s = 5
+
+
+class TooBusy(LabctlError):
+    """The service computes as much as it can, and as much waits; ask again later.
+
+    `retry_after_s`: in about how many seconds there is place again.
+    """
+
+    status = 429
+    slug = "too-busy"
+
+    def __init__(self, text: str, retry_after_s: int = 1) -> None:
+        super().__init__(text)
+        self.retry_after_s = retry_after_s
+
+
+class ComputationEnded(LabctlError):
+    """A computation was ended before its result: it needed too much memory or time, or its process died."""
+
+    status = 503
+    slug = "computation-ended"

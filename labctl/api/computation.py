@@ -1,71 +1,100 @@
-"""Long computations asked for over HTTP: cancelled when the client leaves, and followed stage by stage."""
+"""Long computations asked for over HTTP: ended when their client leaves, and followed stage by stage.
+
+No request waits for a computation in one of the server's threads: those answer what is quick, such as `/health`.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import json
-import threading
 from collections.abc import AsyncIterator, Callable
-from typing import Any, TypeVar
+from contextlib import suppress
+from functools import partial
+from typing import Any, ParamSpec, TypeVar
 
+import anyio
+import anyio.to_thread
 from fastapi import Request
 from fastapi.responses import StreamingResponse
-from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 
 from labctl.api.problems import as_problem
 from labctl.errors import LabctlError
-from labctl.progress import Cancelled, Progress, reporting_to
+from labctl.progress import Progress
+from labctl.services.cache import NotCached, cached_only
+from labctl.services.commands.command import Command, RequestT, ResponseT
+from labctl.services.computation.computation import Work
+from labctl.services.computation.job import Call
+from labctl.services.lab_service import LabService
 from labctl.services.schemas.base import ResponseModel
 
-#: A computation looks this often whether its client is still there, s.
-LOOK_S = 0.2
 #: An open stream says that it is alive after this long without a stage, s.
 HEARTBEAT_S = 10.0
 #: Status of a request whose client left; no client reads it, a log may.
 CLIENT_LEFT = 499
+#: Threads that look for cached results, and threads for long work on files.
+LOOKING, FILES = 4, 4
 
+ArgsT = ParamSpec("ArgsT")
 T = TypeVar("T")
 
 
-async def while_connected(request: Request, work: Callable[[], T]) -> T:
-    """Return what `work` returns, computed in a thread; at its next stage it is cancelled when the client leaves."""
-    left = threading.Event()
+class Threads:
+    """Threads of their own for what may take longer than a quick answer; more wait without one."""
 
-    def stop_when_left(stage: str) -> None:
-        if left.is_set():
-            raise Cancelled(stage)
+    def __init__(self) -> None:
+        """Of one event loop."""
+        self.looking = anyio.CapacityLimiter(LOOKING)
+        self.files = anyio.CapacityLimiter(FILES)
 
-    task = _in_thread(work, stop_when_left)
+
+def _threads(request: Request) -> Threads:
+    state = request.app.state
+    if not hasattr(state, "threads"):
+        state.threads = Threads()
+    threads: Threads = state.threads
+    return threads
+
+
+async def while_connected(
+    request: Request, service: LabService, work: Work[..., T], *args: object, **named: object
+) -> T:
+    """Return what `work` returns, from the cache or computed; it is ended at once when the client leaves."""
+    asked = asyncio.ensure_future(_result(request, service, Call(work, args, named), lambda _: None))
+    left = asyncio.ensure_future(_left(request))
     try:
-        while not (await asyncio.wait({task}, timeout=LOOK_S))[0]:
-            if await request.is_disconnected():
-                left.set()
-        return task.result()
-    except Cancelled:
-        raise HTTPException(CLIENT_LEFT, "the client left before the answer was computed") from None
+        await asyncio.wait({asked, left}, return_when=asyncio.FIRST_COMPLETED)
+        if not asked.done():
+            raise HTTPException(CLIENT_LEFT, "the client left before the answer was computed")
+        return asked.result()
     finally:
-        left.set()
+        await _end(asked, left)
 
 
-async def follow(request: Request, work: Callable[[], ResponseModel]) -> StreamingResponse:
+async def follow(
+    request: Request, service: LabService, work: Work[..., ResponseModel], *args: object, **named: object
+) -> StreamingResponse:
     """Return server-sent events: `stage` for each stage of `work`, then `answer` or, where it fails, `problem`.
 
-    At its next stage the work is cancelled when the client leaves. Raises what fails before the first stage.
+    The work is ended at once when the client leaves. Raises what fails before the first stage.
     """
-    loop, left = asyncio.get_running_loop(), threading.Event()
+    loop = asyncio.get_running_loop()
     stages: asyncio.Queue[str | None] = asyncio.Queue()
 
     def tell(stage: str) -> None:
-        if left.is_set():
-            raise Cancelled(stage)
-        loop.call_soon_threadsafe(stages.put_nowait, stage)
+        with suppress(RuntimeError):  # the loop was closed meanwhile
+            loop.call_soon_threadsafe(stages.put_nowait, stage)
 
-    task = _in_thread(work, tell)
-    task.add_done_callback(lambda _: stages.put_nowait(None))
+    asked = asyncio.ensure_future(_result(request, service, Call(work, args, named), tell))
+    asked.add_done_callback(lambda _: loop.call_soon(stages.put_nowait, None))
+    left = asyncio.ensure_future(_left(request))
+    left.add_done_callback(lambda _: asked.cancel())
     first = await stages.get()
-    if first is None:
-        task.result()
+    if asked.cancelled() or (first is None and asked.exception() is not None):
+        await _end(left)
+        if asked.cancelled():
+            raise HTTPException(CLIENT_LEFT, "the client left before the first stage")
+        asked.result()
 
     async def stream() -> AsyncIterator[bytes]:
         try:
@@ -78,26 +107,66 @@ async def follow(request: Request, work: Callable[[], ResponseModel]) -> Streami
                     stage = await asyncio.wait_for(stages.get(), HEARTBEAT_S)
                 except TimeoutError:
                     yield b": alive\n\n"
-            yield _result(task, request.url.path)
+            if not asked.cancelled():
+                yield _last_event(asked, request.url.path)
         finally:
-            left.set()
+            await _end(asked, left)
 
     return StreamingResponse(stream(), media_type="text/event-stream", headers={"Cache-Control": "no-cache"})
 
 
-def _in_thread(work: Callable[[], T], progress: Progress) -> asyncio.Task[T]:
-    def reporting() -> T:
-        with reporting_to(progress):
-            return work()
-
-    task = asyncio.ensure_future(run_in_threadpool(reporting))
-    task.add_done_callback(lambda done: done.cancelled() or done.exception())  # also where its client has left
-    return task
+async def execute(service: LabService, command: Command[RequestT, ResponseT], asked: RequestT) -> ResponseT:
+    """Execute a command that computes. It was asked to be done: it goes on when the client leaves."""
+    pending = service.submit(command, asked)
+    return await asyncio.wrap_future(pending.future)
 
 
-def _result(task: asyncio.Task[Any], path: str) -> bytes:
+async def with_files(request: Request, work: Callable[ArgsT, T], *args: ArgsT.args, **named: ArgsT.kwargs) -> T:
+    """Return what long work on files returns, done in one of the threads for it."""
+    limiter = _threads(request).files
+    return await anyio.to_thread.run_sync(partial(work, *args, **named), limiter=limiter)
+
+
+async def _result(request: Request, service: LabService, call: Call, progress: Progress) -> Any:
+    """Return the result of some work; where another client has it computed, or what it needs, wait for that."""
+    looking = _threads(request).looking
+    while True:
+        try:
+            return await anyio.to_thread.run_sync(_cached, call, service, limiter=looking)
+        except NotCached as miss:
+            pending = service.computation.submit(
+                call.work, *call.args, named=call.named, progress=progress, key=miss.question or repr(call)
+            )
+        try:
+            with suppress(*(() if pending.same else (Exception,))):  # what fails there may be another question's
+                found = await asyncio.wrap_future(pending.future)
+                if pending.same:
+                    return found
+        finally:
+            pending.leave()
+
+
+def _cached(call: Call, service: LabService) -> Any:
+    with cached_only():
+        return call(service.store)
+
+
+async def _left(request: Request) -> None:
+    """Return when the client has left; the body of the request is read already, or there is none."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+
+
+async def _end(*tasks: asyncio.Future[Any]) -> None:
+    """Cancel what is not done yet, and wait until it has let go of what it waits for."""
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def _last_event(asked: asyncio.Future[Any], path: str) -> bytes:
     try:
-        return _event("answer", task.result().model_dump_json())
+        return _event("answer", asked.result().model_dump_json())
     except LabctlError as error:
         return _event("problem", bytes(as_problem(error, path).body).decode())
 

@@ -14,7 +14,7 @@ from starlette.exceptions import HTTPException
 
 from instruments.errors import InstrumentError
 from instruments.toml_documents import listed
-from labctl.errors import DiskFull, LabctlError, NotIdentified, Overloaded, TooLarge
+from labctl.errors import DiskFull, LabctlError, NotIdentified, Overloaded, TooBusy, TooLarge
 from procedures.contracts.errors import PlanRefused, ProcedureError, StalePrompt
 
 #: A key that is not known is shown up to here.
@@ -36,7 +36,7 @@ def as_problem(error: LabctlError, path: str) -> JSONResponse:
     answer = problem(error.status, error.slug, _title(type(error)), str(error), path, **error.members)
     if isinstance(error, NotIdentified):
         answer.headers["WWW-Authenticate"] = 'Bearer realm="labctl"'
-    if isinstance(error, Overloaded):
+    if isinstance(error, Overloaded | TooBusy):
         answer.headers["Retry-After"] = str(error.retry_after_s)
     return answer
 

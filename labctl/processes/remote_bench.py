@@ -35,14 +35,19 @@ RECONNECT_S = 0.5
 
 
 class RemoteWriter:
-    """Runs transactions in the bench process."""
+    """Runs transactions in the bench process. Pickled, it is another one that reaches the same process."""
 
     def __init__(self, folder: Path) -> None:
+        self._folder = folder
         self._caller = Caller(folder / CALLS, TRANSACTION_S)
 
     def run(self, name: str, args: Any, kwargs: Any) -> Any:
         """Run a transaction there; returns or raises what it did. Raises BenchSilent."""
         return self._caller.call(f"store.{name}", args, kwargs)
+
+    def __reduce__(self) -> tuple[type[RemoteWriter], tuple[Path]]:
+        """Return how it is made again in another process."""
+        return RemoteWriter, (self._folder,)
 
     def close(self) -> None:
         """Close the connections."""

@@ -22,6 +22,7 @@ from labctl.processes.children import line_to_parent, tell
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
 from labctl.processes.settings import ServeRequest, WebSettings
 from labctl.services.admin.api_keys import require_an_api_key
+from labctl.services.computation import InWorkers
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
@@ -30,6 +31,13 @@ from labctl.store.connection.database import Database
 #: A request that has not ended so long after the end was asked for is cut, s.
 GRACE_S = 5
 BEAT_S = 1
+#: What a worker needs, loaded once for all of them.
+WORKER_MODULES = (
+    "blosc2", "pyarrow.csv", "pyarrow.parquet", "labctl.plots", "labctl.processes.remote_bench",
+    "labctl.services.commands.computed", "labctl.services.commands.registry",
+    "labctl.services.criticism.next_experiment", "labctl.services.criticism.evaluation", "labctl.services.lab_service",
+    "labctl.services.simulation.visibility",
+)  # fmt: skip
 
 
 def create_service(settings: WebSettings) -> LabService:
@@ -37,7 +45,8 @@ def create_service(settings: WebSettings) -> LabService:
     request, folder = settings.request, settings.folder
     bench = load_bench(request.bench_name) if request.bench_name is not None else None
     store = Store(Database(request.location, write=False, writer=RemoteWriter(folder)))
-    return LabService(store, WallClock(), access=RemoteBench(folder, bench))
+    computation = InWorkers(store, preload=WORKER_MODULES)
+    return LabService(store, WallClock(), computation=computation, access=RemoteBench(folder, bench))
 
 
 def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:

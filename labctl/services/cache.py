@@ -10,7 +10,8 @@ import hashlib
 import json
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -30,6 +31,40 @@ PACKAGES = ("instruments", "labctl", "procedures")
 LIBRARIES = ("numpy", "scipy")
 #: What a damaged file raises while it is read.
 DAMAGED = (OSError, EOFError, ValueError, KeyError, BadZipFile)
+
+
+#: The question of what takes long and is cached by nobody: only the same request has the same one.
+UNNAMED = ""
+
+
+class NotCached(Exception):
+    """The result is not cached, and computing it was not wanted; `question` is the same for all of one work's results.
+
+    Not a LabctlError: what handles a failed part of a computation must not take it for one.
+    """
+
+    def __init__(self, question: str) -> None:
+        super().__init__(question)
+        self.question = question
+
+
+_cached_only: ContextVar[bool] = ContextVar("cached_only", default=False)
+
+
+@contextmanager
+def cached_only() -> Iterator[None]:
+    """Compute nothing inside that takes long: it raises NotCached there."""
+    token = _cached_only.set(True)
+    try:
+        yield
+    finally:
+        _cached_only.reset(token)
+
+
+def compute(question: str) -> None:
+    """Say that what follows takes long. Raises NotCached where only cached results are wanted."""
+    if _cached_only.get():
+        raise NotCached(question)
 
 
 class FileCache:
@@ -71,6 +106,7 @@ class FileCache:
         file = self.file(question)
         if (found := self.load(file, decode)) is not None:
             return found
+        compute(str(file))
         with single_flight(str(file)):
             if (found := self.load(file, decode)) is not None:
                 return found
@@ -101,7 +137,9 @@ def cached_group(
 
     if (response := RESPONSES.load(file(kind), kind.model_validate_json)) is not None:
         return response
-    with single_flight(json.dumps(question, sort_keys=True)):
+    asked = json.dumps(question, sort_keys=True)
+    compute(asked)
+    with single_flight(asked):
         if (response := RESPONSES.load(file(kind), kind.model_validate_json)) is not None:
             return response
         # A fresh response takes the same way through JSON as a cached one, so both are equal.

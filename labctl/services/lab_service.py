@@ -16,7 +16,9 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.status import ENDED, from_rows, mark_abandoned, statuses_of
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
+from labctl.services.commands.computed import carry_out
 from labctl.services.commands.context import CommandContext
+from labctl.services.computation import Computation, InThreads, Pending
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
 from labctl.services.schemas.campaigns import (
@@ -31,9 +33,17 @@ class LabService:
     """What a running service serves. Its bench is driven by a runner in this process, or reached through `access`."""
 
     def __init__(
-        self, store: Store, clock: Clock, runner: BenchRunner | None = None, *, access: BenchAccess | None = None
+        self,
+        store: Store,
+        clock: Clock,
+        runner: BenchRunner | None = None,
+        computation: Computation | None = None,
+        *,
+        access: BenchAccess | None = None,
     ) -> None:
+        """Serve a store; what takes long is done by `computation`, default: in the threads that ask for it."""
         self.store = store
+        self.computation = computation or InThreads(store)
         self.clock = clock
         self.bench_access: BenchAccess = access or LocalBench(store, clock, runner)
         self._executor = LocalExecutor(CommandContext(lambda: store, clock, self.bench_access.control))
@@ -61,6 +71,7 @@ class LabService:
     def end_soon(self) -> None:
         """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
         self.bench_access.end_soon()
+        self.computation.end_soon()
 
     def close(self) -> None:
         """Begin nothing more, end what runs, leave the bench safe, close the store. Safe to call twice."""
@@ -69,11 +80,18 @@ class LabService:
         self._closed = True
         with self._hooks:
             self.left = self.bench_access.close()
+            self.computation.close()
             self.store.close()
 
     def execute(self, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
         """Execute a command on this service's store and bench. Raises LabctlError."""
+        if command.computes:
+            return self.computation.run(carry_out, command.handler, request, self.clock.utc(), writes=True)
         return self._executor.execute(command, request)
+
+    def submit(self, command: Command[RequestT, ResponseT], request: RequestT) -> Pending[ResponseT]:
+        """Begin to execute a command that computes; returns at once. Raises TooBusy."""
+        return self.computation.submit(carry_out, command.handler, request, self.clock.utc(), writes=True)
 
     def benches(self) -> list[dict[str, Any]]:
         """Describe the bench of this service."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from labctl.store.connection.database import Database, Writer
@@ -83,6 +84,7 @@ __all__ = [
     "Starts",
     "StepRow",
     "Store",
+    "StoreAddress",
     "StoreJournal",
     "TakeUp",
     "Unit",
@@ -127,6 +129,11 @@ class Store:
         """Whether no other process can write to the database as long as this one holds it."""
         return self._database.writes and not is_url(self.location)
 
+    @property
+    def address(self) -> StoreAddress:
+        """By which another process opens the same database."""
+        return StoreAddress(self.location, self._database.writer)
+
     def note_address(self, address: ServiceAddress) -> None:
         """Write down at which address the service that holds this database is reached now."""
         self._database.note_address(address)
@@ -157,3 +164,22 @@ def open_store(
         yield store
     finally:
         store.close()
+
+
+@dataclass(frozen=True)
+class StoreAddress:
+    """By which a process opens a store that another one has; it can be pickled, as its writer can."""
+
+    location: str  #: path or URL
+    writer: Writer | None = None  #: the process that writes for others
+
+    @property
+    def can_write(self) -> bool:
+        """Whether a store opened by it can be written to while another process has the database."""
+        return self.writer is not None or is_url(self.location)
+
+    @contextmanager
+    def open(self) -> Iterator[Store]:
+        """Open the store; without a writer for reading. Raises StoreError."""
+        with open_store(self.location, write=False, writer=self.writer) as store:
+            yield store

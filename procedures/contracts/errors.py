@@ -17,10 +17,17 @@ ProcedureError
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
+
+from instruments.errors import copy_of
 
 
 class ProcedureError(Exception):
     """Anything that a person can be told in one line."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle it whole: a subclass may take other arguments than its text."""
+        return copy_of, (type(self), self.args, self.__dict__)
 
 
 class RecipeError(ProcedureError):

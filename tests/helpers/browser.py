@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import httpx
 import uvicorn
+from labctl.api.server import WORKER_MODULES
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.api.middleware import AccessPolicy
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.computation import InWorkers, Limits
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
@@ -63,13 +65,15 @@ class Service:
     keys: bool = False
     port: int = 0
     url: str = ""
+    limits: Limits | None = None  #: of worker processes; without, it computes in threads
     lab_service: LabService = field(init=False)
 
     def start(self) -> None:
         """Begin to answer."""
         store = Store(Database(str(self.folder / "lab.sqlite"), write=True))
         runner = BenchRunner(store, load_bench(self.bench), VirtualClock) if self.bench else None
-        self.lab_service = LabService(store, SystemClock(), runner)
+        computation = InWorkers(store, self.limits, preload=WORKER_MODULES) if self.limits else None
+        self.lab_service = LabService(store, SystemClock(), runner, computation)
         listener = socket.socket()
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(("127.0.0.1", self.port))

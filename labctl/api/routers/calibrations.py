@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
 from labctl.api.access_policy import NEEDS_APPROVER
-from labctl.api.computation import follow, while_connected
+from labctl.api.computation import execute, follow, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.fitting.effects import read_formulas
 from labctl.services.calibrations import fitting as services
@@ -20,12 +19,11 @@ from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
 from labctl.services.commands.registry import CERTIFY, FIT, IMPROVE, REVOKE
 from labctl.services.commands.requests import ToNewestOrVersion, ToUnit, ToVersion
-from labctl.services.criticism import criticise as criticism_services
 from labctl.services.criticism.comparison import compare_version
+from labctl.services.criticism.criticise import criticise_unit, residuals_unit
 from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
 from labctl.services.criticism.verification import verify_unit
-from labctl.services.lab_service import LabService
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
@@ -85,15 +83,15 @@ def calibrations(serial: str, service: ServiceDep) -> list[CalibrationRow]:
 
 
 @command_route(router, FIT, "Fit a model")
-def fit(serial: str, request: FitRequest, service: ServiceDep) -> FitResponse:
+async def fit(serial: str, request: FitRequest, service: ServiceDep) -> FitResponse:
     """Fit a model to a recording; it becomes the unit's next version."""
-    return service.execute(FIT, ToUnit(serial, request))
+    return await execute(service, FIT, ToUnit(serial, request))
 
 
 @command_route(router, IMPROVE, "Change a model")
-def improve(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> FitResponse:
+async def improve(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> FitResponse:
     """Add effects to a version, or take some out, and fit everything again; it becomes the unit's next version."""
-    return service.execute(IMPROVE, ToNewestOrVersion(serial, version, request))
+    return await execute(service, IMPROVE, ToNewestOrVersion(serial, version, request))
 
 
 @router.get("/calibrations/{version}", summary="One version")
@@ -109,17 +107,22 @@ def certifications(serial: str, service: ServiceDep) -> list[CertificationRespon
 
 
 @router.get("/calibrations/{version}/assessment", summary="What speaks against certifying a version")
-def assessment(serial: str, version: int, service: ServiceDep) -> AssessmentResponse:
+async def assessment(request: Request, serial: str, version: int, service: ServiceDep) -> AssessmentResponse:
     """The verdict on the version by its own recording, its errors, and what certifying it would have to override."""
-    return assess(service.store, serial, version)
+    return await while_connected(request, service, assess, serial, version)
 
 
 @router.get("/calibrations/{version}/verification", summary="Apply a version to a recording")
-def verification(
-    serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None, other_unit: OtherUnit = False
+async def verification(
+    request: Request,
+    serial: str,
+    version: int,
+    service: ServiceDep,
+    recording: RecordingNumber = None,
+    other_unit: OtherUnit = False,
 ) -> VerificationResponse:
     """What the version leaves of the recording as it is, nothing refitted, and whether that is as expected of it."""
-    return verify_unit(service.store, serial, version, recording, other_unit=other_unit)
+    return await while_connected(request, service, verify_unit, serial, version, recording, other_unit=other_unit)
 
 
 @router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")
@@ -136,7 +139,10 @@ async def criticism(
 
     The computation is cancelled when the client leaves.
     """
-    return await while_connected(request, _criticism(service, serial, version, recording, other_unit, formula))
+    competing = tuple(read_formulas(formula or []))
+    return await while_connected(
+        request, service, criticise_unit, serial, version, recording, competing, other_unit=other_unit
+    )
 
 
 @router.get(
@@ -157,16 +163,8 @@ async def criticism_events(
 
     The computation is cancelled when the client leaves.
     """
-    return await follow(request, _criticism(service, serial, version, recording, other_unit, formula))
-
-
-def _criticism(
-    service: LabService, serial: str, version: int, recording: int | None, other_unit: bool, formula: list[str] | None
-) -> Callable[[], CriticismResponse]:
-    competing = read_formulas(formula or [])
-    return lambda: criticism_services.criticise_unit(
-        service.store, serial, version, recording, competing, other_unit=other_unit
-    )
+    competing = tuple(read_formulas(formula or []))
+    return await follow(request, service, criticise_unit, serial, version, recording, competing, other_unit=other_unit)
 
 
 @router.get("/calibrations/{version}/residuals", summary="What a model leaves, data set by data set")
@@ -174,29 +172,33 @@ async def residuals(
     request: Request, serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None
 ) -> ResidualsResponse:
     """The rows behind the map of the criticism, one per data set and axis: measured, modelled, and what is left."""
-    return await while_connected(
-        request, lambda: criticism_services.residuals_unit(service.store, serial, version, recording)
-    )
+    return await while_connected(request, service, residuals_unit, serial, version, recording)
 
 
 @router.get("/calibrations/{version}/pictures", summary="The pictures of a criticism")
-def pictures(
-    serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None
+async def pictures(
+    request: Request, serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None
 ) -> list[PictureResponse]:
     """Every picture that there is something to draw in, as a Plotly figure, with how to read it."""
-    return pictures_unit(service.store, serial, version, recording)
+    return await while_connected(request, service, pictures_unit, serial, version, recording)
 
 
 @router.get("/calibrations/{version}/comparison", summary="A version as it is, beside a recording")
-def comparison(
-    serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None, other_unit: OtherUnit = False
+async def comparison(
+    request: Request,
+    serial: str,
+    version: int,
+    service: ServiceDep,
+    recording: RecordingNumber = None,
+    other_unit: OtherUnit = False,
 ) -> ComparisonResponse:
     """Measured and modelled error, data set by data set, and the version's model as lines; nothing is refitted."""
-    return compare_version(service.store, serial, version, recording, other_unit=other_unit)
+    return await while_connected(request, service, compare_version, serial, version, recording, other_unit=other_unit)
 
 
 @router.get("/calibrations/{version}/surface", summary="The modelled error over rate and temperature")
-def surface(
+async def surface(
+    request: Request,
     serial: str,
     version: int,
     service: ServiceDep,
@@ -204,17 +206,21 @@ def surface(
     temperature_points: Annotated[int, Query(ge=2, le=201)] = 25,
 ) -> SurfaceResponse:
     """What the calibration takes off each axis, turned about itself, on a grid over what was calibrated."""
-    return surface_of(service.store, serial, version, rate_points, temperature_points)
+    return await while_connected(request, service, surface_of, serial, version, rate_points, temperature_points)
 
 
 @router.post("/calibrations/{version}/preview", summary="What a changed model would be")
-def preview(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> PreviewResponse:
+async def preview(
+    http: Request, serial: str, version: int, request: ImproveRequest, service: ServiceDep
+) -> PreviewResponse:
     """The same change as `improve` makes, fitted, with its errors before and after; nothing is kept."""
-    return preview_unit(service.store, serial, request.model_copy(update={"version": version}))
+    change = request.model_copy(update={"version": version})
+    return await while_connected(http, service, preview_unit, serial, change)
 
 
 @router.get("/calibrations/{version}/uncertainty", summary="How far a corrected rate may be off")
-def uncertainty(
+async def uncertainty(
+    request: Request,
     serial: str,
     version: int,
     service: ServiceDep,
@@ -223,28 +229,29 @@ def uncertainty(
     grid: Annotated[bool, Query(description="Also on a small grid over what was calibrated.")] = False,
 ) -> UncertaintyResponse:
     """GUM components of a corrected rate at one rate and temperature, and whether that was calibrated at all."""
-    return uncertainty_at(service.store, serial, version, rate_dps, temperature_c, grid=grid)
+    return await while_connected(request, service, uncertainty_at, serial, version, rate_dps, temperature_c, grid=grid)
 
 
 @router.head("/ladder", include_in_schema=False)
 @router.get("/ladder", summary="The error, version by version")
-def ladder(
+async def ladder(
+    request: Request,
     serial: str,
     service: ServiceDep,
     recording: Annotated[int | None, Query(description="Recording; default: that of the newest version.")] = None,
 ) -> LadderResponse:
     """The errors of the versions fitted to one recording, each after its parent, and the noise floor."""
-    return ladder_of(service.store, serial, recording)
+    return await while_connected(request, service, ladder_of, serial, recording)
 
 
 @command_route(router, CERTIFY, "Make a version current", dependencies=[NEEDS_APPROVER])
-def certify(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
+async def certify(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
     """Make a version the one in force: who, why, and when it is due again. An older version again is a rollback.
 
     Its verdict is kept with the act. 409 where something speaks against it, unless `override` is set and the reason is
     a sentence. Asks for an approver.
     """
-    return service.execute(CERTIFY, ToVersion(serial, version, request))
+    return await execute(service, CERTIFY, ToVersion(serial, version, request))
 
 
 @command_route(router, REVOKE, "Take a version out of force", dependencies=[NEEDS_APPROVER])

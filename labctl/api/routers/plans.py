@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 
+from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.services.planning import planner as services
 from labctl.services.schemas.plans import PlannedResponse, PlanRequest, RecipeResponse
-from labctl.services.simulation.visibility import visibility
+from labctl.services.simulation.visibility import planned
 
 router = APIRouter(prefix="/api", tags=["campaigns"])
 
@@ -22,6 +23,6 @@ def recipes(service: ServiceDep) -> list[RecipeResponse]:
 
 
 @router.post("/plans", summary="Plan a recipe")
-def plan(request: PlanRequest, service: ServiceDep) -> PlannedResponse:
+async def plan(http: Request, request: PlanRequest, service: ServiceDep) -> PlannedResponse:
     """What a campaign would do, step by step, and what it could find. Nothing moves, nothing is kept."""
-    return services.plan_steps(request, service.bench, visibility)
+    return await while_connected(http, service, planned, request, service.bench)

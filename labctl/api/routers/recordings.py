@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, UploadFile
+from fastapi import APIRouter, Query, Request, UploadFile
 from fastapi.responses import StreamingResponse
 
+from labctl.api.computation import execute, while_connected, with_files
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_RECORDING, SIMULATE_RECORDING
 from labctl.services.commands.requests import RecordingFolder
@@ -29,25 +30,27 @@ router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
 
 @command_route(router, IMPORT_RECORDING, "Import a recording")
-def import_recording(files: list[UploadFile], service: ServiceDep) -> ImportResponse:
+async def import_recording(request: Request, files: list[UploadFile], service: ServiceDep) -> ImportResponse:
     """Take in a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
     environment file, as parts of one multipart form. All of it or nothing; an error names file, column and row."""
-    return import_files(
+    return await with_files(
+        request,
+        import_files,
         [(file.filename or "", file.file) for file in files],
         lambda folder: service.execute(IMPORT_RECORDING, RecordingFolder(folder)),
     )
 
 
 @command_route(router, SIMULATE_RECORDING, "Simulate a recording")
-def simulated(request: SimulatedRequest, service: ServiceDep) -> SimulatedRecordingResponse:
+async def simulated(request: SimulatedRequest, service: ServiceDep) -> SimulatedRecordingResponse:
     """Walk through a recipe in simulation, with effects hidden in the unit, and take in what it would have given."""
-    return service.execute(SIMULATE_RECORDING, request)
+    return await execute(service, SIMULATE_RECORDING, request)
 
 
 @command_route(router, IMPORT_EXAMPLE, "Take in an example")
-def example(request: ExampleRequest, service: ServiceDep) -> ImportResponse:
+async def example(request: ExampleRequest, service: ServiceDep) -> ImportResponse:
     """Take in one of the recordings of real gyros that come with labctl."""
-    return service.execute(IMPORT_EXAMPLE, request)
+    return await execute(service, IMPORT_EXAMPLE, request)
 
 
 @router.get("", summary="All recordings")
@@ -73,7 +76,8 @@ def datasets(recording: int, service: ServiceDep) -> DataSetsResponse:
 
 
 @router.get("/{recording}/trace", summary="A channel over time")
-def trace(
+async def trace(
+    request: Request,
     recording: int,
     service: ServiceDep,
     channel: Annotated[str, Query(description="Such as gyro_x or temperature_c.", max_length=60)],
@@ -82,27 +86,29 @@ def trace(
     points: Annotated[int, Query(ge=1, le=20_000, description="At most this many bins.")] = 2000,
 ) -> TraceResponse:
     """Least, largest and mean reading of a channel in bins of equal time, only those that hold readings."""
-    return trace_of(service.store, recording, channel, from_s, until_s, points)
+    return await while_connected(request, service, trace_of, recording, channel, from_s, until_s, points)
 
 
 @router.get("/{recording}/allan", summary="Its noise at rest")
-def allan(
+async def allan(
+    request: Request,
     recording: int,
     service: ServiceDep,
     dataset: Annotated[int | None, Query(description="A data set; default: the longest stretch at rest.")] = None,
 ) -> AllanResponse:
     """The overlapping Allan deviation of each axis with 95 % intervals, and N, B and K as far as they show."""
-    return allan_unit(service.store, recording, dataset)
+    return await while_connected(request, service, allan_unit, recording, dataset)
 
 
 @router.get("/{recording}/file", summary="The recording to take away", response_class=StreamingResponse)
-def file(
+async def file(
+    request: Request,
     recording: int,
     service: ServiceDep,
     format: Annotated[Literal["parquet", "csv"], Query(description="Of its tables.")] = "parquet",  # noqa: A002
 ) -> StreamingResponse:
     """The recording in the interchange format, every reading, as one zip; it imports again."""
-    made = zip_recording(service.store, recording, format)
+    made = await with_files(request, zip_recording, service.store, recording, format)
     headers = {"Content-Disposition": f'attachment; filename="{made.name}"', "Content-Length": str(made.size)}
     return StreamingResponse(made.chunks(), media_type="application/zip", headers=headers)
 

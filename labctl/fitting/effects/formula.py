@@ -65,6 +65,16 @@ class Formula(Effect):
         names = {"table_rate_dps" if name == OWN_RATE else name for name in _names(self._tree)}
         self.draws = tuple("time" if name == "t_s" else name for name in sorted(names))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the text, which is read again."""
+        return type(self), (self.name, self.text, self.sentence)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Formula) and self.__reduce__() == other.__reduce__()
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.text))
+
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the formula's value; raises BadInput when it is not finite everywhere."""
         values = np.broadcast_to(

@@ -13,6 +13,7 @@ from labctl.services.schemas.base import ResponseModel
 
 RequestT = TypeVar("RequestT")
 ResponseT = TypeVar("ResponseT", bound=ResponseModel)
+Handler = Callable[[CommandContext, RequestT], ResponseT]
 
 
 class NoContent(ResponseModel):
@@ -35,10 +36,11 @@ class Command(Generic[RequestT, ResponseT]):
 
     method: Literal["POST", "DELETE"]
     path: str
-    handler: Callable[[CommandContext, RequestT], ResponseT]
+    handler: Handler[RequestT, ResponseT]
     responses: Mapping[int, type[ResponseT]]
     encode: Callable[[ExitStack, RequestT], Mapping[str, Any]] = json_body  #: keyword arguments of an httpx request
     newest: Newest | None = None
+    computes: bool = False  #: takes long: a service has it done by its computation; the handler is a module's function
 
     @property
     def status(self) -> int:

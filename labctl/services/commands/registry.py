@@ -122,26 +122,37 @@ IMPORT_RECORDING = Command(
     handler=_import_recording,
     responses={201: ImportResponse},
     encode=recording_files,
+    computes=True,
 )
 IMPORT_EXAMPLE = Command(
-    method="POST", path="/api/recordings/example", handler=_import_example, responses={201: ImportResponse}
+    method="POST",
+    path="/api/recordings/example",
+    handler=_import_example,
+    responses={201: ImportResponse},
+    computes=True,
 )
 SIMULATE_RECORDING = Command(
     method="POST",
     path="/api/recordings/simulated",
     handler=_simulate_recording,
     responses={201: SimulatedRecordingResponse},
+    computes=True,
 )
-FIT = Command(method="POST", path=_UNIT, handler=_fit, responses={201: FitResponse})
+FIT = Command(method="POST", path=_UNIT, handler=_fit, responses={201: FitResponse}, computes=True)
 IMPROVE = Command(
     method="POST",
     path=_UNIT + "/{version}/improve",
     handler=_improve,
     responses={201: FitResponse},
     newest=Newest("version", _UNIT, "version", otherwise=1),
+    computes=True,
 )
 CERTIFY = Command(
-    method="POST", path=_UNIT + "/{version}/certify", handler=_certify, responses={200: CertificationResponse}
+    method="POST",
+    path=_UNIT + "/{version}/certify",
+    handler=_certify,
+    responses={200: CertificationResponse},
+    computes=True,
 )
 REVOKE = Command(
     method="POST", path=_UNIT + "/{version}/revoke", handler=_revoke, responses={200: CertificationResponse}

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from labctl.errors import BadInput, LabctlError
+from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.versions import version_of
 from labctl.services.schemas.calibrations import LadderResponse, LadderRow
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
+#: Applying more versions than this to a recording takes long.
+QUICK_VERSIONS = 4
 ERRORS = ("raw_rms_dps", "rms_dps", "heldout_rms_dps", "noise_floor_dps")
 
 
@@ -69,6 +72,8 @@ def _applied_here(store: Store, others: Sequence[CalibrationRecord], recording: 
     """Return versions of other recordings, each with its error on this one; None where it cannot be applied."""
     if not others or recording is None:
         return [_step(row) for row in others]
+    if len(others) > QUICK_VERSIONS:
+        compute(UNNAMED)
     from labctl.services.criticism.measurements import Measurements  # noqa: PLC0415  loads the fit's libraries
     from labctl.services.criticism.verification import verify  # noqa: PLC0415  as above
 

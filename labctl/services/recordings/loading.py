@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData, NotFound
 from labctl.recording import Recording
 from labctl.recording.output_steps import per_reading
 from labctl.recording.points import with_pieces
 from labctl.recording.quantisation import QUANTISATION
+from labctl.services.cache import UNNAMED, compute
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.schemas.warnings import RecordingInspection
 from labctl.store import RecordingRow, Store
@@ -21,7 +25,12 @@ def points_of(store: Store, row: RecordingRow) -> Recording:
     points = store.recordings.points(row.id, head=row)
     if row.kind != "samples":
         return points
-    pieces = with_pieces(points, lambda dataset: store.recordings.dataset(row.id, dataset))
+
+    def readings(dataset: int) -> Mapping[str, NDArray[Any]]:
+        compute(UNNAMED)
+        return store.recordings.dataset(row.id, dataset)
+
+    pieces = with_pieces(points, readings)
     return _with_steps(pieces, inspect_stored(store, row))
 
 

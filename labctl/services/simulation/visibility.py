@@ -7,8 +7,11 @@ from dataclasses import asdict
 from instruments.bench_config import BenchFile
 from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.services.schemas.plans import Visibility
+from labctl.services.cache import UNNAMED, compute
+from labctl.services.planning.planner import plan_steps
+from labctl.services.schemas.plans import PlannedResponse, PlanRequest, Visibility
 from labctl.services.simulation.plan_simulation import hidden_recording
+from labctl.store import Store
 from procedures.planning.plan import Plan
 
 #: Readings per second at which a plan is walked through: its channels are slow.
@@ -26,3 +29,16 @@ def visibility(plan: Plan, bench: BenchFile) -> list[Visibility]:
     """Return every effect with its visible share and smallest detectable size on a plan, most visible first."""
     found = effect_visibilities(planned_schedule(plan, bench))
     return [Visibility(**{**asdict(one), "needs": list(one.needs)}) for one in found]
+
+
+def planned(_: Store, request: PlanRequest, bench: BenchFile | None) -> PlannedResponse:
+    """Plan a recipe on a bench, or on the simulated one that fits it best, and say what the plan could find.
+
+    Raises RecipeError, PlanRefused, BadInput.
+    """
+
+    def look(plan: Plan, on: BenchFile) -> list[Visibility]:
+        compute(UNNAMED)
+        return visibility(plan, on)
+
+    return plan_steps(request, bench, look)

@@ -1,0 +1,129 @@
+"""Computations in worker processes: one process for each, bounded in number, memory and time, ended at once.
+
+The processes come from a fork server, which has loaded the libraries once and inherits nothing that is open here: a
+worker begins in some 30 ms with no connection, no file and no lock of the service.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import threading
+from collections.abc import Sequence
+from multiprocessing import forkserver
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkServerProcess
+from typing import Any
+
+from instruments.clock import Clock
+from labctl.errors import ComputationEnded
+from labctl.progress import Cancelled
+from labctl.services.computation.in_threads import result_here
+from labctl.services.computation.job import Job
+from labctl.services.computation.limits import Limits
+from labctl.services.computation.pool import ENDS, Pool
+from labctl.services.computation.worker import Outcome, Stage, Task, carry_out
+from labctl.store import Store, StoreAddress
+
+#: `multiprocessing` looks after all processes whenever one is started: not from two threads at a time.
+_processes = threading.Lock()
+#: How long a worker that has sent its result may take to end, s.
+END_S = 5.0
+
+
+class InWorkers(Pool):
+    """Each job in a process of its own, which opens the store by its address.
+
+    Jobs that write run in this process, with its own store, until the address says how another process writes.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        limits: Limits | None = None,
+        *,
+        address: StoreAddress | None = None,
+        preload: Sequence[str] = (),
+        clock: Clock | None = None,
+    ) -> None:
+        """Start the fork server, which loads the modules of `preload` in the background."""
+        super().__init__(limits or Limits(), clock)
+        self._store = store
+        self._address = address or store.address
+        self._workers: dict[Job, ForkServerProcess] = {}
+        self._context = multiprocessing.get_context("forkserver")
+        self._context.set_forkserver_preload([*preload])
+        forkserver.ensure_running()
+
+    def _result_of(self, job: Job) -> Any:
+        if job.writes and not self._address.can_write:
+            return result_here(job, self._store)
+        task = Task(job.call, self._address, job.actor, self.limits)
+        receiving, sending = self._context.Pipe(duplex=False)
+        worker = self._context.Process(target=carry_out, args=(sending, task), name="labctl worker", daemon=True)
+        with receiving:
+            with sending, _processes:
+                worker.start()
+            self._workers[job] = worker
+            job.end_with(worker.kill)
+            try:
+                if self._closed:
+                    raise ComputationEnded(ENDS)
+                return self._heard(job, worker, receiving)
+            finally:
+                self._workers.pop(job, None)
+                self._leave_nothing(worker)
+
+    def _heard(self, job: Job, worker: ForkServerProcess, receiving: Connection) -> Any:
+        """Return what a worker sends in the end; its stages are reported on the way."""
+        deadline_s = self._clock.now_s() + self.limits.deadline_s
+        while True:
+            ready = wait([receiving, worker.sentinel], max(deadline_s - self._clock.now_s(), 0.0))
+            if not ready:
+                raise ComputationEnded(
+                    f"the computation was ended after {self.limits.deadline_s:g} s, which is all that one may take; "
+                    "ask for less at a time: a recording of fewer data sets, or fewer effects that compete"
+                )
+            try:
+                message = receiving.recv() if receiving.poll() else None
+            except (EOFError, OSError):  # it died, perhaps while it sent
+                message = None
+            if isinstance(message, Outcome):
+                return message.result()
+            if not isinstance(message, Stage):
+                raise self._died(job, worker)
+            job.report(message.text)
+
+    def _died(self, job: Job, worker: ForkServerProcess) -> Exception:
+        """Return the error of a worker that ended without a result."""
+        if job.is_abandoned:
+            return Cancelled("its clients have left")
+        if self._closed:
+            return ComputationEnded(ENDS)
+        with _processes:
+            worker.join(END_S)
+            code = worker.exitcode
+        return ComputationEnded(
+            f"the computation was ended: its process {_end_in_words(code)} before it had a result. Ask again; if it "
+            f"happens again, take a recording of fewer data sets (memory limit {self.limits.memory_mib} MiB)"
+        )
+
+    @staticmethod
+    def _leave_nothing(worker: ForkServerProcess) -> None:
+        """End a worker that has nothing more to say."""
+        worker.kill()
+        with _processes:
+            worker.join()
+
+    def _end_all(self) -> None:
+        """Kill every worker; what waits is refused by its thread."""
+        for worker in list(self._workers.values()):
+            worker.kill()
+
+
+def _end_in_words(code: int | None) -> str:
+    if code is None or code >= 0:
+        return f"ended (status {code})"
+    name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+    short = ", as the system does where memory is short" if -code == signal.SIGKILL else ""
+    return f"was killed ({name}{short})"
