@@ -127,13 +127,14 @@ class LabService:
 
     def health(self) -> dict[str, Any]:
         """Return whether the service is well."""
-        unconfirmed = any(row.unconfirmed for row in self.store.benches.all())
+        bench = self.bench_access.describe()
+        unconfirmed = any(row.unconfirmed for row in self.store.benches.all()) or bool(bench and bench["unconfirmed"])
         return {
             **self.pulse(),
             **({"status": "look at the bench"} if unconfirmed else {}),
             "database": Path(self.store.location).name,  # a folder, or a password in a URL, is not shown
             "since": self._opened_at.isoformat(),
-            "bench": self.bench_access.describe(),
+            "bench": bench,
             "schedule_trouble": self.bench_access.schedule_trouble,
         }
 
