@@ -103,6 +103,7 @@ def test_a_client_that_leaves_ends_its_worker(
         client.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
         held.wait_for_begin()
     held.wait_for_end()
+    assert service.get("/health")["status"] == "ok"
 
 
 def test_a_worker_that_dies_is_a_problem_document(service: Service, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
