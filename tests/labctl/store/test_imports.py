@@ -94,7 +94,7 @@ def test_another_writer_gets_its_turn_during_an_import(store: Store, monkeypatch
     assert max(seen.rows) <= import_parts.MOST_ROWS + BESIDE
     assert sum(seen.rows) > 80_000
     assert len(between) > 20
-    assert max(between) <= 3  # transactions of the import that came before one of the other's
+    assert max(between) <= 5  # transactions of the import that came before one of the other's
 
 
 def test_parts_are_bounded_in_bytes(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
