@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive, Scope, Send
 
 from instruments.clock import WallClock
@@ -40,7 +41,9 @@ def service(tmp_path: Path) -> Iterator[LabService]:
         yield LabService(store, WallClock())
 
 
-async def answer(middleware: AccessMiddleware, method: str, path: str, key: str = "", reserved: bool = True) -> Any:
+async def answer(
+    middleware: AccessMiddleware, method: str, path: str, key: str = "", reserved: bool = False, body: int = 0
+) -> Any:
     """Return status and headers of the answer to a request."""
     headers = [(b"authorization", f"Bearer {key}".encode())] if key else []
     scope = {
@@ -53,7 +56,7 @@ async def answer(middleware: AccessMiddleware, method: str, path: str, key: str 
         sent.append(message)
 
     async def receive() -> Message:
-        return {"type": "http.request", "body": b"", "more_body": False}
+        return {"type": "http.request", "body": b"x" * body, "more_body": False}
 
     await middleware(scope, receive, send)
     return sent[0]["status"], dict(sent[0]["headers"])
@@ -89,6 +92,31 @@ def test_the_reserve_is_for_operators_who_act(
     found, headers = asyncio.run(ask(True))
     assert (found, headers.get(b"retry-after")) == (status, b"5" if status == 503 else None)
     assert asyncio.run(ask(False))[0] == (200 if status == 503 else status)
+
+
+class ReadingApp(WaitingApp):
+    """Reads one piece of a body, then waits."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await receive()
+        await super().__call__(scope, receive, send)
+
+
+def test_bodies_are_bounded_in_all(service: LabService) -> None:
+    async def ask() -> None:
+        app = ReadingApp()
+        middleware = AccessMiddleware(app, service, AccessPolicy(held_bytes=1000))
+        first = [asyncio.ensure_future(answer(middleware, "POST", "/api/plans", body=500)) for _ in range(2)]
+        await asyncio.sleep(0)  # each has begun
+        with pytest.raises(HTTPException) as refused:
+            await answer(middleware, "POST", "/api/plans", body=500)
+        assert (refused.value.status_code, refused.value.headers) == (503, {"Retry-After": "5"})
+        app.go.set()
+        assert {status for status, _ in await asyncio.gather(*first)} == {200}
+        for _ in range(5):
+            assert (await answer(middleware, "POST", "/api/plans", body=500))[0] == 200
+
+    asyncio.run(ask())
 
 
 def test_few_recordings_come_at_once(service: LabService) -> None:
