@@ -36,6 +36,7 @@ class AccessPolicy:
     hosts: frozenset[str] | None = None
     body_bytes: int = MIB
     upload_bytes: int = 2048 * MIB
+    held_bytes: int = 64 * MIB  #: of bodies that are held in memory for all requests together
 
     def largest_body(self, path: str) -> int:
         """Return the largest body of a request to a path, in bytes."""

@@ -134,6 +134,6 @@ class ConnectionTable:
         """Compare times; not right after the loop stood still, when what clients have sent is not read yet."""
         now = loop.time()
         self._late = not self._late and now - due > self.limits.look_s
+        self._look_later(loop)
         for each in () if self._late else tuple(self._all):
             each.check(now)
-        self._look_later(loop)

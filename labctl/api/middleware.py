@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from urllib.parse import unquote
 
 from starlette.datastructures import Headers
@@ -31,6 +32,7 @@ class AccessMiddleware:
         self._service = service
         self._access = access
         self._uploads = 0
+        self._held = _Held(access.held_bytes)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer it with a problem document."""
@@ -43,7 +45,8 @@ class AccessMiddleware:
         try:
             caller = self._admit(scope)
             uploads = self._refuse_crowd(scope)
-            bounded = _bounded(receive, _declared(scope), self._access.largest_body(scope["path"]))
+            largest = self._access.largest_body(scope["path"])
+            body = _BoundedBody(receive, _declared(scope), largest, None if uploads else self._held)
         except LabctlError as error:
             await as_problem(error, scope["path"])(scope, receive, send)
             return
@@ -51,9 +54,10 @@ class AccessMiddleware:
         self._uploads += uploads
         try:
             with acting(Actor(caller.name, caller.via) if caller else Actor("nobody")):
-                await self._app(scope, bounded, send)
+                await self._app(scope, body, send)
         finally:
             self._uploads -= uploads
+            body.release()
 
     def _refuse_crowd(self, scope: Scope) -> bool:
         """Return whether a request uploads files. Raises Overloaded where it has to wait for others.
@@ -129,19 +133,43 @@ def _declared(scope: Scope) -> int:
     return int(text) if text.isascii() and text.isdigit() else 0
 
 
-def _bounded(receive: Receive, declared: int, limit: int) -> Receive:
-    """Return a `receive` that passes on at most `limit` bytes of body. Raises TooLarge for more, declared or sent."""
-    text = f"the request's body is larger than {limit} bytes, which is all that is taken here"
-    if declared > limit:
-        raise TooLarge(text)
-    taken = 0
+@dataclass
+class _Held:
+    """Bytes of bodies in memory, and how many there may be."""
 
-    async def bounded() -> Message:
-        nonlocal taken
-        message = await receive()
-        taken += len(message.get("body", b""))
-        if taken > limit:
-            raise HTTPException(TooLarge.status, text)  # the one kind that passes the framework's body reader
+    limit: int
+    now: int = 0
+
+
+class _BoundedBody:
+    """A `receive` that passes on at most `limit` bytes of body, counted among what is `held` until it is released.
+
+    Without `held` the body goes to the disk. Raises TooLarge for a body declared larger.
+    """
+
+    def __init__(self, receive: Receive, declared: int, limit: int, held: _Held | None) -> None:
+        self._receive, self._limit, self._held = receive, limit, held
+        self._text = f"the request's body is larger than {limit} bytes, which is all that is taken here"
+        self._taken = 0
+        if declared > limit:
+            raise TooLarge(self._text)
+
+    async def __call__(self) -> Message:
+        """Return the next piece. Raises HTTPException, the one kind that passes the framework's body reader."""
+        message = await self._receive()
+        size = len(message.get("body", b""))
+        self._taken += size
+        if self._held is not None:
+            self._held.now += size
+        if self._taken > self._limit:
+            raise HTTPException(TooLarge.status, self._text)
+        if self._held is not None and size and self._held.now > self._held.limit:
+            text = f"bodies of {self._held.limit} bytes are being sent already; send this one again in a moment"
+            raise HTTPException(Overloaded.status, text, {"Retry-After": str(Overloaded.retry_after_s)})
         return message
 
-    return bounded
+    def release(self) -> None:
+        """Count the body no more."""
+        if self._held is not None:
+            self._held.now -= self._taken
+        self._taken = 0
