@@ -74,25 +74,31 @@ class Database:
         try:
             if write and self._sqlite and not Path(location).exists():
                 self._refuse_loss(None)
-            if write and self._sqlite:
-                self._make_private()
+            self._make_private()
             self._engine = make_engine(location, write=write)
             if not as_it_is:
                 self._migrate(write=write)
             #: Reading has connections of its own: it neither waits for the writer nor makes it wait.
             self._reader = make_engine(location, write=False) if write and self._sqlite else self._engine
-            if write and self._sqlite:
-                self._make_private()
-                self._identity = identity = FileIdentity(location)
-                sa.event.listen(self._engine, "connect", lambda *_: identity.forget_log())
+            self._make_private()
+            self._remember_files()
         except BaseException:
             self._release()
             raise
 
     def _make_private(self) -> None:
         """Give the files of the database to their owner alone; SQLite makes its log as it finds the database."""
+        if self._lock is None:
+            return
         make_private(Path(self.location))
         close_to_others(*(Path(f"{self.location}{end}") for end in ("", "-wal", "-shm", ".lock", ".seal")))
+
+    def _remember_files(self) -> None:
+        if self._lock is None:
+            return
+        self._identity = identity = FileIdentity(self.location)
+        for event in ("connect", "close"):  # an interrupt inside a write opens the connection anew
+            sa.event.listen(self._engine, event, lambda *_: identity.forget_log())
 
     def _migrate(self, *, write: bool) -> None:
         try:
@@ -199,6 +205,7 @@ class Database:
 
     def close(self) -> None:
         """Close the database and let the next writer in."""
+        self._identity = None  # the log goes with the last connection
         self._reader.dispose()
         self._engine.dispose()
         self._release()

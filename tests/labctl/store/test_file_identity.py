@@ -65,6 +65,17 @@ def test_nothing_is_written_into_a_file_that_is_gone(location: str, lose: Callab
                 store.audit.rows()
 
 
+def test_a_connection_that_an_interrupt_closed_is_opened_anew_with_its_log(location: str) -> None:
+    with open_store(location, write=True) as store:
+        record(store)
+        connection = store.audit._database._engine.connect()
+        connection.invalidate()
+        connection.close()
+        assert store.audit.rows()
+        record(store)
+        assert len(store.audit.rows()) == 2
+
+
 def test_a_file_that_is_put_back_is_written_to_again(location: str) -> None:
     path = Path(location)
     with open_store(location, write=True) as store:
