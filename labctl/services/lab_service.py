@@ -12,9 +12,11 @@ from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.acting_user import ITSELF, acting
 from labctl.errors import StoreError
+from labctl.services.benches.start_confirmation import start_questions
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.execution import describe_safe_state
+from labctl.services.campaigns.resumability import NO_BENCH, with_resume
 from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses_of
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
@@ -26,6 +28,8 @@ from labctl.services.schemas.campaigns import (
 )
 from labctl.store import Store
 from procedures.execution.signals import shutdown_hook
+
+VERSION = version("labctl")
 
 
 class LabService:
@@ -98,14 +102,19 @@ class LabService:
 
     def benches(self) -> list[dict[str, Any]]:
         """Describe the bench of this service."""
-        return [] if self.bench_runner is None else [self.bench_runner.describe()]
+        if self.bench_runner is None:
+            return []
+        return [{**self.bench_runner.describe(), "start_questions": start_questions(self.bench_runner.bench)}]
 
     def status(self, campaign: int) -> CampaignResponse:
         """Return where a campaign is: live when it runs here, else as the database tells."""
-        if (live := self._live(campaign)) is not None:
-            return live
-        row = self.store.campaigns.get(campaign)
-        return mark_abandoned(from_rows(self.store, row), attended=self._runs(campaign))
+        answer = self._live(campaign)
+        if answer is None:
+            row = self.store.campaigns.get(campaign)
+            answer = mark_abandoned(from_rows(self.store, row), attended=self._runs(campaign))
+        if self.bench_runner is None:
+            return answer.model_copy(update={"resumable": False, "resume_reason": NO_BENCH})
+        return with_resume(self.store, answer, self.bench_runner.bench, self.bench_runner.running)
 
     def _live(self, campaign: int) -> CampaignResponse | None:
         return None if self.bench_runner is None else self.bench_runner.status(campaign)
@@ -124,7 +133,11 @@ class LabService:
 
     def pulse(self) -> dict[str, Any]:
         """Return what a caller without a key may know: that the service answers, and its version."""
-        return {"status": "ok", "version": version("labctl")}
+        return {"status": "ok", "version": VERSION}
+
+    def heartbeat(self) -> dict[str, Any]:
+        """Return what every open page asks once a second: that the service answers, and since when; no database."""
+        return {**self.pulse(), "since": self._opened_at.isoformat()}
 
     def health(self) -> dict[str, Any]:
         """Return whether the service is well."""
