@@ -50,5 +50,5 @@ def _refusal(store: Store, answer: CampaignResponse, bench: BenchFile | None, ru
     if running is not None:
         return f"campaign {running} runs on bench {name} now; it has to end first"
     if text := store.benches.unconfirmed(name):
-        return f"bench {name} was not confirmed safe: {text}; look at it first"
+        return f"the safe state of bench {name} is not confirmed ({text}); look at it first"
     return ""
