@@ -136,8 +136,8 @@ class LabService:
         return {"status": "ok", "version": VERSION}
 
     def heartbeat(self) -> dict[str, Any]:
-        """Return what every open page asks once a second: that the service answers, and since when; no database."""
-        return {**self.pulse(), "since": self._opened_at.isoformat()}
+        """Return what every open page asks once a second: that the service answers; reads no database."""
+        return self.pulse()
 
     def health(self) -> dict[str, Any]:
         """Return whether the service is well."""

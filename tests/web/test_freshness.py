@@ -53,7 +53,8 @@ def expect_stale(page: Page) -> None:
 
     expect(page.locator("[data-freshness]")).to_contain_text("Stale.", timeout=STALE_MS)
     expect(page.get_by_text(FREE)).not_to_be_visible(timeout=1)
-    expect(page.get_by_text("Not known now")).to_be_visible(timeout=1)
+    expect(page.get_by_text("Nothing runs")).not_to_be_visible(timeout=1)
+    expect(page.get_by_text("Not known now").first).to_be_visible(timeout=1)
     text: str = page.evaluate("() => getComputedStyle(document.documentElement).getPropertyValue('--text').trim()")
     assert colour(page) == text
 
@@ -83,9 +84,20 @@ def test_a_network_that_is_gone_is_stale_within_5_s(idle: Page) -> None:
 
 
 def test_a_bench_process_that_is_not_heard_is_stale_though_the_service_answers(idle: Page) -> None:
-    idle.route(f"**{HEARTBEAT}", lambda asked: asked.fulfill(json={"status": "ok", "since": "x", "heard_s": 12.0}))
+    idle.route(f"**{HEARTBEAT}", lambda asked: asked.fulfill(json={"status": "ok", "heard_s": 12.0}))
     expect_stale(idle)
     assert "Bench last heard 12 s ago" in idle.locator("[data-freshness]").inner_text()
+
+
+def test_a_service_that_answers_but_refuses_what_the_page_shows_is_stale(idle: Page) -> None:
+    from playwright.sync_api import expect
+
+    refusal = {"title": "The database cannot be used", "detail": "the database is locked", "status": 503}
+    idle.route("**/api/benches", lambda asked: asked.fulfill(status=503, json=refusal))
+    expect(idle.locator("[data-freshness]")).to_contain_text("the database is locked")
+    expect_stale(idle)
+    idle.unroute("**/api/benches")
+    expect(idle.get_by_text(FREE)).to_be_visible()
 
 
 def test_a_page_asks_once_a_second_and_not_while_its_tab_is_hidden(visit: Callable[..., Page], faults: Faults) -> None:

@@ -20,7 +20,7 @@ def health(service: ServiceDep, request: Request) -> dict[str, Any]:
 
 @router.get("/health/heartbeat", summary="Does the service answer?")
 async def heartbeat(service: ServiceDep) -> dict[str, Any]:
-    """Whether the service answers, and since when it does: what every open page asks once a second.
+    """Whether the service answers: what every open page asks once a second.
 
     No key is asked for and no database is read. `heard_s`, where it is there: how long the bench was not heard.
     """

@@ -18,6 +18,31 @@ app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on 
 
 Recipe = Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")]
 Clip = Annotated[bool, typer.Option("--clip", help="Leave out points beyond the bench or a unit, and say which.")]
+Speed = Annotated[
+    float | None,
+    typer.Option("--speed", metavar="X", help="A simulated bench, X times as fast; default: as fast as it can."),
+]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the simulated bench.")]
+At = Annotated[
+    str | None, typer.Option("--at", metavar="TIME", help="Begin then: 2026-03-28T22:00, or now: when it is free.")
+]
+Cron = Annotated[str | None, typer.Option("--cron", metavar="LINE", help="Begin again and again: '30 22 * * FRI'.")]
+TimeZone = Annotated[
+    str | None, typer.Option("--time-zone", metavar="NAME", help="Of TIME and LINE; default: the local one.")
+]
+Priority = Annotated[int | None, typer.Option("--priority", metavar="N", help="The highest goes first; default: 0.")]
+LateLimit = Annotated[
+    float | None,
+    typer.Option("--late-limit-s", metavar="S", help="Later it is not begun; 0 skips a missed start."),
+]
+ClearConfirmedBy = Annotated[
+    str | None,
+    typer.Option(
+        "--clear-confirmed-by",
+        metavar="NAME",
+        help="Of a real bench: NAME confirms chamber clear, table free, limiter on. Default: asked here.",
+    ),
+]
 
 
 @app.command("plan")
@@ -51,35 +76,14 @@ def start(
     recipe: Recipe,
     bench: BenchName = None,
     clip: Clip = False,
-    speed: Annotated[
-        float | None,
-        typer.Option("--speed", metavar="X", help="A simulated bench, X times as fast; default: as fast as it can."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the simulated bench.")] = None,
-    at: Annotated[
-        str | None, typer.Option("--at", metavar="TIME", help="Begin then: 2026-03-28T22:00, or now: when it is free.")
-    ] = None,
-    cron: Annotated[
-        str | None, typer.Option("--cron", metavar="LINE", help="Begin again and again: '30 22 * * FRI'.")
-    ] = None,
-    time_zone: Annotated[
-        str | None, typer.Option("--time-zone", metavar="NAME", help="Of TIME and LINE; default: the local one.")
-    ] = None,
-    priority: Annotated[
-        int | None, typer.Option("--priority", metavar="N", help="The highest goes first; default: 0.")
-    ] = None,
-    late_limit_s: Annotated[
-        float | None,
-        typer.Option("--late-limit-s", metavar="S", help="Later it is not begun; 0 skips a missed start."),
-    ] = None,
-    clear_confirmed_by: Annotated[
-        str | None,
-        typer.Option(
-            "--clear-confirmed-by",
-            metavar="NAME",
-            help="Of a real bench: NAME confirms chamber clear, table free, limiter on. Default: asked here.",
-        ),
-    ] = None,
+    speed: Speed = None,
+    seed: Seed = None,
+    at: At = None,
+    cron: Cron = None,
+    time_zone: TimeZone = None,
+    priority: Priority = None,
+    late_limit_s: LateLimit = None,
+    clear_confirmed_by: ClearConfirmedBy = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:

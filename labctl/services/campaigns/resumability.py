@@ -47,7 +47,7 @@ def _refusal(store: Store, answer: CampaignResponse, bench: BenchFile | None, ru
     name = answer.bench if bench is None else bench.name
     if bench is not None and {gyro.serial for gyro in bench.gyros} != set(answer.recordings):
         return f"bench {name} carries other units than the campaign measures"
-    if running is not None:
+    if running not in {None, answer.id}:  # its own end is being written: by the time of a resume it is over
         return f"campaign {running} runs on bench {name} now; it has to end first"
     if text := store.benches.unconfirmed(name):
         return f"the safe state of bench {name} is not confirmed ({text}); look at it first"

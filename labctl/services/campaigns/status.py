@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import timedelta
-from typing import Any, Literal
+from typing import Literal
 
-from instruments.bench_config import BenchFile, is_simulated_address
+from instruments.bench_config import BenchFile
+from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.campaigns.advice import advice_of
 from labctl.services.schemas.campaigns import CampaignResponse, EventResponse, OutputResponse, PromptResponse
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
@@ -48,15 +49,6 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
         simulated_time=has_simulated_time(row.bench),
         advice=advice_of(state, progress.reason),
     )
-
-
-def has_simulated_time(bench: Mapping[str, Any]) -> bool:
-    """Return whether a bench, as its file says it, keeps a simulated clock instead of the wall's."""
-    if (bench.get("simulation") or {}).get("control"):  # simulators in another process set the pace
-        return True
-    devices = [bench["table"], bench["chamber"], *bench["gyros"]]
-    links = [link for device in devices for key in ("port", "host") if (link := device.get(key)) is not None]
-    return all(is_simulated_address(link) for link in links)
 
 
 def _open_request(request: ControlRequest, state: str) -> Literal["pause", "abort"] | None:

@@ -27,8 +27,8 @@ from procedures.contracts.journal import NOT_SAFE
 from procedures.contracts.operator import HumanOperator
 from procedures.monitoring.guards import CHECKS, Guards
 from procedures.recipe.rules import GuardRules
+from tests.helpers.guard_trips import TRIPS, WELL
 from tests.helpers.waiting import wait_until
-from tests.procedures.monitoring.test_guards import TRIPS, WELL
 
 
 def happened(reason: str) -> str:

@@ -1,6 +1,6 @@
 // A bench without a running campaign: the last campaign, the next scheduled one, and how to start.
 
-import { h } from "../core/elements.js";
+import { h, uniqueId } from "../core/elements.js";
 import { percent } from "../core/format.js";
 import { card, factList, notice } from "../core/components.js";
 import { presentWords } from "../core/freshness.js";
@@ -19,15 +19,21 @@ export function noBenchCard() {
     h("div", { class: "row" }, linkButton("To the recordings", "/recordings")));
 }
 
+/** A card whose heading speaks of the present, and is another one while the page is stale. */
+function presentCard(fresh, stale, ...children) {
+  const id = uniqueId("present");
+  return h("section", { class: "card stack", "aria-labelledby": id }, h("h2", { id }, presentWords(fresh, stale)), ...children);
+}
+
 /** `next` is the next entry of the schedule, `last` the newest campaign; either may be undefined. */
 export function idleBench(bench, last, next) {
   return h("div", { class: "columns", style: "--column-min: 17rem" },
-    card("Nothing runs",
+    presentCard("Nothing runs", "State of the bench",
       h("p", {}, bench.unconfirmed ? "No campaign starts before the bench was looked at." : presentWords(`${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`)),
       h("div", { class: "row" }, linkButton("Plan a campaign", "/campaigns/new", "primary"), linkButton("All campaigns", "/campaigns"))),
     card("Next on the schedule", next
       ? [h("p", { class: "lead" }, startTime(next)), h("p", { class: "muted" }, `${next.recipe} on ${next.bench}`, next.cron ? [", then again: ", h("code", {}, next.cron)] : null), attendanceNotice(next.attendance)]
-      : h("p", { class: "muted" }, "Nothing is scheduled.")),
+      : h("p", { class: "muted" }, presentWords("Nothing is scheduled."))),
     last ? card(`Last: campaign ${last.id}`,
       h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),
       factList([["Ended", last.ended_at ? campaignInstant(last, last.ended_at) : "not", "", durationTaken(last)], ["Progress", percent(last.progress)]]),

@@ -13,7 +13,7 @@ const BENCH_STALE_S = 5;
 const PATH = "/health/heartbeat";
 
 const now = () => performance.now();
-let [heard, heardAt, bench, asking, askedAt, paused, since, state] = [null, null, null, false, -ASK_MS, false, null, null];
+let [heard, heardAt, bench, asking, askedAt, paused, state] = [null, null, null, false, -ASK_MS, false, null];
 
 const elapsed = () => (heard === null ? null : (now() - heard) / 1000);
 
@@ -23,10 +23,8 @@ async function ask() {
     const response = await fetch(PATH, { cache: "no-store", signal: AbortSignal.timeout(PATIENCE_MS) });
     if (!response.ok) return;
     const answer = await response.json();
-    const restarted = since !== null && answer.since !== since;
-    [heard, heardAt, since] = [now(), new Date(), answer.since];
+    [heard, heardAt] = [now(), new Date()];
     bench = Number.isFinite(answer.heard_s) ? { heard_s: answer.heard_s, at: now() } : null;
-    if (restarted) window.dispatchEvent(new CustomEvent("labctl:restarted"));
   } catch {
     // not heard: the time since the last answer grows
   } finally {
@@ -71,7 +69,8 @@ export function setTrouble(why = "") {
 
 function draw() {
   const found = stateNow();
-  setChildren(text, words(found));
+  const said = words(found);
+  if (text.textContent !== said.map((word) => word.textContent ?? word).join("")) setChildren(text, said);
   if (found === state) return;
   const before = state;
   state = found;
@@ -104,6 +103,5 @@ export function freshnessLine() {
   return h("div", { class: "freshness", "data-freshness": "" }, text, announcement);
 }
 
-/** Words about the present that are only shown while the page is fresh; on a stale page it says that it is not known. */
-export const presentWords = (...children) => h("span", { class: "present" }, h("span", { class: "present-fresh" }, ...children),
-  h("span", { class: "present-stale" }, "Not known now: the bench or the service is not heard."));
+/** Words about the present that are only shown while the page is fresh; a stale page says instead that it is not known. */
+export const presentWords = (fresh, stale = "Not known now: the bench or the service is not heard.") => h("span", { class: "present" }, h("span", { class: "present-fresh" }, fresh), h("span", { class: "present-stale" }, stale));
