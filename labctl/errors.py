@@ -79,9 +79,9 @@ class StartNotConfirmed(BadInput):
     status = 422
     slug = "start-not-confirmed"
 
-    def __init__(self, text: str, questions: Mapping[str, str]) -> None:
+    def __init__(self, text: str, questions: Mapping[str, str] | None = None) -> None:
         super().__init__(text)
-        self.questions = dict(questions)
+        self.questions = dict(questions or {})
 
     @property
     def members(self) -> Mapping[str, Any]:

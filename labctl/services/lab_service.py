@@ -112,9 +112,10 @@ class LabService:
         if answer is None:
             row = self.store.campaigns.get(campaign)
             answer = mark_abandoned(from_rows(self.store, row), attended=self._runs(campaign))
-        if self.bench_runner is None:
+        runner = self.bench_runner
+        if runner is None:
             return answer.model_copy(update={"resumable": False, "resume_reason": NO_BENCH})
-        return with_resume(self.store, answer, self.bench_runner.bench, self.bench_runner.running)
+        return with_resume(self.store, answer, runner.bench, lambda: runner.running)
 
     def _live(self, campaign: int) -> CampaignResponse | None:
         return None if self.bench_runner is None else self.bench_runner.status(campaign)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from instruments.bench_config import BenchFile
 from labctl.services.campaigns.status import ENDED
 from labctl.services.schemas.campaigns import CampaignResponse
@@ -19,25 +21,34 @@ def retries_exhausted(standing: ResumePoint) -> str | None:
     return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
 
 
+def _nothing() -> None:
+    """Nothing runs on the bench."""
+
+
 def with_resume(
-    store: Store, answer: CampaignResponse, bench: BenchFile | None = None, running: int | None = None
+    store: Store,
+    answer: CampaignResponse,
+    bench: BenchFile | None = None,
+    running: Callable[[], int | None] = _nothing,
 ) -> CampaignResponse:
     """Return the status with `resumable` and `resume_reason`.
 
-    `bench` is where it would be resumed, by default the campaign's own; `running` is the campaign that runs there.
+    `bench` is where it would be resumed, by default the campaign's own; `running` returns the campaign that runs there.
     """
     resumable, reason = _standing(store, answer, bench, running)
     return answer.model_copy(update={"resumable": resumable, "resume_reason": reason})
 
 
-def _standing(store: Store, answer: CampaignResponse, bench: BenchFile | None, running: int | None) -> tuple[bool, str]:
+def _standing(
+    store: Store, answer: CampaignResponse, bench: BenchFile | None, running: Callable[[], int | None]
+) -> tuple[bool, str]:
     if answer.state == "paused" and not answer.abandoned:
         return True, ""
     if answer.state == "done":
         return False, "it is done"
     if answer.state not in ENDED | {"interrupted"} and not answer.abandoned:
         return False, f"it is {answer.state}"
-    if refused := _refusal(store, answer, bench, running):
+    if refused := _refusal(store, answer, bench, running()):
         return False, refused
     return True, retries_exhausted(store.resume_points.of_campaign(answer.id)) or ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,7 +15,7 @@ from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
 from labctl.cli import terminal_operator
 from labctl.errors import StartNotConfirmed
-from labctl.services.benches.start_confirmation import start_questions
+from labctl.services.benches.start_confirmation import confirmation_text, start_questions
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run_here
 from labctl.services.planning.loading import load_bench
@@ -26,6 +27,7 @@ from labctl.store.repositories.scheduled_starts import NewStart
 from tests.helpers.service import open_client
 
 BENCH = load_bench("single-axis-sim")
+REAL_TABLE = BENCH.table.model_copy(update={"port": "/dev/ttyUSB0"})
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 CONFIRMED: dict[str, Any] = {"confirmed_by": "Ann", "checks": list(BENCH_CHECKS)}
 TEXT = "chamber clear, table free, limiter on: confirmed by Ann"
@@ -182,6 +184,13 @@ def test_only_three_times_yes_and_a_name_is_a_confirmation(
     monkeypatch.setattr(terminal_operator.sys, "stdin", terminal)
     monkeypatch.setattr(terminal_operator.termios, "tcflush", lambda *_: None)
     assert terminal_operator.ask_bench_clear(dict.fromkeys(BENCH_CHECKS, "Is it?")) == by
+
+
+def test_a_refusal_keeps_its_questions_on_the_way_between_processes() -> None:
+    with pytest.raises(StartNotConfirmed) as refused:
+        confirmation_text(BENCH.model_copy(update={"table": REAL_TABLE}), CampaignRequest(recipe="short"))
+    copy = pickle.loads(pickle.dumps(refused.value))
+    assert (str(copy), copy.questions) == (str(refused.value), refused.value.questions)
 
 
 def test_an_unknown_check_is_refused_by_name(tmp_path: Path) -> None:

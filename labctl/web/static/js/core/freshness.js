@@ -9,7 +9,7 @@ const PATIENCE_MS = 2500;
 export const STALE_MS = 4000;
 const DRAW_MS = 250;
 /** A bench process that was not heard for longer is not known to be what the page shows. */
-const BENCH_STALE_S = 5;
+const BENCH_STALE_S = 3.5;
 const PATH = "/health/heartbeat";
 
 const now = () => performance.now();
