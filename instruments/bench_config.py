@@ -141,6 +141,12 @@ class BenchFile(Strict):
         """Whether any instrument is reached by sim://."""
         return any(is_simulated_address(link) for link in self._links())
 
+    @property
+    def needs_person(self) -> bool:
+        """Whether a person turns and switches the units: no simulated unit handler does."""
+        remote = self.simulation is not None and self.simulation.control is not None
+        return not self.has_simulated and not remote
+
     def _links(self) -> list[str]:
         links = [self.table.port, self.chamber.port, self.chamber.host, *(g.port or g.host for g in self.gyros)]
         return [link for link in links if link is not None]

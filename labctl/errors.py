@@ -3,6 +3,7 @@
 LabctlError              exit 2, HTTP 400
 ├── BadInput             a file, an option or a request is wrong; nothing was changed
 │   ├── BadRecording     in a recording: names file, column, row and what was expected
+│   ├── StartNotConfirmed    a real bench starts only after a person has confirmed that it is clear   HTTP 422
 │   ├── DataRefused      the data are certainly wrong, or a fit makes them worse     HTTP 422
 │   ├── BadBench         in a bench file
 │   └── BadCalibrationFile   edited, truncated or of an unknown format
@@ -73,6 +74,25 @@ class DataRefused(BadInput):
     def members(self) -> Mapping[str, Any]:
         """The warnings."""
         return {"warnings": self.warnings}
+
+
+class StartNotConfirmed(BadInput):
+    """A real bench starts only after a person has confirmed that it is clear; nothing has moved.
+
+    `questions`: what is still to be confirmed, check -> question.
+    """
+
+    status = 422
+    slug = "start-not-confirmed"
+
+    def __init__(self, text: str, questions: Mapping[str, str] | None = None) -> None:
+        super().__init__(text)
+        self.questions = dict(questions or {})
+
+    @property
+    def members(self) -> Mapping[str, Any]:
+        """The questions that are open."""
+        return {"questions": self.questions}
 
 
 class BadBench(BadInput):

@@ -93,7 +93,8 @@ def kill_once(folder: Path, bench: Path, after_s: float) -> Heir:
     """Kill a campaign after so many seconds, let the next process take it up, and look at what is there then."""
     recipe = folder / "killed.toml"
     recipe.write_text(RECIPE)
-    with labctl(folder, "campaign", "start", str(recipe), "--bench", str(bench)) as first:
+    start = ("start", str(recipe), "--clear-confirmed-by", "the study")  # what is far is not known to be simulated
+    with labctl(folder, "campaign", *start, "--bench", str(bench)) as first:
         with suppress(subprocess.TimeoutExpired):
             first.wait(after_s)
         first.send_signal(signal.SIGKILL)
@@ -103,7 +104,7 @@ def kill_once(folder: Path, bench: Path, after_s: float) -> Heir:
     database.close()
     answer = _status(folder)
     if answer is None or answer["state"] != "done":
-        verb = ("resume",) if answer is not None else ("start", str(recipe))
+        verb = ("resume",) if answer is not None else start
         with labctl(folder, "campaign", *verb, "--bench", str(bench)) as heir:
             said, complaint = heir.communicate(timeout=300)
         answer = json.loads(said) if said else {"state": "none", "reason": complaint}

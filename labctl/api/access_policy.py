@@ -14,8 +14,8 @@ LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Where computing begins; everything else that is read is a file or a few figures.
 API = "/api/"
-#: Answered without a key: a load balancer asks it.
-OPEN = frozenset({"/health"})
+#: Answered without a key: a load balancer asks the first, every open page the second.
+OPEN = frozenset({"/health", "/health/heartbeat"})
 #: Queries that are sent by POST because of what they carry: nothing changes, so a viewer may.
 ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview")
 _ASKED = re.compile("|".join(re.sub(r"{\w+}", "[^/]+", path) for path in ASKING))

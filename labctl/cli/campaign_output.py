@@ -10,7 +10,7 @@ from labctl.cli.output import console, format_number, print_json, table
 
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse
-    from labctl.services.schemas.plans import PlanResponse
+    from labctl.services.schemas.plans import AttendanceResponse, PlanResponse
     from labctl.services.schemas.schedule import ScheduledResponse
 
 
@@ -20,6 +20,9 @@ def print_plan(answer: PlanResponse) -> None:
     console.print(f"  {answer.datasets} data sets in {answer.steps} steps, about {hours(answer.expected_s)}")
     for left_out in answer.clipped:
         console.print(f"  left out: {left_out}", style="yellow", markup=False)
+    if answer.attendance is not None:
+        console.print(f"  begun now it {answer.attendance.text}", markup=False)
+        _print_warning(answer.attendance)
     if answer.visibility is None:
         return
     rows = table("\nwhat this plan could find", "effect", "visible share", "from size", "unit", numbers=3)
@@ -33,6 +36,11 @@ def print_plan(answer: PlanResponse) -> None:
             why = f"no channel {', '.join(line.needs)}" if line.why == "channel" else "the schedule"
             hidden.add_row(line.effect, why, line.experiment)
     console.print(hidden)
+
+
+def _print_warning(attendance: AttendanceResponse) -> None:
+    if attendance.warning:
+        console.print(f"  at night: {attendance.warning}", style="yellow", markup=False, soft_wrap=True)
 
 
 def hours(seconds: float) -> str:
@@ -69,7 +77,8 @@ def print_campaign(answer: CampaignResponse) -> None:
         markup=False,
     )
     if answer.expected_end and answer.state in {"running", "paused", "waiting"}:
-        console.print(f"  expected end {answer.expected_end:%Y-%m-%d %H:%M} UTC")
+        clock = "simulated time" if answer.simulated_time else "UTC"
+        console.print(f"  expected end {answer.expected_end:%Y-%m-%d %H:%M} {clock}")
     if answer.chamber_c is not None:
         console.print(
             f"  chamber {format_number(answer.chamber_c)} deg C, gyro {format_number(answer.gyro_c)} deg C, "
@@ -87,8 +96,20 @@ def print_campaign(answer: CampaignResponse) -> None:
         console.print(f"  last fault: {answer.last_error}", style="red", markup=False)
     if answer.unrecorded:
         console.print(f"  {answer.unrecorded}", style="red", markup=False)
+    _print_advice(answer)
     for serial, recording in answer.recordings.items():
         console.print(f"  recording {recording}: {serial}", markup=False)
+
+
+def _print_advice(answer: CampaignResponse) -> None:
+    """Print a failure in words, and whether the campaign may be resumed."""
+    if answer.advice is not None:
+        console.print(f"  what happened: {answer.advice.happened}", markup=False, soft_wrap=True)
+        console.print(f"  what labctl did: {answer.advice.done}", markup=False, soft_wrap=True)
+        console.print(f"  what to do next: {answer.advice.next}", markup=False, soft_wrap=True)
+    if answer.state in {"failed", "aborted", "interrupted"} and answer.resume_reason:
+        word = "resume with care" if answer.resumable else "not resumable"
+        console.print(f"  {word}: {answer.resume_reason}", style="yellow", markup=False, soft_wrap=True)
 
 
 def print_start(answer: ScheduledResponse) -> None:
@@ -97,6 +118,11 @@ def print_start(answer: ScheduledResponse) -> None:
     if answer.due_at is not None:
         again = f", again by cron line {answer.cron!r}" if answer.cron else ""
         console.print(f"  begins {answer.due_at:%Y-%m-%d %H:%M %z} ({answer.time_zone}){again}", markup=False)
+    if answer.confirmed_by:
+        console.print(f"  {answer.confirmed_by} confirmed that the bench will be clear", markup=False)
+    if answer.attendance is not None:
+        console.print(f"  {answer.attendance.text}", markup=False, soft_wrap=True)
+        _print_warning(answer.attendance)
     for event in answer.history:
         console.print(f"  due {event.due_at:%Y-%m-%d %H:%M %z}: {event.outcome}: {event.message}", markup=False)
     if answer.note:

@@ -8,7 +8,7 @@ from contextlib import closing, contextmanager
 from labctl.cli.interrupts import ending_is_an_interrupt
 from labctl.cli.output import stderr
 from labctl.cli.progress_bar import CampaignProgress
-from labctl.cli.terminal_operator import TerminalOperator
+from labctl.cli.terminal_operator import TerminalOperator, ask_bench_clear
 from labctl.services.commands.foreground_control import CampaignTerminal, OpenTerminal
 
 
@@ -22,7 +22,7 @@ def campaign_terminal(*, quiet: bool) -> OpenTerminal:
             closing(TerminalOperator()) as operator,
             CampaignProgress(quiet=quiet) as progress,
         ):
-            yield CampaignTerminal(progress.update, operator.answer_prompts, _say)
+            yield CampaignTerminal(progress.update, operator.answer_prompts, _say, ask_bench_clear)
 
     return opened
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import termios
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextvars import copy_context
 from typing import TYPE_CHECKING
 
@@ -64,3 +64,20 @@ class TerminalOperator:
             note(f"{prompt.id}: {f'cannot be done; {why}' if why else 'done'}; {prompt.text}")
         except (StalePrompt, StoreError) as error:
             stderr.print(f"labctl: {error}", markup=False)
+
+
+def ask_bench_clear(questions: Mapping[str, str]) -> str:
+    """Ask at the terminal whether a real bench is clear; returns who has said yes to every question, else nothing.
+
+    Without a terminal nothing is asked.
+    """
+    if not sys.stdin.isatty():
+        return ""
+    termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)  # an answer from before the question is none
+    stderr.print("This bench is not simulated: the table turns and the chamber heats when the campaign starts.")
+    for question in questions.values():
+        stderr.print(f"{question} Type yes, or anything else to stop.", markup=False)
+        if sys.stdin.readline().strip().lower() not in {"yes", "y"}:
+            return ""
+    stderr.print("Your name:", end=" ", markup=False)
+    return sys.stdin.readline().strip()

@@ -28,7 +28,7 @@ CONTROL = frozenset({"start", "schedule", "resume", "pause", "abort", "confirm"}
 class Beat:
     """What a watcher hears: that the process lives, and what it does."""
 
-    busy: bool
+    running: int | None  #: the campaign
     stops: bool
     schedule_trouble: str
 
@@ -81,7 +81,7 @@ class BenchCalls:
             with contextlib.suppress(OSError):
                 while True:
                     local = self._local
-                    connection.send(Beat(local.busy, local.stops, local.schedule_trouble))
+                    connection.send(Beat(local.running, local.stops, local.schedule_trouble))
                     changed.wait(BEAT_S)
                     changed.clear()
                     never.wait(LEAST_BEAT_S)

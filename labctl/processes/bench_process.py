@@ -102,7 +102,7 @@ class BenchProcess:
             if self._supervision.begin and not begun:
                 begun = True
                 self._local.start()
-            if self._supervision.alone_s > ALONE_S and not self._local.busy:
+            if self._supervision.alone_s > ALONE_S and self._local.running is None:
                 return
 
     def _close(self) -> None:

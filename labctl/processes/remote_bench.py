@@ -109,7 +109,7 @@ class RemoteBench:
         self.control = RemoteControl(folder)
         self._caller = Caller(folder / CALLS, ANSWER_S)
         self._listeners = ChangeListeners()
-        self._beat = Beat(busy=False, stops=False, schedule_trouble="")
+        self._beat = Beat(running=None, stops=False, schedule_trouble="")
         self._heard = Elapsed()
         self._last_live: CampaignResponse | None = None
         self._described: dict[str, Any] | None = None
@@ -122,9 +122,9 @@ class RemoteBench:
         return self._beat.stops or self._over.is_set()
 
     @property
-    def busy(self) -> bool:
-        """Whether a campaign ran when the bench process was last heard of."""
-        return self._beat.busy
+    def running(self) -> int | None:
+        """The campaign that ran when the bench process was last heard of."""
+        return self._beat.running
 
     @property
     def schedule_trouble(self) -> str:

@@ -30,8 +30,8 @@ class BenchAccess(Protocol):
         ...
 
     @property
-    def busy(self) -> bool:
-        """Whether a campaign runs now."""
+    def running(self) -> int | None:
+        """The campaign that runs now."""
         ...
 
     @property

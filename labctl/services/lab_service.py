@@ -12,8 +12,10 @@ from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.services.bench_access import BenchAccess
 from labctl.services.benches.bench_left import BenchLeft
+from labctl.services.benches.start_confirmation import start_questions
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
+from labctl.services.campaigns.resumability import NO_BENCH, with_resume
 from labctl.services.campaigns.status import ENDED, from_rows, mark_abandoned, statuses_of
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.computed import carry_out
@@ -27,6 +29,8 @@ from labctl.services.schemas.campaigns import (
 )
 from labctl.store import Store
 from procedures.execution.signals import shutdown_hook
+
+VERSION = version("labctl")
 
 
 class LabService:
@@ -96,14 +100,20 @@ class LabService:
     def benches(self) -> list[dict[str, Any]]:
         """Describe the bench of this service."""
         described = self.bench_access.describe()
-        return [] if described is None else [described]
+        if described is None or self.bench is None:
+            return []
+        return [{**described, "start_questions": start_questions(self.bench)}]
 
     def status(self, campaign: int) -> CampaignResponse:
         """Return where a campaign is: live when it runs here, else as the database tells."""
-        if (live := self.bench_access.status(campaign)) is not None:
-            return live
-        row = self.store.campaigns.get(campaign)
-        return mark_abandoned(from_rows(self.store, row), attended=self.bench_access.runs(campaign))
+        access = self.bench_access
+        answer = access.status(campaign)
+        if answer is None:
+            row = self.store.campaigns.get(campaign)
+            answer = mark_abandoned(from_rows(self.store, row), attended=access.runs(campaign))
+        if access.bench is None:
+            return answer.model_copy(update={"resumable": False, "resume_reason": NO_BENCH})
+        return with_resume(self.store, answer, access.bench, lambda: access.running)
 
     def campaigns(self) -> list[CampaignResponse]:
         """Return every campaign, newest first."""
@@ -123,7 +133,11 @@ class LabService:
 
     def pulse(self) -> dict[str, Any]:
         """Return what a caller without a key may know: that the service answers, and its version."""
-        return {"status": "ok", "version": version("labctl")}
+        return {"status": "ok", "version": VERSION}
+
+    def heartbeat(self) -> dict[str, Any]:
+        """Return what every open page asks once a second: that the service answers; reads no database."""
+        return {**self.pulse(), "heard_s": round(self.bench_access.heard_s, 1)}
 
     def health(self) -> dict[str, Any]:
         """Return whether the service is well."""
@@ -145,5 +159,5 @@ class LabService:
             "labctl_units": float(len(self.store.units.all())),
             "labctl_campaigns": float(len(states)),
             "labctl_campaigns_failed": float(states.count("failed")),
-            "labctl_campaign_running": float(self.bench_access.busy),
+            "labctl_campaign_running": float(self.bench_access.running is not None),
         }

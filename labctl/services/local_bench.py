@@ -36,9 +36,9 @@ class LocalBench:
         return None if self.runner is None else self.runner.bench
 
     @property
-    def busy(self) -> bool:
-        """Whether a campaign runs now."""
-        return self.runner is not None and self.runner.busy
+    def running(self) -> int | None:
+        """The campaign that runs now."""
+        return None if self.runner is None else self.runner.running
 
     @property
     def schedule_trouble(self) -> str:

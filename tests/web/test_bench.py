@@ -85,6 +85,11 @@ def test_what_cannot_be_done_ends_the_campaign(service: Service, visit: Callable
     asked.get_by_role("button", name="It cannot be done").click()
     expect(page.get_by_role("region", name="Nothing runs")).to_be_visible()
     assert "no wrench" in service.get("/api/campaigns/1")["reason"]
+    last = page.get_by_role("region", name="Last: campaign 1")
+    expect(last).to_contain_text("A person said that it cannot be done.")
+    expect(last).to_contain_text("labctl stopped the table")
+    expect(last).to_contain_text("Next:")
+    expect(last).to_contain_text("simulated time")
 
 
 def test_says_that_it_is_stale_and_goes_on_where_it_was(
@@ -135,9 +140,12 @@ def test_a_bench_that_was_not_confirmed_safe_is_told_and_cleared_by_a_person(
     expect(told).to_be_visible()
     expect(page.locator("main")).to_contain_text("the chamber did not answer")
     expect(page.get_by_role("region", name="Nothing runs")).to_contain_text("No campaign starts before")
+    expect(page.get_by_role("button", name="Resume where it was")).to_be_disabled()
+    expect(page.get_by_text("Cannot be resumed now")).to_contain_text("look at it first")
     page.get_by_role("button", name="I have looked, it is safe").click()
     asked = page.get_by_role("dialog")
     asked.get_by_label("Your name").fill("Ann")
     asked.get_by_role("button", name="It is safe", exact=True).click()
     expect(told).to_have_count(0)
     assert store.benches.unconfirmed(bench) == ""
+    expect(page.get_by_role("button", name="Resume where it was")).to_be_enabled()

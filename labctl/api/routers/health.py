@@ -18,6 +18,15 @@ def health(service: ServiceDep, request: Request) -> dict[str, Any]:
     return service.health() if request.state.caller is not None else service.pulse()
 
 
+@router.get("/health/heartbeat", summary="Does the service answer?")
+async def heartbeat(service: ServiceDep) -> dict[str, Any]:
+    """Whether the service answers: what every open page asks once a second.
+
+    No key is asked for and no database is read. `heard_s`, where it is there: how long the bench was not heard.
+    """
+    return service.heartbeat()
+
+
 @router.get("/metrics", summary="Figures for a monitor", response_class=PlainTextResponse)
 def metrics(service: ServiceDep) -> str:
     """Counts in the text format that Prometheus reads."""

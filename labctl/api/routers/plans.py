@@ -7,6 +7,7 @@ from fastapi import APIRouter, Request
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.services.planning import planner as services
+from labctl.services.schedule.planned_start import planned_start
 from labctl.services.schemas.plans import PlannedResponse, PlanRequest, RecipeResponse
 from labctl.services.simulation.visibility import planned
 
@@ -24,5 +25,9 @@ def recipes(service: ServiceDep) -> list[RecipeResponse]:
 
 @router.post("/plans", summary="Plan a recipe")
 async def plan(http: Request, request: PlanRequest, service: ServiceDep) -> PlannedResponse:
-    """What a campaign would do, step by step, and what it could find. Nothing moves, nothing is kept."""
-    return await while_connected(http, service, planned, request, service.bench)
+    """What a campaign would do, step by step, and what it could find. Nothing moves, nothing is kept.
+
+    `attendance` says when a person is needed if it begins now, at `at` or when `cron` is due next.
+    """
+    start = planned_start(request.at, request.cron, request.time_zone, service.clock.utc())
+    return await while_connected(http, service, planned, request, service.bench, start)

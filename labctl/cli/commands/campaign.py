@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -18,6 +18,31 @@ app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on 
 
 Recipe = Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")]
 Clip = Annotated[bool, typer.Option("--clip", help="Leave out points beyond the bench or a unit, and say which.")]
+Speed = Annotated[
+    float | None,
+    typer.Option("--speed", metavar="X", help="A simulated bench, X times as fast; default: as fast as it can."),
+]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the simulated bench.")]
+At = Annotated[
+    str | None, typer.Option("--at", metavar="TIME", help="Begin then: 2026-03-28T22:00, or now: when it is free.")
+]
+Cron = Annotated[str | None, typer.Option("--cron", metavar="LINE", help="Begin again and again: '30 22 * * FRI'.")]
+TimeZone = Annotated[
+    str | None, typer.Option("--time-zone", metavar="NAME", help="Of TIME and LINE; default: the local one.")
+]
+Priority = Annotated[int | None, typer.Option("--priority", metavar="N", help="The highest goes first; default: 0.")]
+LateLimit = Annotated[
+    float | None,
+    typer.Option("--late-limit-s", metavar="S", help="Later it is not begun; 0 skips a missed start."),
+]
+ClearConfirmedBy = Annotated[
+    str | None,
+    typer.Option(
+        "--clear-confirmed-by",
+        metavar="NAME",
+        help="Of a real bench: NAME confirms chamber clear, table free, limiter on. Default: asked here.",
+    ),
+]
 
 
 @app.command("plan")
@@ -32,11 +57,14 @@ def plan(
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
     """Say what a campaign would do and how long it takes. Nothing moves."""
+    from instruments.clock import SystemClock
     from labctl.services.planning.loading import describe_plan
+    from labctl.services.schedule.planned_start import planned_start
     from labctl.services.simulation.visibility import visibility as look
 
     with one_clear_line():
-        answer = describe_plan(recipe, bench, clip=clip, look=look if visibility else None)
+        start = planned_start(None, None, None, SystemClock().utc())
+        answer = describe_plan(recipe, bench, clip=clip, look=look if visibility else None, start=start)
     if as_json:
         print_json(answer)
     else:
@@ -48,44 +76,34 @@ def start(
     recipe: Recipe,
     bench: BenchName = None,
     clip: Clip = False,
-    speed: Annotated[
-        float | None,
-        typer.Option("--speed", metavar="X", help="A simulated bench, X times as fast; default: as fast as it can."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the simulated bench.")] = None,
-    at: Annotated[
-        str | None, typer.Option("--at", metavar="TIME", help="Begin then: 2026-03-28T22:00, or now: when it is free.")
-    ] = None,
-    cron: Annotated[
-        str | None, typer.Option("--cron", metavar="LINE", help="Begin again and again: '30 22 * * FRI'.")
-    ] = None,
-    time_zone: Annotated[
-        str | None, typer.Option("--time-zone", metavar="NAME", help="Of TIME and LINE; default: the local one.")
-    ] = None,
-    priority: Annotated[
-        int | None, typer.Option("--priority", metavar="N", help="The highest goes first; default: 0.")
-    ] = None,
-    late_limit_s: Annotated[
-        float | None,
-        typer.Option("--late-limit-s", metavar="S", help="Later it is not begun; 0 skips a missed start."),
-    ] = None,
+    speed: Speed = None,
+    seed: Seed = None,
+    at: At = None,
+    cron: Cron = None,
+    time_zone: TimeZone = None,
+    priority: Priority = None,
+    late_limit_s: LateLimit = None,
+    clear_confirmed_by: ClearConfirmedBy = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
     """Run a recipe. A service that holds the database runs it on its bench; else it runs here, until it is over.
 
-    With --at or --cron it is entered into the schedule, which only a service (`labctl serve`) carries out.
+    With --at or --cron it is entered into the schedule, which only a service (`labctl serve`) carries out. On a bench
+    that is not simulated a person has to confirm first that the bench is clear, or will be at that time.
     """
     from labctl.cli.campaign_terminal import campaign_terminal
     from labctl.services.commands.open import open_commands
     from labctl.services.commands.registry import START_CAMPAIGN
     from labctl.services.commands.requests import CampaignStart
     from labctl.services.planning.loading import own_text
-    from labctl.services.schemas.campaigns import CampaignRequest
+    from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest
 
     with one_clear_line():
         wanted = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}
-        given = {name: value for name, value in wanted.items() if value is not None}
+        given: dict[str, Any] = {name: value for name, value in wanted.items() if value is not None}
+        if clear_confirmed_by is not None:
+            given |= {"confirmed_by": clear_confirmed_by, "checks": list(BENCH_CHECKS)}
         request = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **given})
         asked = CampaignStart(request, bench=bench, speed=speed, seed=seed)
         with open_commands(database, campaign_terminal(quiet=as_json)) as commands:

@@ -12,9 +12,10 @@ from instruments.clock import Clock
 from labctl.errors import BenchBusy, Conflict, StoreError
 from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import BenchHold
+from labctl.services.benches.start_confirmation import confirmation_text
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.listeners import ChangeListeners
-from labctl.services.campaigns.preparation import Prepared, prepare
+from labctl.services.campaigns.preparation import Prepared, prepare, refuse_unconfirmed
 from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
 from labctl.services.campaigns.resume import prepare_resume, with_original_simulation
 from labctl.services.campaigns.status import ENDED, answer_of, campaign_status
@@ -87,6 +88,12 @@ class BenchRunner:
         return self._job is not None
 
     @property
+    def running(self) -> int | None:
+        """The campaign that runs now."""
+        job = self._job
+        return None if job is None else job.row.id
+
+    @property
     def free(self) -> bool:
         """Whether a campaign may begin now: nothing runs, or waits to be taken up, and the bench may be driven."""
         return self._job is None and not self._recovery.pending and not self._stops and self._may_drive
@@ -106,12 +113,16 @@ class BenchRunner:
     def start(self, request: CampaignRequest) -> CampaignResponse:
         """Plan, write down and begin a campaign.
 
-        Raises BenchBusy while another runs or without the lease on the bench, and whatever planning raises.
+        Raises BenchBusy while another runs or without the lease on the bench, StartNotConfirmed where no person has
+        confirmed that a real bench is clear, and whatever planning raises.
         """
         with self._guard:
             self._refuse_unless_free()
             bench = with_hidden_effects(self._bench, request.hide)
-            prepared = prepare(self._store, request.recipe, bench, self._make_clock(), clip=request.clip)
+            refuse_unconfirmed(self._store, bench.name)
+            clear = confirmation_text(bench, request)
+            clock = self._make_clock()
+            prepared = prepare(self._store, request.recipe, bench, clock, clip=request.clip, bench_clear=clear)
             self._begin(prepared)
         return campaign_status(self._store, prepared.id)
 

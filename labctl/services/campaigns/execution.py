@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
 
 from instruments.bench_config import BenchFile
@@ -10,10 +10,11 @@ from labctl.config import default_database
 from labctl.errors import Conflict, DiskFull, Stopped, StoreError
 from labctl.services.benches.confirmation import SafeStateRetry, describe_safe_state
 from labctl.services.benches.lease import holding, open_for
-from labctl.services.campaigns.preparation import Prepared, clock_for, prepare, seeded
+from labctl.services.benches.start_confirmation import confirmation_text, start_questions
+from labctl.services.campaigns.preparation import Prepared, clock_for, prepare, refuse_unconfirmed, seeded
 from labctl.services.campaigns.status import ENDED, answer_of, describe_interrupted, from_rows
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
-from labctl.services.schemas.campaigns import CampaignResponse, StartRequest
+from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignResponse, StartRequest
 from labctl.store import Store
 from labctl.store.connection.writer_lock import note_campaign
 from procedures.contracts.control import Control
@@ -24,6 +25,8 @@ from procedures.monitoring.progress import Progress
 
 Observe = Callable[[CampaignResponse], None]
 Attend = Callable[[Operator, Callable[[str], None]], None]
+#: Asks the person at the terminal; returns who has confirmed everything, empty for a no.
+AskClear = Callable[[Mapping[str, str]], str]
 
 
 def run(
@@ -104,10 +107,13 @@ def run_here(
     observe: Observe | None = None,
     attend: Attend | None = None,
     say: Callable[[str], None] | None = None,
+    ask_clear: AskClear | None = None,
 ) -> CampaignResponse:
     """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks.
 
-    `say` is told of a campaign that was left on a simulated bench. Raises Conflict for one on any other bench.
+    `say` is told of a campaign that was left on a simulated bench. `ask_clear` is given the questions about a real
+    bench that nobody has confirmed yet, and returns who has. Raises Conflict for a campaign that was left on a real
+    bench, StartNotConfirmed where no person has confirmed that it is clear.
     """
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
     with open_for(bench_file, database or default_database()) as store, holding(store, bench_file) as control:
@@ -118,7 +124,12 @@ def run_here(
                 raise Conflict(f"bench {bench_file.name}: {text}; nothing is begun there before")
             if say is not None:
                 say(text)
-        prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip)
+        refuse_unconfirmed(store, bench_file.name)
+        questions = start_questions(bench_file)
+        if questions and not request.confirmed_by and ask_clear is not None and (by := ask_clear(questions)):
+            request = request.model_copy(update={"confirmed_by": by, "checks": list(BENCH_CHECKS)})
+        clear = confirmation_text(bench_file, request)
+        prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip, bench_clear=clear)
         return run_attended(store, prepared, control, observe, attend)
 
 

@@ -92,11 +92,18 @@ def load_libraries() -> None:
 
 
 def prepare(
-    store: Store, recipe_source: str, bench_file: BenchFile, clock: Clock, *, clip: bool, opened: Bench | None = None
+    store: Store,
+    recipe_source: str,
+    bench_file: BenchFile,
+    clock: Clock,
+    *,
+    clip: bool,
+    opened: Bench | None = None,
+    bench_clear: str = "",
 ) -> Prepared:
     """Open the bench, plan, and write the whole campaign down; the table is at rest when this returns.
 
-    `opened` is the bench where it is open already.
+    `opened` is the bench where it is open already; `bench_clear` is what a person has confirmed about it.
 
     Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe.
     """
@@ -121,6 +128,7 @@ def prepare(
             steps=[step.model_dump(mode="json") for step in plan.steps],
             units=units,
             boot_id=boot_id(),
+            bench_clear=bench_clear,
         )
         return Prepared(store.campaigns.create(new, clock.utc()), plan, bench, clock, operator_of(bench))
     except BaseException:

@@ -11,19 +11,10 @@ from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
 from labctl.errors import BenchBusy, LabctlError
+from labctl.services.campaigns.resumability import retries_exhausted
 from labctl.services.campaigns.status import ENDED, from_rows, how_far
-from labctl.store import ResumePoint, Store
+from labctl.store import Store
 from procedures.execution.safe_state import make_safe
-
-#: A campaign that was taken up so often without finishing a step needs a person.
-MAX_RESUMES = 5
-
-
-def retries_exhausted(standing: ResumePoint) -> str | None:
-    """Return why a campaign is not taken up by itself any more, or None."""
-    if standing.tries < MAX_RESUMES:
-        return None
-    return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
 
 
 def describe_recovery(store: Store, bench: str) -> str:

@@ -8,6 +8,8 @@ from datetime import timedelta
 from typing import Literal
 
 from instruments.bench_config import BenchFile
+from labctl.services.benches.bench_clock import has_simulated_time
+from labctl.services.campaigns.advice import advice_of
 from labctl.services.schemas.campaigns import CampaignResponse, EventResponse, OutputResponse, PromptResponse
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
 from procedures.contracts.control import ControlRequest
@@ -44,6 +46,8 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
+        simulated_time=has_simulated_time(row.bench),
+        advice=advice_of(state, progress.reason),
     )
 
 
@@ -88,6 +92,8 @@ def _from_summary(row: CampaignRow, seen: CampaignSummary) -> CampaignResponse:
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
+        simulated_time=has_simulated_time(row.bench),
+        advice=advice_of(row.state, row.reason),
     )
 
 

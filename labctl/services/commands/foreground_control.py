@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from labctl.errors import BadInput
-from labctl.services.campaigns.execution import Attend, Observe, run_here
+from labctl.services.campaigns.execution import AskClear, Attend, Observe, run_here
 from labctl.services.campaigns.resume import resume_here
 from labctl.services.campaigns.unattended import abort_abandoned, not_running
 from labctl.services.commands.context import CommandContext
@@ -25,6 +25,7 @@ class CampaignTerminal:
     observe: Observe | None = None
     attend: Attend | None = None
     say: Callable[[str], None] | None = None
+    ask_clear: AskClear | None = None
 
 
 #: Opens the terminal for the time of one campaign.
@@ -47,10 +48,13 @@ class ForegroundControl:
     def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
         request = StartRequest(
-            recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, speed=asked.speed, seed=asked.seed
-        )
+            recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, speed=asked.speed, seed=asked.seed,
+            confirmed_by=asked.body.confirmed_by, checks=asked.body.checks,
+        )  # fmt: skip
         with self._open_terminal() as terminal:
-            return run_here(self._database, request, terminal.observe, terminal.attend, terminal.say)
+            return run_here(
+                self._database, request, terminal.observe, terminal.attend, terminal.say, terminal.ask_clear
+            )
 
     def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
         """Enter a campaign into the schedule of a bench; a service that holds this bench and database starts it."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from instruments.clock import SystemClock
 from labctl.config import default_database
+from labctl.services.campaigns.resumability import with_resume
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.command import Command, CommandExecutor, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
@@ -67,7 +68,7 @@ def current_status(database: str | None, campaign: int | None) -> CampaignRespon
     Without a number: the newest campaign. Raises NotFound.
     """
     with open_readonly(database) as store:
-        answer = campaign_status(store, campaign)
+        answer = with_resume(store, campaign_status(store, campaign))
     if url := service_url(database):
         from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 from typing import Any
+from zoneinfo import ZoneInfo
 
 from pydantic import ValidationError
 
@@ -16,6 +18,7 @@ from instruments.interfaces.gyro import GyroLimits
 from instruments.interfaces.table import TableLimits
 from instruments.toml_documents import read_toml_text, shown
 from labctl.errors import BadBench
+from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.schemas.plans import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.limits import BenchLimits
@@ -29,6 +32,8 @@ LONGEST_PLACE = 80
 
 
 Look = Callable[[Plan, BenchFile], list[Visibility]]
+#: When a plan would begin, and the time zone of the people at the bench.
+LocalStart = tuple[datetime, ZoneInfo]
 
 
 def load_recipe(source: str) -> Recipe:
@@ -118,14 +123,18 @@ def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tup
     return make_plan(recipe, limits_of(bench), clip=clip), bench
 
 
-def describe_plan(recipe: str, bench: str | None, *, clip: bool, look: Look | None = None) -> PlanResponse:
-    """Say what a campaign would do and how long it takes; `look` also says what it could find."""
+def describe_plan(
+    recipe: str, bench: str | None, *, clip: bool, look: Look | None = None, start: LocalStart | None = None
+) -> PlanResponse:
+    """Say what a campaign would do and how long it takes, as `plan_answer` does."""
     plan, bench_file = plan_for(recipe, bench, clip=clip)
-    return plan_answer(plan, bench_file, look)
+    return plan_answer(plan, bench_file, look, start)
 
 
-def plan_answer(plan: Plan, bench_file: BenchFile, look: Look | None = None) -> PlanResponse:
-    """Return a plan's figures; `look` also says what it could find."""
+def plan_answer(
+    plan: Plan, bench_file: BenchFile, look: Look | None = None, start: LocalStart | None = None
+) -> PlanResponse:
+    """Return a plan's figures; `look` also says what it could find, `start` when it needs a person."""
     return PlanResponse(
         recipe=plan.recipe.name,
         bench=bench_file.name,
@@ -135,4 +144,5 @@ def plan_answer(plan: Plan, bench_file: BenchFile, look: Look | None = None) -> 
         clipped=list(plan.clipped),
         schedule_hash=plan.schedule_hash,
         visibility=look(plan, bench_file) if look else None,
+        attendance=attendance(visits_s(plan, bench_file), *start) if start else None,
     )

@@ -8,6 +8,7 @@ from typing import Any
 from instruments.bench_config import BenchFile
 from labctl.errors import BadInput
 from labctl.services.planning.loading import (
+    LocalStart,
     Look,
     bench_for,
     limits_of,
@@ -57,8 +58,12 @@ def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
     return ""
 
 
-def plan_steps(request: PlanRequest, bench: BenchFile | None, look: Look) -> PlannedResponse:
+def plan_steps(
+    request: PlanRequest, bench: BenchFile | None, look: Look, start: LocalStart | None = None
+) -> PlannedResponse:
     """Plan a recipe on a bench, or on the simulated one that fits it best; `look` returns what the plan could find.
+
+    With `start` the answer says when a person is needed.
 
     Raises RecipeError, PlanRefused, BadInput.
     """
@@ -70,6 +75,6 @@ def plan_steps(request: PlanRequest, bench: BenchFile | None, look: Look) -> Pla
             f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days; what it could find is worked out for up "
             f"to {LONGEST_LOOK_S / 86_400:.0f}"
         )
-    answer = plan_answer(plan, on, look if request.visibility else None)
+    answer = plan_answer(plan, on, look if request.visibility else None, start)
     columns = timeline_columns([step.model_dump(mode="json") for step in plan.steps])
     return PlannedResponse(**answer.model_dump(), timeline=TimelineColumns(**columns))

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from labctl.recording import Recording
+from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.schemas.recordings import ChannelColumns, DataSetsResponse, RecordingResponse
 from labctl.store import MeanRow, RecordingRow, Store
 
 
 def list_recordings(store: Store) -> list[RecordingResponse]:
     """Return every recording, newest first."""
-    return [_line(row) for row in store.recordings.all()]
+    rows = store.recordings.all()
+    simulated = _of_simulated_time(store, rows)
+    return [_line(row, row.campaign in simulated) for row in rows]
 
 
-def _line(row: RecordingRow) -> RecordingResponse:
+def _of_simulated_time(store: Store, rows: Sequence[RecordingRow]) -> set[int | None]:
+    """Return the campaigns of these recordings whose times are of a simulated bench's clock."""
+    if all(row.campaign is None for row in rows):
+        return set()
+    return {campaign.id for campaign in store.campaigns.all() if has_simulated_time(campaign.bench)}
+
+
+def _line(row: RecordingRow, simulated_time: bool) -> RecordingResponse:
     return RecordingResponse(
         id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
         readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
+        simulated_time=simulated_time,
     )  # fmt: skip
 
 
@@ -92,6 +104,7 @@ def describe_recording(store: Store, recording: int, *, points: bool = True) -> 
         "kind": row.kind,
         "info": dict(row.info),
         "created_at": row.created_at.isoformat(),
+        "simulated_time": row.campaign is not None and has_simulated_time(store.campaigns.get(row.campaign).bench),
         "datasets": row.datasets,
         "readings": row.readings,
     }

@@ -6,6 +6,8 @@ from datetime import datetime
 
 from instruments.bench_config import BenchFile
 from labctl.errors import BadInput
+from labctl.services.benches.start_confirmation import confirmation_text
+from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.loading import limits_of, load_recipe
 from labctl.services.schedule import times
 from labctl.services.schemas.campaigns import CampaignRequest
@@ -33,7 +35,8 @@ def is_scheduled(request: CampaignRequest) -> bool:
 def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: datetime) -> ScheduledResponse:
     """Enter a campaign into the schedule of a bench.
 
-    What can be known now is refused now: raises BadInput for its time, RecipeError, PlanRefused.
+    What can be known now is refused now: raises BadInput for its time, RecipeError, PlanRefused, and
+    StartNotConfirmed where no person has confirmed that a real bench will be clear then.
     """
     zone = times.time_zone(request.time_zone)
     if request.cron is not None:
@@ -42,10 +45,12 @@ def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: dat
         assert request.at is not None
         due = times.moment(request.at, zone, now)
     recipe = load_recipe(request.recipe)
-    make_plan(recipe, limits_of(bench), clip=request.clip)
+    plan = make_plan(recipe, limits_of(bench), clip=request.clip)
+    confirmed = confirmation_text(bench, request)
     new = NewStart(
         bench_name=bench.name, recipe_name=recipe.name, recipe=request.recipe, clip=request.clip,
         priority=request.priority, cron=request.cron, time_zone=zone.key, late_limit_s=request.late_limit_s, due_at=due,
+        confirmed_by=request.confirmed_by.strip() if confirmed else None, visits_s=visits_s(plan, bench),
     )  # fmt: skip
     row = store.starts.get(store.starts.add(new, now))
     assumed = request.time_zone is None and (request.cron is not None or not _has_zone(request.at))
@@ -74,9 +79,10 @@ def cancel_start(store: Store, start: int, now: datetime) -> ScheduledResponse:
 
 def _answer(store: Store, row: StartRow, note: str = "") -> ScheduledResponse:
     zone = times.time_zone(row.time_zone)
+    waits = row.state == "waiting"
     return ScheduledResponse(
         id=row.id, bench=row.bench_name, recipe=row.recipe_name, state=row.state,
-        due_at=row.due_at.astimezone(zone) if row.state == "waiting" else None, time_zone=row.time_zone, cron=row.cron,
+        due_at=row.due_at.astimezone(zone) if waits else None, time_zone=row.time_zone, cron=row.cron,
         priority=row.priority, clip=row.clip, late_limit_s=row.late_limit_s, created_at=row.created_at, note=note,
         history=[
             StartEventResponse(
@@ -85,4 +91,6 @@ def _answer(store: Store, row: StartRow, note: str = "") -> ScheduledResponse:
             )
             for event in store.starts.events(row.id)
         ],
+        confirmed_by=row.confirmed_by or "",
+        attendance=attendance(row.visits_s or (), row.due_at, zone) if waits else None,
     )  # fmt: skip

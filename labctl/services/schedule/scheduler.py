@@ -16,7 +16,7 @@ from instruments.clock import Clock
 from instruments.errors import InstrumentError
 from labctl.errors import BenchBusy, LabctlError
 from labctl.services.schedule import times
-from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse
+from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest, CampaignResponse
 from labctl.store import StartEventRow, StartRow, Store
 from procedures.contracts.errors import ProcedureError
 
@@ -135,7 +135,7 @@ class Scheduler:
     def _start(self, claim: StartEventRow, row: StartRow, due: datetime, now: datetime) -> None:
         starts = self._store.starts
         try:
-            campaign = self._runner.start(CampaignRequest(recipe=row.recipe, clip=row.clip)).id
+            campaign = self._runner.start(_request(row)).id
         except BenchBusy:  # somebody was quicker: it waits its turn
             starts.put_back(claim)
         except (LabctlError, InstrumentError, ProcedureError) as error:
@@ -147,6 +147,12 @@ class Scheduler:
             late = now - due
             text = f", {_span(late.total_seconds())} late" if late > timedelta(seconds=GRACE_S) else ""
             starts.conclude(claim, self._clock.utc(), "started", f"campaign {campaign} began{text}", campaign)
+
+
+def _request(row: StartRow) -> CampaignRequest:
+    """Return the start of an entry, with the confirmation that was given when it was entered."""
+    checks = list(BENCH_CHECKS) if row.confirmed_by else []
+    return CampaignRequest(recipe=row.recipe, clip=row.clip, confirmed_by=row.confirmed_by or "", checks=checks)
 
 
 def _span(seconds: float) -> str:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal
+from typing import Literal, get_args
 
 from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
+
+#: What a person confirms about a real bench before a campaign starts there.
+BenchCheck = Literal["chamber_clear", "table_free", "limiter_on"]
+BENCH_CHECKS: tuple[BenchCheck, ...] = get_args(BenchCheck)
 
 
 class CampaignRequest(Request):
@@ -37,6 +41,18 @@ class CampaignRequest(Request):
         le=1e9,
         description="How much later than due it may begin; 0: a missed start is skipped; absent: any time, once.",
     )
+    confirmed_by: str = Field(
+        default="",
+        max_length=200,
+        description="Of a bench that is not simulated: the person who confirms `checks`; of a later start, that they "
+        "will hold then.",
+    )
+    checks: list[BenchCheck] = Field(
+        default_factory=list,
+        max_length=10,
+        description="Of a bench that is not simulated, all three: the chamber is clear, the table is free, the "
+        "independent temperature limiter is on.",
+    )
 
 
 class StartRequest(Request):
@@ -49,6 +65,8 @@ class StartRequest(Request):
         default=None, gt=0, allow_inf_nan=False, description="Of a simulated bench; absent: as fast as it can."
     )
     seed: int | None = Field(default=None, ge=0, description="Of a simulated bench.")
+    confirmed_by: str = Field(default="", max_length=200, description="As of CampaignRequest.")
+    checks: list[BenchCheck] = Field(default_factory=list, description="As of CampaignRequest.")
 
 
 class ReasonRequest(Request):
@@ -103,6 +121,14 @@ class OutputResponse(ResponseModel):
     t_s: float = Field(description="Time of the last reading since the campaign began.")
 
 
+class AdviceResponse(ResponseModel):
+    """A failed campaign in words: three short sentences."""
+
+    happened: str
+    done: str = Field(description="What labctl did.")
+    next: str = Field(description="What a person does next.")
+
+
 class CampaignResponse(ResponseModel):
     """Where a campaign is."""
 
@@ -132,6 +158,16 @@ class CampaignResponse(ResponseModel):
     ended_at: datetime | None = None
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
     unrecorded: str = Field(default="", description="Of a request that was carried out: what could not be written.")
+    simulated_time: bool = Field(
+        default=False, description="Its times are those of a simulated bench, which may run faster than the wall's."
+    )
+    advice: AdviceResponse | None = Field(default=None, description="Of a failed campaign.")
+    resumable: bool | None = Field(
+        default=None, description="Whether `resume` would be accepted here now; null in lists."
+    )
+    resume_reason: str = Field(
+        default="", description="Why it would not be accepted, or what speaks against it although it would be."
+    )
 
 
 class EventResponse(ResponseModel):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
@@ -30,6 +31,21 @@ class PlanRequest(Request):
     recipe: RecipeSource
     clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
     visibility: bool = Field(default=False, description="Also say what the plan could find; it takes some seconds.")
+    at: str | None = Field(default=None, max_length=64, description="When it would begin, as of `POST /api/campaigns`.")
+    cron: str | None = Field(default=None, max_length=200, description="The same as a cron line.")
+    time_zone: str | None = Field(default=None, max_length=100, description="Of `at`, `cron` and `attendance`.")
+
+
+class AttendanceResponse(ResponseModel):
+    """When a plan needs a person at the bench, to turn or to switch the units."""
+
+    start: datetime = Field(description="When it begins; all times are in `time_zone`.")
+    time_zone: str
+    needed_at: list[datetime] = Field(description="Expected; prompts close together count as one.")
+    at_night: list[datetime] = Field(description="Those of them between 20:00 and 07:00.")
+    text: str = Field(description="The same in words.")
+    warning: str = Field(default="", description="Of times at night; empty when there are none.")
+    better_start: datetime | None = Field(default=None, description="The next start with fewer of them at night.")
 
 
 class Visibility(ResponseModel):
@@ -56,6 +72,9 @@ class PlanResponse(ResponseModel):
     clipped: list[str] = Field(description="Points left out because the bench or the unit cannot do them.")
     schedule_hash: str
     visibility: list[Visibility] | None = Field(default=None, description="What the plan could and could not find.")
+    attendance: AttendanceResponse | None = Field(
+        default=None, description="When it needs a person; null: the bench turns and switches the units itself."
+    )
 
 
 StepState = Literal["to come", "running", "done", "failed", "interrupted", "skipped"]

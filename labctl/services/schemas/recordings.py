@@ -66,6 +66,7 @@ class RecordingResponse(ResponseModel):
     readings: int
     created_at: datetime
     notes: str = ""
+    simulated_time: bool = Field(default=False, description="`created_at` is of a simulated bench's clock.")
 
 
 class ChannelColumns(ResponseModel):

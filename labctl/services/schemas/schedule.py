@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.plans import AttendanceResponse
 
 
 class StartEventResponse(ResponseModel):
@@ -36,3 +37,9 @@ class ScheduledResponse(ResponseModel):
     created_at: datetime
     note: str = ""
     history: list[StartEventResponse] = Field(default_factory=list)
+    confirmed_by: str = Field(
+        default="", description="Who confirmed that the bench will be clear; empty: a simulated bench, or not asked."
+    )
+    attendance: AttendanceResponse | None = Field(
+        default=None, description="When the next start needs a person; null: never, or not known."
+    )

@@ -8,6 +8,7 @@ from instruments.bench_config import BenchFile
 from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.services.cache import UNNAMED, compute
+from labctl.services.planning.loading import LocalStart
 from labctl.services.planning.planner import plan_steps
 from labctl.services.schemas.plans import PlannedResponse, PlanRequest, Visibility
 from labctl.services.simulation.plan_simulation import hidden_recording
@@ -31,8 +32,12 @@ def visibility(plan: Plan, bench: BenchFile) -> list[Visibility]:
     return [Visibility(**{**asdict(one), "needs": list(one.needs)}) for one in found]
 
 
-def planned(_: Store, request: PlanRequest, bench: BenchFile | None) -> PlannedResponse:
+def planned(
+    _: Store, request: PlanRequest, bench: BenchFile | None, start: LocalStart | None = None
+) -> PlannedResponse:
     """Plan a recipe on a bench, or on the simulated one that fits it best, and say what the plan could find.
+
+    With `start` the answer says when a person is needed.
 
     Raises RecipeError, PlanRefused, BadInput.
     """
@@ -41,4 +46,4 @@ def planned(_: Store, request: PlanRequest, bench: BenchFile | None) -> PlannedR
         compute(UNNAMED)
         return visibility(plan, on)
 
-    return plan_steps(request, bench, look)
+    return plan_steps(request, bench, look, start)

@@ -20,6 +20,9 @@ from labctl.store.repositories.campaign_summaries import CampaignSummaries, Camp
 from labctl.store.repositories.recording_writer import new_recording
 from labctl.store.schema import tables
 
+#: Kind of the event that says who confirmed that the bench is clear.
+BENCH_CLEAR = "operator.bench_clear"
+
 
 @dataclass(frozen=True)
 class NewCampaign:
@@ -34,6 +37,7 @@ class NewCampaign:
     steps: Sequence[Mapping[str, Any]]  #: JSON of every step, in order; `kind` and `expected_s` among the keys
     units: Sequence[NewUnit]
     boot_id: str | None = None  #: of the host that runs it
+    bench_clear: str = ""  #: what a person has confirmed about the bench before the start, and who
 
 
 class Campaigns:
@@ -90,6 +94,9 @@ class Campaigns:
             }
             if hidden := (new.bench.get("simulation") or {}).get("hidden"):
                 what["hidden"] = hidden
+            if new.bench_clear:
+                what["bench_clear"] = new.bench_clear
+                _confirmed(connection, number, new.bench_clear, at)
             append(connection, at, "campaign start", f"campaign {number}", what)
         return number
 
@@ -192,3 +199,9 @@ class Campaigns:
                 .values(state=state, reason=reason, ended_at=at)
             )
             append(connection, at, "campaign state", f"campaign {campaign}", {"state": state, "reason": reason})
+
+
+def _confirmed(connection: sa.Connection, campaign: int, text: str, at: datetime) -> None:
+    """Write down, as the first event of a campaign, what a person confirmed about its bench."""
+    event = {"campaign_id": campaign, "at": at, "t_s": 0.0, "kind": BENCH_CLEAR, "level": "info", "message": text}
+    connection.execute(sa.insert(tables.events).values(**event))

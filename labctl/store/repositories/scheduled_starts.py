@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from typing import Literal
@@ -31,6 +32,8 @@ class NewStart:
     time_zone: str
     late_limit_s: float | None  #: how much later than due it may begin; None: any time
     due_at: datetime
+    confirmed_by: str | None  #: who confirmed that the bench will be clear; None: not asked
+    visits_s: Sequence[float] | None  #: when the plan needs a person, s from its begin; None: not known
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,8 @@ class Starts:
         with self._database.writing() as connection:
             number = int(connection.scalar(row.returning(tables.scheduled_starts.c.id)) or 0)
             what = {"recipe": new.recipe_name, "due_at": new.due_at.isoformat(), "cron": new.cron}
+            if new.confirmed_by:
+                what["bench_clear_confirmed_by"] = new.confirmed_by
             audit.append(connection, at, "schedule enter", _subject(number, new.bench_name), what)
         return number
 
@@ -96,7 +101,7 @@ class Starts:
         s = tables.scheduled_starts.c
         query = sa.select(
             s.bench_name, s.recipe_name, s.recipe, s.clip, s.priority, s.cron, s.time_zone, s.late_limit_s, s.due_at,
-            s.id, s.state, s.created_at,
+            s.confirmed_by, s.visits_s, s.id, s.state, s.created_at,
         )  # fmt: skip
         with self._database.reading() as connection:
             rows = connection.execute(query.where(condition).order_by(*order)).mappings().all()

@@ -22,6 +22,8 @@ scheduled_starts = sa.Table(
     sa.Column("due_at", Instant, nullable=False),
     sa.Column("state", sa.String(20), nullable=False),
     sa.Column("created_at", Instant, nullable=False),
+    sa.Column("confirmed_by", sa.String(200)),  # who confirmed that the bench will be clear
+    sa.Column("visits_s", sa.JSON),  # when the plan needs a person, s from its begin
     sa.Index(None, "bench_name", "state", "due_at"),
 )
 

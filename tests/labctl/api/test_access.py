@@ -22,7 +22,7 @@ from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 
 CLOCK = SystemClock()
-OPEN = {("get", "/health")}
+OPEN = {("get", "/health"), ("get", "/health/heartbeat")}
 
 
 def operations() -> list[tuple[str, str]]:

@@ -18,7 +18,7 @@ from labctl.errors import Conflict
 from labctl.services.benches.power_failure import power_failed
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
-from labctl.services.campaigns.recovery import MAX_RESUMES, retries_exhausted
+from labctl.services.campaigns.resumability import MAX_RESUMES, retries_exhausted
 from labctl.services.campaigns.resume import prepare_resume, resume_here
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import ResumeRequest, StartRequest

@@ -4,6 +4,7 @@ import { get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
 import { button, dialog, toast } from "../core/components.js";
 import { navigate } from "../core/router.js";
+import { canResume } from "../campaigns/states.js";
 
 const OPERATOR_NAME_KEY = "labctl.who";
 const operatorNameField = () => ({ name: "by", label: "Your name", value: localStorage.getItem(OPERATOR_NAME_KEY) ?? "" });
@@ -33,15 +34,35 @@ export const pauseButton = (id) => button("Pause", async () => {
   if (answers) await postAction(id, "pause", answers);
 });
 
+/**
+ * Ask who confirms that a real bench is clear; with `later` that it will be when the campaign begins. Returns the keys of
+ * the request, nothing for a simulated bench, and null when the dialog was cancelled.
+ */
+export async function askBenchClear(bench, { later = false } = {}) {
+  const questions = Object.entries(bench.start_questions ?? {});
+  if (!questions.length) return {};
+  const answers = await askOperator(`${bench.name} is a real bench: ${later ? "will it be clear then" : "is it clear"}?`, [operatorNameField(), ...questions.map(([name, label]) => ({ name, label, type: "checkbox" }))],
+    { text: later ? "The table turns and the chamber heats and cools when the campaign begins, without asking again. Tick what you make sure of for that time." : "The table turns and the chamber heats and cools as soon as you start. Look at the bench, then tick what you have seen.", confirm: later ? "I make sure of it" : "Start now" });
+  return answers && { confirmed_by: answers.by, checks: questions.map(([name]) => name).filter((name) => answers[name]) };
+}
+
+/** The button that resumes an ended or interrupted campaign, and beside it why it may not, or what speaks against it. */
+export function resumeControl(campaign) {
+  if (!canResume(campaign)) return [];
+  const { resumable, resume_reason: reason } = campaign;
+  if (resumable === false) return [h("button", { type: "button", class: "button", disabled: true, title: reason }, "Resume where it was"), h("span", { class: "small muted" }, `Cannot be resumed now: ${reason}.`)];
+  return [resumeButton(campaign.id, { whole: true, kind: reason ? "" : "primary" }), reason ? h("span", { class: "small warn-text" }, `Look first: ${reason}.`) : null];
+}
+
 /** Continue a paused campaign, or with `whole` resume one that had ended or was interrupted. */
-export const resumeButton = (id, { whole = false } = {}) => button(whole ? "Resume where it was" : "Go on", async () => {
+export const resumeButton = (id, { whole = false, kind = "primary" } = {}) => button(whole ? "Resume where it was" : "Go on", async () => {
   const answers = await askOperator(whole ? "Take the campaign up where it was?" : "Go on with the campaign?", [operatorNameField(), { name: "reason", label: "Why", required: false }],
     { text: whole ? "First the safe state, then home, temperature and soak again; the first incomplete data set is measured anew." : null, confirm: whole ? "Resume" : "Go on" });
   if (!answers) return;
   await postAction(id, "resume", { by: answers.by, reason: answers.reason });
   toast("good", whole ? `Campaign ${id} is taken up.` : "It goes on.");
   if (whole) await navigate("/bench");
-}, { kind: "primary" });
+}, { kind });
 
 /** Buttons that answer the open prompt: done, or cannot be done. */
 export const answerButtons = (id, prompt) => [

@@ -1,11 +1,15 @@
 // A bench without a running campaign: the last campaign, the next scheduled one, and how to start.
 
-import { h } from "../core/elements.js";
-import { duration, instant, percent } from "../core/format.js";
+import { h, uniqueId } from "../core/elements.js";
+import { percent } from "../core/format.js";
 import { card, factList, notice } from "../core/components.js";
-import { canResume, CHIP_KINDS, stateChip } from "../campaigns/states.js";
+import { presentWords } from "../core/freshness.js";
+import { adviceNotice } from "../campaigns/advice.js";
+import { attendanceNotice } from "../campaigns/attendance.js";
+import { campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
+import { CHIP_KINDS, stateChip } from "../campaigns/states.js";
 import { startTime } from "../campaigns/start_time.js";
-import { linkButton, resumeButton } from "./actions.js";
+import { linkButton, resumeControl } from "./actions.js";
 
 export function noBenchCard() {
   return card("This service drives no bench",
@@ -15,19 +19,25 @@ export function noBenchCard() {
     h("div", { class: "row" }, linkButton("To the recordings", "/recordings")));
 }
 
+/** A card whose heading speaks of the present, and is another one while the page is stale. */
+function presentCard(fresh, stale, ...children) {
+  const id = uniqueId("present");
+  return h("section", { class: "card stack", "aria-labelledby": id }, h("h2", { id }, presentWords(fresh, stale)), ...children);
+}
+
 /** `next` is the next entry of the schedule, `last` the newest campaign; either may be undefined. */
 export function idleBench(bench, last, next) {
   return h("div", { class: "columns", style: "--column-min: 17rem" },
-    card("Nothing runs",
-      h("p", {}, bench.unconfirmed ? "No campaign starts before the bench was looked at." : `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`),
+    presentCard("Nothing runs", "State of the bench",
+      h("p", {}, bench.unconfirmed ? "No campaign starts before the bench was looked at." : presentWords(`${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`)),
       h("div", { class: "row" }, linkButton("Plan a campaign", "/campaigns/new", "primary"), linkButton("All campaigns", "/campaigns"))),
     card("Next on the schedule", next
-      ? [h("p", { class: "lead" }, startTime(next)), h("p", { class: "muted" }, `${next.recipe} on ${next.bench}`, next.cron ? [", then again: ", h("code", {}, next.cron)] : null)]
-      : h("p", { class: "muted" }, "Nothing is scheduled.")),
+      ? [h("p", { class: "lead" }, startTime(next)), h("p", { class: "muted" }, `${next.recipe} on ${next.bench}`, next.cron ? [", then again: ", h("code", {}, next.cron)] : null), attendanceNotice(next.attendance)]
+      : h("p", { class: "muted" }, presentWords("Nothing is scheduled."))),
     last ? card(`Last: campaign ${last.id}`,
       h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),
-      factList([["Ended", last.ended_at ? instant(last.ended_at) : "not", "", last.started_at && last.ended_at ? `took ${duration((Date.parse(last.ended_at) - Date.parse(last.started_at)) / 1000)}` : null], ["Progress", percent(last.progress)]]),
-      last.reason ? notice(CHIP_KINDS[last.state] ?? "warn", last.reason) : null,
+      factList([["Ended", last.ended_at ? campaignInstant(last, last.ended_at) : "not", "", durationTaken(last)], ["Progress", percent(last.progress)]]),
+      adviceNotice(last) ?? (last.reason ? notice(CHIP_KINDS[last.state] ?? "warn", last.reason) : null),
       h("div", { class: "row" }, Object.entries(last.recordings).map(([serial, recording]) => linkButton(`Explore ${serial}`, `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`)),
-        canResume(last) && last.bench === bench.name ? resumeButton(last.id, { whole: true }) : null)) : null);
+        last.bench === bench.name ? resumeControl(last) : null)) : null);
 }

@@ -2,10 +2,11 @@
 
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
-import { duration, instant } from "../core/format.js";
+import { duration } from "../core/format.js";
 import { card, cardWithHeader, notice } from "../core/components.js";
 import { navigate } from "../core/router.js";
 import { planChart } from "../campaigns/plan_chart.js";
+import { campaignInstant } from "../campaigns/campaign_time.js";
 import { stateChip } from "../campaigns/states.js";
 import { linkButton, pauseButton, resumeButton, stopButton } from "./actions.js";
 import { eventList } from "./event_list.js";
@@ -21,13 +22,13 @@ const MAX_EVENTS = 8;
 const PLAN_REFRESH_MS = 2500;
 
 /** `over()` is called when the campaign has ended. */
-export function runningCampaign(status, plan, bench, { signal, over }) {
+export function runningCampaign(status, plan, { signal, over }) {
   const { timeline } = plan;
   const history = campaignHistory(status.id);
-  const bar = statusBar(status, plan, bench);
+  const bar = statusBar(status, plan);
   const [connection, prompt, warningList] = [h("div", { "aria-live": "assertive" }), h("div", {}), h("div", { class: "stack", "aria-live": "polite" })];
   const dials = gauges(timeline);
-  const [historyFigure, outputCard, datasetCard, events] = [historyPlot(history), liveOutput(status.id), lastDataset(timeline, signal), eventList(MAX_EVENTS)];
+  const [historyFigure, outputCard, datasetCard, events] = [historyPlot(history), liveOutput(status.id), lastDataset(timeline, signal), eventList(MAX_EVENTS, "info", status)];
   let [now, asked, planned] = [status, null, 0];
   const picture = planChart(`Campaign ${status.id} plan`, () => ({ timeline: plan.timeline, now_s: now.t_s, live: true }), { height: "22rem", pick: (dataset) => Object.values(now.recordings)[0] && navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
   const setpoint = () => now.setpoint_c ?? timeline.temperature_c[Math.max((now.step ?? 1) - 1, 0)];
@@ -64,7 +65,7 @@ export function runningCampaign(status, plan, bench, { signal, over }) {
     event: (event) => events.add(event),
     link: ({ stale, since, why }) => {
       bar.classList.toggle("stale", stale);
-      setChildren(connection, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `What you see may no longer be so: ${why}. Trying again.`) : null);
+      setChildren(connection, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `), `What you see may no longer be so: ${why}. Trying again.`) : null);
     },
   }, signal);
   return [bar, connection, prompt, warningList, dials,
@@ -74,7 +75,7 @@ export function runningCampaign(status, plan, bench, { signal, over }) {
     cardWithHeader("Last events", linkButton("All of them", `/campaigns/${status.id}?level=info#events`, "tiny"), events)];
 }
 
-function statusBar(status, plan, bench) {
+function statusBar(status, plan) {
   const [state, text, beside, acts] = [h("span", {}), h("strong", { class: "status-bar-step" }), h("span", { class: "muted small" }), h("div", { class: "row tight" })];
   const bar = h("i", {});
   const meter = h("div", { class: "meter thick", role: "progressbar", "aria-label": "Progress of the campaign", "aria-valuemin": "0", "aria-valuemax": "100" }, bar);
@@ -88,7 +89,7 @@ function statusBar(status, plan, bench) {
     bar.style.width = `${(100 * now.progress).toFixed(2)}%`;
     meter.setAttribute("aria-valuenow", String(Math.round(100 * now.progress)));
     setChildren(beside, `Step ${now.step ?? "–"} of ${now.steps}, ${(100 * now.progress).toFixed(1)} %. `,
-      now.expected_end ? `${duration(remainingSeconds(now, plan.expected_s))} left, end ${instant(now.expected_end)}` : "", now.expected_end && bench.simulated ? h("span", { class: "wide-only" }, " on the simulated bench's own clock") : "", now.expected_end ? "." : "",
+      now.expected_end ? `${duration(remainingSeconds(now, plan.expected_s))} left, end ${campaignInstant(now, now.expected_end)}.` : "",
       now.wish === "pause" ? h("strong", {}, " Pauses after this data set.") : now.wish === "abort" ? h("strong", {}, " Stops now.") : null);
     const wanted = now.state === "paused" || now.wish === "pause" ? "resume" : "pause";
     if (wanted !== mode) setChildren(acts, wanted === "resume" ? resumeButton(now.id) : pauseButton(now.id));

@@ -5,11 +5,14 @@ import { setChildren, h } from "../core/elements.js";
 import { instant } from "../core/format.js";
 import { button, card, labelledField, notice, toggleGroup, toast } from "../core/components.js";
 import { navigate } from "../core/router.js";
+import { askBenchClear } from "../bench/actions.js";
+import { attendanceNotice, wallText } from "./attendance.js";
 
 const LOCAL_TIME_ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone;
 const HOUR_S = 3600;
 
-/** `order()` returns the chosen {recipe, clip, hide}; `bench` is the bench of the service, or null. */
+/** `order()` returns the chosen {recipe, clip, hide}; `bench` is the bench of the service, or null. `look()` of the element
+ * says again when the plan needs a person. */
 export function startForm(bench, order) {
   const when = [...(bench ? [["now", "Now"], ["at", "At a time"], ["cron", "Again and again"]] : []), ["simulation", "In simulation, without a bench"]];
   const place = h("div", { class: "stack" });
@@ -22,8 +25,34 @@ export function startForm(bench, order) {
   const late = h("input", { type: "number", min: "0", step: "any", placeholder: "any time" });
   const seed = h("input", { type: "number", value: "1", min: "0", step: "1" });
 
+  const attended = h("div", { "aria-live": "polite" });
+  let asked = new AbortController();
+  const timeOfStart = () => (chosen === "at" ? { at: at.value } : chosen === "cron" ? { cron: cron.value } : {});
+
+  /** Ask when this start would need a person; only a bench without a unit handler needs one. */
+  async function look() {
+    asked.abort();
+    asked = new AbortController();
+    setChildren(attended);
+    if (!bench || bench.simulated || chosen === "simulation" || (chosen === "at" && !at.value)) return;
+    const { hide, ...rest } = order();
+    try {
+      const answer = await post("/api/plans", { ...rest, ...timeOfStart(), ...(chosen === "now" ? {} : { time_zone: zone.value || null }) }, { signal: asked.signal });
+      setChildren(attended, attendanceNotice(answer.attendance, propose));
+    } catch (error) {
+      if (error.name !== "AbortError") setChildren(attended, notice("", error.message));
+    }
+  }
+  function propose(attendance) {
+    [at.value, zone.value] = [wallText(attendance.better_start), attendance.time_zone];
+    group.querySelectorAll("button")[when.findIndex(([each]) => each === "at")].click();
+  }
+  for (const input of [at, cron, zone]) input.addEventListener("change", look);
+
   async function now() {
-    const made = await post("/api/campaigns", order());
+    const clear = await askBenchClear(bench);
+    if (!clear) return;
+    const made = await post("/api/campaigns", { ...order(), ...clear });
     toast("good", `Campaign ${made.id} begins.`);
     await navigate("/bench");
   }
@@ -31,7 +60,9 @@ export function startForm(bench, order) {
     const { hide, ...rest } = order();
     if (hide.length) throw new Error("An effect can be hidden only in a campaign that begins now.");
     if (chosen === "at" && !at.value) throw new Error("Say when it is to begin.");
-    const made = await post("/api/campaigns", { ...rest, ...(chosen === "at" ? { at: at.value } : { cron: cron.value }), time_zone: zone.value || null, priority: Number(priority.value), ...(late.value === "" ? {} : { late_limit_s: Number(late.value) * HOUR_S }) });
+    const clear = await askBenchClear(bench, { later: true });
+    if (!clear) return;
+    const made = await post("/api/campaigns", { ...rest, ...clear, ...timeOfStart(), time_zone: zone.value || null, priority: Number(priority.value), ...(late.value === "" ? {} : { late_limit_s: Number(late.value) * HOUR_S }) });
     toast("good", `It begins ${instant(made.due_at)}, your time.`);
     await navigate("/campaigns");
   }
@@ -48,11 +79,11 @@ export function startForm(bench, order) {
   };
   const show = () => setChildren(place, FORMS[chosen]());
   show();
-  const element = card("Begin", bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."),
-    h("div", {}, toggleGroup("When", when, chosen, (value) => {
-      chosen = value;
-      show();
-    })), place);
-  element.id = "begin";
-  return element;
+  const group = toggleGroup("When", when, chosen, (value) => {
+    chosen = value;
+    show();
+    look();
+  });
+  const element = card("Begin", bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."), h("div", {}, group), attended, place);
+  return Object.assign(element, { id: "begin", look });
 }

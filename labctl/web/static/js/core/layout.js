@@ -1,8 +1,9 @@
-// Layout around every page: sidebar, access key, colour theme.
+// Layout around every page: how fresh it is, sidebar, access key, colour theme.
 
 import { accessKey, setAccessKey } from "./api.js";
 import { setChildren, h, svg } from "./elements.js";
 import { dialog } from "./components.js";
+import { freshnessLine } from "./freshness.js";
 import { show } from "./router.js";
 
 const NAVIGATION = [
@@ -67,7 +68,7 @@ export function buildLayout() {
       h("a", { class: "brand", href: "/" }, h("img", { src: "/static/mark.svg", alt: "" }), "labctl"),
       h("nav", { "aria-label": "Pages" }, links),
       h("div", { class: "sidebar-footer" }, controls())),
-    h("main", { id: "main", tabindex: "-1" }),
+    h("div", { class: "content" }, h("header", { class: "head" }, freshnessLine()), h("main", { id: "main", tabindex: "-1" })),
     h("footer", { class: "page-footer" }, controls()),
     h("div", { class: "toasts", "aria-live": "polite" }));
   name();

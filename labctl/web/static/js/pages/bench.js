@@ -1,14 +1,15 @@
 // The bench page: the running campaign, or what ran last and what comes next.
 
-import { get } from "../core/api.js";
+import { get, Problem } from "../core/api.js";
 import { h } from "../core/elements.js";
-import { instant } from "../core/format.js";
 import { chip, pageHeader, notice } from "../core/components.js";
+import { setTrouble } from "../core/freshness.js";
 import { show } from "../core/router.js";
 import { clearButton } from "../bench/actions.js";
+import { campaignInstant } from "../campaigns/campaign_time.js";
 import { idleBench, noBenchCard } from "../bench/idle_bench.js";
 import { runningCampaign } from "../bench/running_campaign.js";
-import { isRunning } from "../campaigns/states.js";
+import { canResume, isRunning } from "../campaigns/states.js";
 
 const POLL_MS = 5000;
 const AFTER_END_MS = 1500;
@@ -22,33 +23,37 @@ export async function page({ signal }) {
   const element = h("div", { class: "page bench" },
     pageHeader("Bench", h("span", { class: "row" }, h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null, h("span", {}, "with ", bench.units.flatMap((each, k) => (k ? [", ", unit(each)] : [unit(each)]))), now ? h("span", {}, "runs ", h("a", { href: `/campaigns/${now.id}` }, `campaign ${now.id}`), `, ${now.recipe}`) : null)));
   const unsafe = states.filter((each) => each.unconfirmed);
-  for (const each of unsafe) element.append(unconfirmedNotice(each));
+  for (const each of unsafe) element.append(unconfirmedNotice(each, each.name === bench.name && bench.simulated));
   if (now) {
     const plan = await get(`/api/campaigns/${now.id}/plan`, { signal });
-    element.append(...runningCampaign(now, plan, bench, { signal, over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS) }));
+    element.append(...runningCampaign(now, plan, { signal, over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS) }));
   } else {
-    element.append(idleBench(bench, campaigns.find((campaign) => campaign.bench === bench.name), schedule.find((each) => each.bench === bench.name)));
-    watchForStart(signal);
+    const last = campaigns.find((campaign) => campaign.bench === bench.name);
+    const whole = last && canResume(last) ? await get(`/api/campaigns/${last.id}`, { signal }) : last;
+    element.append(idleBench(bench, whole, schedule.find((each) => each.bench === bench.name)));
+    watchForChange(Boolean(bench.unconfirmed), signal);
   }
   return element;
 }
 
-/** While no campaign runs, poll for one that the schedule or another person has started. */
-function watchForStart(signal) {
+/** While no campaign runs, poll for one that the schedule or another person has started, and for the safe state. */
+function watchForChange(unconfirmed, signal) {
   const looking = setInterval(async () => {
     try {
       const [bench] = await get("/api/benches", { signal });
-      if (bench?.campaign) show();
-    } catch {
-      // polled again soon; the page shows nothing that could be out of date
+      setTrouble();
+      if (bench?.campaign || Boolean(bench?.unconfirmed) !== unconfirmed) show();
+    } catch (error) {
+      if (error instanceof Problem) setTrouble(error.message); // a silent service is seen by the head of the page
     }
   }, POLL_MS);
   signal.addEventListener("abort", () => clearInterval(looking));
+  window.addEventListener("labctl:fresh", show, { signal });
 }
 
-function unconfirmedNotice(bench) {
+function unconfirmedNotice(bench, simulated_time) {
   return notice("bad", h("p", { class: "lead" }, `Bench ${bench.name} was not confirmed safe`),
-    h("p", {}, `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${instant(bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`),
-    bench.attempts ? h("p", {}, bench.confirmed_at ? `labctl confirmed the safe state at ${instant(bench.confirmed_at)}, at attempt ${bench.attempts}. Look all the same before you clear it.` : `The safe state was tried again ${bench.attempts} times, last at ${instant(bench.attempted_at)}; it is tried every 30 s.`) : null,
+    h("p", {}, `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`),
+    bench.attempts ? h("p", {}, bench.confirmed_at ? `labctl confirmed the safe state at ${campaignInstant({ simulated_time }, bench.confirmed_at)}, at attempt ${bench.attempts}. Look all the same before you clear it.` : `The safe state was tried again ${bench.attempts} times, last at ${campaignInstant({ simulated_time }, bench.attempted_at)}; it is tried every 30 s.`) : null,
     h("div", { class: "row" }, clearButton(bench.name, show)));
 }

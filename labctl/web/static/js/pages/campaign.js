@@ -2,15 +2,17 @@
 
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
-import { count, duration, instant, percent } from "../core/format.js";
+import { count, percent } from "../core/format.js";
 import { card, chip, factList, pageHeader, cardWithHeader, notice, toggleGroup } from "../core/components.js";
 import { navigate, updateQuery, show as showAgain } from "../core/router.js";
-import { linkButton, resumeButton, stopButton } from "../bench/actions.js";
+import { linkButton, resumeControl, stopButton } from "../bench/actions.js";
 import { eventList } from "../bench/event_list.js";
 import { FINAL_STATES, followCampaign } from "../bench/campaign_stream.js";
 import { remainingSeconds } from "../bench/campaign_history.js";
 import { planChart } from "../campaigns/plan_chart.js";
-import { canResume, isRunning, stateChip } from "../campaigns/states.js";
+import { adviceNotice } from "../campaigns/advice.js";
+import { campaignDuration, campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
+import { isRunning, stateChip } from "../campaigns/states.js";
 
 const LEVELS = [["info", "all"], ["warning", "warnings and errors"], ["error", "errors"]];
 const MAX_EVENTS = 200;
@@ -21,7 +23,7 @@ export async function page({ params, query, signal }) {
   let [now, plan, benches] = await Promise.all([get(path, { signal }), get(`${path}/plan`, { signal }), get("/api/benches", { signal })]);
   const here = benches[0]?.name === now.bench;
   const level = LEVELS.some(([each]) => each === query.level) ? query.level : "info";
-  const events = eventList(MAX_EVENTS, level);
+  const events = eventList(MAX_EVENTS, level, now);
   const [about, reason, connection] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
   const picture = planChart(`Campaign ${now.id} plan`, () => ({ timeline: plan.timeline, now_s: isRunning(now) ? now.t_s : null, live: true }), { pick: (dataset) => Object.values(now.recordings)[0] && navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
   let asked = Date.now();
@@ -43,10 +45,10 @@ export async function page({ params, query, signal }) {
   followCampaign(now.id, {
     progress: show,
     event: (event) => events.add(event),
-    link: ({ stale, since, why }) => setChildren(connection, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}. `), `${why}. Trying again.`) : null),
+    link: ({ stale, since, why }) => setChildren(connection, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `), `${why}. Trying again.`) : null),
   }, signal);
 
-  const acts = isRunning(now) ? [linkButton("To the bench", "/bench"), here ? stopButton(now.id) : null] : [here && canResume(now) ? resumeButton(now.id, { whole: true }) : null, linkButton("Plan the same again", `/campaigns/new?${plan.text ? `toml=${encodeURIComponent(plan.text)}` : `recipe=${encodeURIComponent(now.recipe)}`}`)];
+  const acts = isRunning(now) ? [linkButton("To the bench", "/bench"), here ? stopButton(now.id) : null] : endedActions(now, plan, here);
   return h("div", { class: "page" },
     pageHeader(`Campaign ${now.id}`, h("span", {}, h("strong", {}, now.recipe), ` on bench ${now.bench}`), ...acts.filter(Boolean)),
     connection, reason, about,
@@ -58,23 +60,29 @@ export async function page({ params, query, signal }) {
     }), events), { id: "events" }));
 }
 
+/** Resume comes first only where it would be accepted and nothing speaks against it. */
+function endedActions(now, plan, here) {
+  const again = linkButton("Plan the same again", `/campaigns/new?${plan.text ? `toml=${encodeURIComponent(plan.text)}` : `recipe=${encodeURIComponent(now.recipe)}`}`);
+  const resume = here ? resumeControl(now) : [];
+  return now.resumable && !now.resume_reason ? [...resume, again] : [again, ...resume];
+}
+
 function summary(now, plan) {
   const states = plan.timeline.dataset.map((dataset, k) => (dataset === null ? null : plan.timeline.state[k])).filter(Boolean);
   const done = states.filter((state) => state === "done").length;
-  const took = now.started_at && now.ended_at ? duration((Date.parse(now.ended_at) - Date.parse(now.started_at)) / 1000) : null;
   return h("div", { class: "card" }, factList([
     ["State", stateChip(now), "", percent(now.progress)],
     ["Data sets", `${count(done)} of ${count(states.length)}`, "", `step ${now.step ?? "–"} of ${now.steps}`],
-    ["Begun", instant(now.started_at)],
-    isRunning(now) ? ["Expected end", instant(now.expected_end), "", `${duration(remainingSeconds(now, plan.expected_s))} left`] : ["Ended", instant(now.ended_at), "", took ? `took ${took}` : null],
-    ["Expected", duration(plan.expected_s), "", "as planned, without interruptions"],
+    ["Begun", campaignInstant(now, now.started_at)],
+    isRunning(now) ? ["Expected end", campaignInstant(now, now.expected_end), "", `${campaignDuration(now, remainingSeconds(now, plan.expected_s))} left`] : ["Ended", campaignInstant(now, now.ended_at), "", durationTaken(now)],
+    ["Expected", campaignDuration(now, plan.expected_s), "", "as planned, without interruptions"],
   ]));
 }
 
 /** The reason of the present state, as the service gives it. */
 function reasonNotices(now) {
   const kind = { done: "good", failed: "bad", aborted: "bad" }[now.state] ?? "warn";
-  return [isRunning(now) && now.state === "running" ? null : notice(kind, h("p", { class: "lead" }, now.reason || `It is ${now.state}.`), now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null),
+  return [isRunning(now) && now.state === "running" ? null : adviceNotice(now) ?? notice(kind, h("p", { class: "lead" }, now.reason || `It is ${now.state}.`), now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null),
     ...Object.entries(now.dropped).map(([unit, why]) => notice("warn", h("strong", {}, unit), ` took no further part: ${why}`))].filter(Boolean);
 }
 

@@ -5,6 +5,8 @@ import { setChildren, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
 import { busyIndicator, card, chip, factList, pageHeader, notice } from "../core/components.js";
 import { updateQuery } from "../core/router.js";
+import { attendanceNotice } from "../campaigns/attendance.js";
+import { SIMULATED } from "../campaigns/campaign_time.js";
 import { startForm } from "../campaigns/start_form.js";
 import { hiddenEffectForm } from "../campaigns/hidden_effects.js";
 import { planChart } from "../campaigns/plan_chart.js";
@@ -31,6 +33,7 @@ export async function page({ query, signal }) {
     try {
       const answer = await post("/api/plans", { recipe: source(), clip }, { signal: given });
       setChildren(planned, planCard(answer, bench));
+      starting.look();
     } catch (error) {
       if (error.name === "AbortError") return;
       setChildren(planned, refusalCard(error));
@@ -50,6 +53,7 @@ export async function page({ query, signal }) {
     updateQuery({ clip: clip ? 1 : null });
     plan();
   } }), h("span", {}, "Leave out what the bench or the unit cannot do"));
+  const starting = startForm(bench, () => ({ recipe: source(), clip, hide }));
   plan();
   return h("div", { class: "page" },
     pageHeader("Plan a campaign", bench ? h("span", { class: "row" }, "On bench ", h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null) : "For the simulated bench that fits the recipe best.",
@@ -64,7 +68,7 @@ export async function page({ query, signal }) {
       h("div", { class: "page" }, planned,
         card("What it could find", found),
         hider ? card("Hide an effect", h("p", { class: "muted" }, "The simulated unit then has it, and nothing tells: a case to practise on."), hider) : null,
-        startForm(bench, () => ({ recipe: source(), clip, hide })))));
+        starting)));
 }
 
 /** The shortest campaign that the bench can run. */
@@ -75,13 +79,16 @@ function shortestRecipe(all) {
 
 function planCard(answer, bench) {
   const ends = new Date(Date.now() + 1000 * answer.expected_s);
+  const simulated = !bench || bench.simulated;
+  const clock = simulated ? SIMULATED : "on the bench's own clock";
   return card("What it would do",
     factList([
       ["Data sets", count(answer.datasets), "", `in ${count(answer.steps)} steps`],
-      ["Expected time", duration(answer.expected_s), "", "on the bench's own clock"],
-      ["Begun now it ends", ends.toLocaleString("en-GB", { weekday: "short", hour: "2-digit", minute: "2-digit" }), "", ends.toLocaleDateString("en-GB", { day: "numeric", month: "short" })],
+      ["Expected time", duration(answer.expected_s), "", clock],
+      ["Begun now it ends", ends.toLocaleString("en-GB", { weekday: "short", hour: "2-digit", minute: "2-digit" }), "", `${ends.toLocaleDateString("en-GB", { day: "numeric", month: "short" })}${simulated ? `, ${SIMULATED}` : ""}`],
       answer.bench === bench?.name ? null : ["Bench", answer.bench],
     ]),
+    attendanceNotice(answer.attendance),
     planChart(`Plan of ${answer.recipe}`, () => ({ timeline: answer.timeline })),
     answer.clipped.length ? notice("warn", h("strong", {}, `${answer.clipped.length} points are left out`), h("details", {}, h("summary", {}, "Which, and why"), h("ul", {}, answer.clipped.map((each) => h("li", { class: "small" }, each))))) : null);
 }

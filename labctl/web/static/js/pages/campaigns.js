@@ -1,10 +1,13 @@
 // The page of all campaigns and of the schedule.
 
-import { get, remove } from "../core/api.js";
+import { get, Problem, remove } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
 import { button, card, chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
+import { setTrouble } from "../core/freshness.js";
 import { linkButton } from "../bench/actions.js";
+import { attendanceNotice } from "../campaigns/attendance.js";
+import { campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
 import { isRunning, stateChip } from "../campaigns/states.js";
 import { startTime } from "../campaigns/start_time.js";
 
@@ -24,22 +27,22 @@ export async function page({ signal }) {
     if (!moving) return;
     try {
       moving = await show();
-    } catch {
-      // polled again soon
+      setTrouble();
+    } catch (error) {
+      if (error instanceof Problem) setTrouble(error.message);
     }
   }, POLL_MS);
   signal.addEventListener("abort", () => clearInterval(looking));
+  window.addEventListener("labctl:fresh", () => show().catch(() => {}), { signal });
   return h("div", { class: "page" }, pageHeader("Campaigns", "One run of a recipe on a bench.", linkButton("Plan a campaign", "/campaigns/new", "primary")), place);
 }
-
-const durationText = (row) => (row.started_at && row.ended_at ? `took ${duration((Date.parse(row.ended_at) - Date.parse(row.started_at)) / 1000)}` : null);
 
 function campaignTable(rows) {
   return table([
     { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "muted small secondary" }, `${row.recipe} on ${row.bench}`)] },
     { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.state !== "running" && row.reason ? h("span", { class: "muted small secondary two-lines", title: row.reason }, row.reason) : null] },
     { title: "Progress", cell: (row) => h("div", { class: "progress-cell" }, h("div", { class: "meter", role: "img", "aria-label": percent(row.progress) }, h("i", { style: `width: ${100 * row.progress}%` })), h("span", { class: "small" }, percent(row.progress))) },
-    { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, instant(row.started_at)), h("span", { class: "muted small secondary nowrap" }, isRunning(row) ? `ends ${instant(row.expected_end)}` : durationText(row))] },
+    { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, campaignInstant(row, row.started_at)), h("span", { class: "muted small secondary nowrap" }, isRunning(row) ? `ends ${campaignInstant(row, row.expected_end)}` : durationTaken(row))] },
     { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("div", {}, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), h("span", { class: "small secondary" }, h("a", { href: `/recordings/${recording}` }, `Recording ${recording}`)))) },
   ], rows, { label: "Every campaign", first: "8rem" });
 }
@@ -49,7 +52,8 @@ const OUTCOMES = { started: "good", refused: "bad", missed: "warn", claimed: "ac
 function scheduleCard(rows, again) {
   const came = (event) => h("span", { class: "small secondary" }, chip(event.outcome, OUTCOMES[event.outcome] ?? ""), ` ${instant(event.at)} `, event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message);
   return card("Schedule", table([
-    { title: "Begins", cell: startTime },
+    { title: "Begins", cell: (row) => [startTime(row), row.confirmed_by ? h("span", { class: "muted small secondary" }, `${row.confirmed_by} makes sure that the bench is clear`) : null] },
+    ...(rows.some((row) => row.attendance) ? [{ title: "Needs a person", prose: true, cell: (row) => (row.attendance ? attendanceNotice(row.attendance) : h("span", { class: "muted" }, "no")) }] : []),
     { title: "Recipe", cell: (row) => [row.recipe, row.clip ? h("span", { class: "muted small secondary" }, "without what the bench cannot do") : null] },
     { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
     { title: "Priority", number: true, cell: (row) => row.priority },

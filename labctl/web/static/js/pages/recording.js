@@ -11,6 +11,7 @@ import { meanPlots } from "../recordings/mean_plots.js";
 import { datasetReadings } from "../recordings/readings.js";
 import { datasetTable } from "../recordings/dataset_table.js";
 import { trace } from "../recordings/trace.js";
+import { SIMULATED } from "../campaigns/campaign_time.js";
 
 const KIND_TEXTS = { samples: "every reading", points: "one mean per data set", coefficients: "a published table, no readings" };
 
@@ -52,7 +53,7 @@ function recordingHeader(about, path) {
   const file = (format, text) => button(text, () => download(`${path}/file?format=${format}`, `recording-${about.id}-${format}.zip`));
   const from = about.campaign ? h("a", { href: `/campaigns/${about.campaign}` }, `campaign ${about.campaign}`) : "an import";
   const made = [about.info.model, about.info.technology?.toUpperCase()].filter(Boolean);
-  return pageHeader(`Recording ${about.id}`, h("span", {}, "Of ", h("a", { href: `/units/${unit}` }, about.serial), made.length ? ` (${made.join(", ")})` : "", ", from ", from, `, ${day(about.created_at)}. Holds ${KIND_TEXTS[about.kind] ?? about.kind}.`),
+  return pageHeader(`Recording ${about.id}`, h("span", {}, "Of ", h("a", { href: `/units/${unit}` }, about.serial), made.length ? ` (${made.join(", ")})` : "", ", from ", from, `, ${day(about.created_at)}${about.simulated_time ? ` (${SIMULATED})` : ""}. Holds ${KIND_TEXTS[about.kind] ?? about.kind}.`),
     h("a", { class: "button primary", href: `/explore?unit=${unit}&recording=${about.id}` }, "Explore"),
     ...(about.kind === "coefficients" ? [] : [file("parquet", "Save as Parquet"), file("csv", "Save as CSV")]));
 }

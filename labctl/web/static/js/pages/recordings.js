@@ -6,6 +6,7 @@ import { count, day } from "../core/format.js";
 import { chip, selectField, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
 import { updateQuery } from "../core/router.js";
 import { importForm } from "../recordings/import_form.js";
+import { SIMULATED } from "../campaigns/campaign_time.js";
 
 export async function page({ query, signal }) {
   const list = h("div", {});
@@ -43,7 +44,7 @@ function recordingTable(rows) {
     { title: "Data sets", number: true, cell: (row) => count(row.datasets) },
     { title: "Readings", number: true, cell: (row) => (row.kind === "samples" ? count(row.readings) : "–") },
     { title: "From", cell: (row) => (row.campaign ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`) : h("span", { class: "muted" }, "import")) },
-    { title: "Since", cell: (row) => h("span", { class: "nowrap" }, day(row.created_at)) },
+    { title: "Since", cell: (row) => [h("span", { class: "nowrap" }, day(row.created_at)), row.simulated_time ? h("span", { class: "muted small secondary" }, SIMULATED) : null] },
     { title: h("span", { class: "visually-hidden" }, "Explore"), cell: (row) => h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(row.serial)}&recording=${row.id}` }, "Explore") },
   ], rows, { label: "Recordings", first: "13rem" });
 }

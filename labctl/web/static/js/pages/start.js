@@ -3,6 +3,7 @@
 import { get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
 import { button, card, pageHeader } from "../core/components.js";
+import { presentWords } from "../core/freshness.js";
 import { navigate } from "../core/router.js";
 import { isRunning } from "../campaigns/states.js";
 
@@ -48,7 +49,7 @@ function overview(units, campaigns, benches) {
     pageHeader("labctl", "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall."),
     h("div", { class: "columns", style: "--column-min: 17rem" },
       card("Bench", benches.length
-        ? h("p", {}, running ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.` : `${benches[0].name} is free.`)
+        ? h("p", {}, presentWords(running ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.` : benches[0].unconfirmed ? `${benches[0].name} was not confirmed safe: look at it.` : `${benches[0].name} is free.`))
         : h("p", {}, "This service drives no bench."),
       h("div", { class: "row" }, h("a", { class: "button primary", href: "/bench" }, "To the bench"), h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"))),
       card("Units", h("ul", { class: "plain" }, units.slice(0, 6).map((unit) => h("li", { class: "row space-between" },

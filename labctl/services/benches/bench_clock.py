@@ -1,0 +1,17 @@
+"""Whose clock a campaign's times are of: the wall's, or that of a simulated bench."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from instruments.bench_config import is_simulated_address
+
+
+def has_simulated_time(bench: Mapping[str, Any]) -> bool:
+    """Return whether a bench, as its file says it, keeps a simulated clock, which may run faster than the wall's."""
+    if (bench.get("simulation") or {}).get("control"):  # simulators in another process set the pace
+        return True
+    devices = [bench["table"], bench["chamber"], *bench["gyros"]]
+    links = [link for device in devices for key in ("port", "host") if (link := device.get(key)) is not None]
+    return all(is_simulated_address(link) for link in links)

@@ -1,0 +1,61 @@
+"""Confirmation by a person that a real bench is clear, before a campaign starts there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from instruments.bench_config import BenchFile
+from labctl.errors import StartNotConfirmed
+from labctl.services.schemas.campaigns import BENCH_CHECKS, BenchCheck
+
+#: What is asked, and what the answer yes says.
+QUESTIONS: Mapping[BenchCheck, str] = {
+    "chamber_clear": "Is the chamber clear: nobody's hand, no tool, no loose part in it, door closed?",
+    "table_free": "Is the table free to turn: nothing touches it, cables have their slack?",
+    "limiter_on": "Is the independent temperature limiter on?",
+}
+STATEMENTS: Mapping[BenchCheck, str] = {
+    "chamber_clear": "chamber clear",
+    "table_free": "table free",
+    "limiter_on": "limiter on",
+}
+
+
+class Confirming(Protocol):
+    """A request that may carry a confirmation."""
+
+    @property
+    def confirmed_by(self) -> str:
+        """The person; empty for none."""
+        ...
+
+    @property
+    def checks(self) -> list[BenchCheck]:
+        """What the person confirms."""
+        ...
+
+
+def start_questions(bench: BenchFile) -> dict[str, str]:
+    """Return what a person is asked before a campaign starts on a bench: check -> question; nothing if simulated."""
+    return {} if bench.is_simulated else {check: QUESTIONS[check] for check in BENCH_CHECKS}
+
+
+def confirmation_text(bench: BenchFile, request: Confirming) -> str:
+    """Return what a person has confirmed about a bench, for the campaign's records; empty for a simulated bench.
+
+    Raises StartNotConfirmed.
+    """
+    if bench.is_simulated:
+        return ""
+    questions = start_questions(bench)
+    by = request.confirmed_by.strip()
+    missing = {check: text for check, text in questions.items() if not by or check not in request.checks}
+    if missing:
+        raise StartNotConfirmed(
+            f"bench {bench.name} is not simulated: a campaign starts only after a person has confirmed "
+            f"{', '.join(STATEMENTS[check] for check in BENCH_CHECKS if check in missing)}. Look at the bench, then "
+            "send `confirmed_by` and `checks`, or name the person with --clear-confirmed-by NAME",
+            missing,
+        )
+    return f"{', '.join(STATEMENTS[check] for check in BENCH_CHECKS)}: confirmed by {by}"

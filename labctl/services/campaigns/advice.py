@@ -1,0 +1,141 @@
+"""A failed campaign in words: what happened, what labctl did, what a person does next."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from labctl.services.schemas.campaigns import AdviceResponse
+from procedures.contracts.journal import NOT_SAFE
+
+RESUME = "then resume the campaign"
+DID_SAFE = "labctl stopped the table, set the chamber to its safe set point, and kept every data set that was complete."
+DID_UNSAFE = (
+    "labctl tried to stop the table and to set the chamber to its safe set point, and could not confirm all of it."
+)
+DID_NOTHING = "labctl did not take the campaign up; every data set that was complete is kept."
+LOOK = (
+    "Go to the bench, look at table and chamber, say so with `labctl bench clear` or on the bench page, " + RESUME + "."
+)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """One kind of failure, known by the text of its reason."""
+
+    pattern: str
+    happened: str
+    next: str
+
+
+#: Kinds of failure by the reason that the engine or the recovery gives; the first that fits counts.
+FAILURES: tuple[Failure, ...] = (
+    Failure(
+        r"not taken up: bench .* was not confirmed safe",
+        "The bench was not confirmed safe when the campaign was to go on.",
+        LOOK,
+    ),
+    Failure(
+        r"taken up \d+ times without finishing a step",
+        "The campaign was taken up several times and never finished a step.",
+        f"Find out at the bench what ends it each time, {RESUME}.",
+    ),
+    Failure(
+        r"not taken up: ",
+        "The campaign was cut short and could not be taken up.",
+        f"Mend what the reason names, {RESUME}.",
+    ),
+    Failure(
+        r"could not be made safe first",
+        "The campaign was taken up, but the bench could not be made safe first.",
+        LOOK,
+    ),
+    Failure(
+        r" declined: ",
+        "A person said that it cannot be done.",
+        f"Remove what prevents it, {RESUME} and answer its question.",
+    ),
+    Failure(
+        r"nobody answered within",
+        "Nobody answered the bench's question in time.",
+        f"Choose a time when a person is at the bench, {RESUME} and answer its question.",
+    ),
+    Failure(
+        r"the soak at .* did not settle within",
+        "The unit did not settle at its temperature in time.",
+        f"Check the air flow around the unit, or allow a longer soak in the recipe, {RESUME}.",
+    ),
+    Failure(
+        r"deg C after .* not within .* of",
+        "The chamber did not reach its set point in time.",
+        f"Check that the chamber heats and cools and that its door is closed, {RESUME}.",
+    ),
+    Failure(
+        r"set point .* read back",
+        "The chamber did not take the set point that it was given.",
+        f"Look at the controller's panel for a profile, a lock or a limit, {RESUME}.",
+    ),
+    Failure(
+        r": alarms \(",
+        "The chamber's controller reports an alarm.",
+        f"Read the alarm at the controller, remove its cause and reset it, {RESUME}.",
+    ),
+    Failure(
+        r"the air is beyond|its own thermometer: ",
+        "A temperature passed a limit of the chamber or of a unit.",
+        f"Let chamber and unit return to room temperature, find out why they left it, {RESUME}.",
+    ),
+    Failure(
+        r"the air left its set point|is off the air's",
+        "The temperature was not steady while readings were taken.",
+        f"Check the chamber's door, air flow and controller, {RESUME}.",
+    ),
+    Failure(
+        r" runs .* deg/s instead of|steps took .* instead of|is steady at .* not for the",
+        "The table did not turn at the rate that it was asked for.",
+        f"Check that the table turns freely and that its cables have their slack, {RESUME}.",
+    ),
+    Failure(
+        r"still turns|still moves",
+        "The table did not come to rest.",
+        LOOK,
+    ),
+    Failure(
+        r"readings lost or damaged|readings marked bad|not one of about",
+        "The readings of a unit were missing, damaged or marked bad.",
+        f"Check the unit's power, cable and baud rate, {RESUME}.",
+    ),
+    Failure(
+        r"nothing heard|no answer|gave no answer|no intact datagram|no whole line|does not answer|link .* broke|"
+        r"cannot be opened|no Modbus TCP|reply belongs to another request|not reached again",
+        "An instrument did not answer.",
+        f"Check its power and cable with `labctl bench check`, {RESUME}.",
+    ),
+    Failure(
+        r"check address and driver|not a C4|, serial ",
+        "Another instrument answered than the one in the bench file.",
+        f"Compare the bench file with the bench, {RESUME}.",
+    ),
+    Failure(
+        r"database|disk|could be written|could not be written",
+        "The database could not be written.",
+        f"Make room on the disk or mend the database, look at the bench, {RESUME}.",
+    ),
+    Failure(
+        r"^ended by an error of the program|^[A-Za-z_.]*(Error|Exception)\b",
+        "labctl met an error of its own.",
+        f"Report the reason with the version of labctl, look at the bench, {RESUME}.",
+    ),
+)
+OTHER = Failure("", "A step of the campaign could not be carried out.", f"Mend what the reason names, {RESUME}.")
+
+
+def advice_of(state: str, reason: str) -> AdviceResponse | None:
+    """Return the advice on a campaign by its reason; None unless it has failed."""
+    if state != "failed":
+        return None
+    unsafe = NOT_SAFE in reason
+    cause = reason.partition(NOT_SAFE)[0] or reason
+    failure = next((each for each in FAILURES if re.search(each.pattern, cause)), OTHER)
+    done = DID_UNSAFE if unsafe else DID_NOTHING if "taken up" in cause else DID_SAFE
+    return AdviceResponse(happened=failure.happened, done=done, next=LOOK if unsafe else failure.next)

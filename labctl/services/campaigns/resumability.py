@@ -1,0 +1,65 @@
+"""Whether a campaign may be resumed here and now, and why not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from instruments.bench_config import BenchFile
+from labctl.services.campaigns.status import ENDED
+from labctl.services.schemas.campaigns import CampaignResponse
+from labctl.store import ResumePoint, Store
+
+#: A campaign that was taken up so often without finishing a step needs a person.
+MAX_RESUMES = 5
+NO_BENCH = "this service has no bench; a service on the campaign's bench or `labctl campaign resume` takes it up"
+
+
+def retries_exhausted(standing: ResumePoint) -> str | None:
+    """Return why a campaign is not taken up by itself any more, or None."""
+    if standing.tries < MAX_RESUMES:
+        return None
+    return f"taken up {standing.tries} times without finishing a step; look at the bench, then `labctl campaign resume`"
+
+
+def _nothing() -> None:
+    """Nothing runs on the bench."""
+
+
+def with_resume(
+    store: Store,
+    answer: CampaignResponse,
+    bench: BenchFile | None = None,
+    running: Callable[[], int | None] = _nothing,
+) -> CampaignResponse:
+    """Return the status with `resumable` and `resume_reason`.
+
+    `bench` is where it would be resumed, by default the campaign's own; `running` returns the campaign that runs there.
+    """
+    resumable, reason = _standing(store, answer, bench, running)
+    return answer.model_copy(update={"resumable": resumable, "resume_reason": reason})
+
+
+def _standing(
+    store: Store, answer: CampaignResponse, bench: BenchFile | None, running: Callable[[], int | None]
+) -> tuple[bool, str]:
+    if answer.state == "paused" and not answer.abandoned:
+        return True, ""
+    if answer.state == "done":
+        return False, "it is done"
+    if answer.state not in ENDED | {"interrupted"} and not answer.abandoned:
+        return False, f"it is {answer.state}"
+    if refused := _refusal(store, answer, bench, running()):
+        return False, refused
+    return True, retries_exhausted(store.resume_points.of_campaign(answer.id)) or ""
+
+
+def _refusal(store: Store, answer: CampaignResponse, bench: BenchFile | None, running: int | None) -> str:
+    """Return why a resume would be refused, empty when it would not."""
+    name = answer.bench if bench is None else bench.name
+    if bench is not None and {gyro.serial for gyro in bench.gyros} != set(answer.recordings):
+        return f"bench {name} carries other units than the campaign measures"
+    if running not in {None, answer.id}:  # its own end is being written: by the time of a resume it is over
+        return f"campaign {running} runs on bench {name} now; it has to end first"
+    if text := store.benches.unconfirmed(name):
+        return f"the safe state of bench {name} is not confirmed ({text}); look at it first"
+    return ""
