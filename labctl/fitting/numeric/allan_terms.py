@@ -17,6 +17,8 @@ from labctl.fitting.numeric.arrays import Array
 #: A term is shown when the deviance of the record rises by this without it (about 99.5 %, as octaves share readings).
 SHOWN_DEVIANCE = 9.0
 ROUNDS = 30
+#: A model of the variances has converged when none changes by more than this share and this amount, (deg/s)^2.
+CONVERGED, CONVERGED_VAR = 1e-8, 1e-8
 DEG_PER_ROOT_HOUR = 60.0
 DEG_PER_HOUR = 3600.0
 
@@ -117,7 +119,7 @@ def _fit(design: NDArray[np.float64], variance: Array, freedom: Array, kept: lis
         before = model
         model = np.maximum(design[:, kept] @ (found / size), 1e-12 * variance)
         terms[kept] = found / size
-        if np.allclose(model, before, rtol=1e-8):
+        if np.all(np.abs(model - before) <= CONVERGED_VAR + CONVERGED * before):
             break
     ratio = variance / model
     return terms, float(np.sum(freedom * (ratio - np.log(ratio) - 1.0)))

@@ -60,8 +60,8 @@ class Drift:
 def whitened(
     scatter: Scatter, drifts: Sequence[Drift], white_var: Array, values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], Array]:
-    """Return values (m, k) with each drift's correlation taken out, (drifts, m, k), and the log determinants of the
-    covariances, (drifts,).
+    """Return values (m, k) with each drift's correlation taken out, (drifts, m, k) with the rows in order of time, and
+    the log determinants of the covariances, (drifts,).
 
     Row by row in time, as a Kalman filter goes: of an Ornstein-Uhlenbeck process only the last value matters, so it is
     the same as by the Cholesky factors, in a number of operations that grows with m and not with its cube. What is
@@ -70,15 +70,17 @@ def whitened(
     order = np.lexsort((scatter.t_s, scatter.run))
     ordered = np.asfortranarray(values[order])
     kept, total, share = _filter(scatter, drifts, white_var, order)
-    found = np.empty((len(drifts), *values.shape))
+    found = np.empty((len(drifts), *values.T.shape))  # column by column, as LAPACK takes and gives them
     band = np.ones((2, len(order)))
+    carried, left = kept[:, 1:] * share[:, :-1], kept[:, 1:] * (1.0 - share[:, :-1])
     for k in range(len(drifts)):
-        band[1, :-1] = -kept[k, 1:] * (1.0 - share[k, :-1])
+        band[1, :-1] = -left[k]
         expected = np.zeros_like(ordered)
-        expected[1:] = (kept[k, 1:] * share[k, :-1])[:, None] * ordered[:-1]
+        np.multiply(carried[k][:, None], ordered[:-1], out=expected[1:])
         expected, _ = dtbtrs(band, expected, uplo="L", diag="U", overwrite_b=True)
-        found[k, order] = (ordered - expected) / np.sqrt(total[k])[:, None]
-    return found, np.log(total).sum(axis=1)
+        np.subtract(ordered, expected, out=expected)
+        np.divide(expected.T, np.sqrt(total[k]), out=found[k])
+    return found.transpose(0, 2, 1), np.log(total).sum(axis=1)
 
 
 def _filter(

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from labctl.fitting.criticism.candidates import option_of
-from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
+from labctl.fitting.criticism.evidence.elimination import ScaledBase, WhitenedBase
 from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.model_comparison import Comparison, centred, compare_models, constant_coordinates
 from labctl.fitting.criticism.ranking import Candidate
@@ -81,20 +81,22 @@ def _gain_function(comparison: Comparison, candidate: Candidate, kind: Effect) -
     """Return the function shape -> chi2 that it removes over the candidate's axes, at the base's likeliest noise."""
     data, reference = comparison.data, comparison.model.reference
     bases = {
-        axis: WhitenedBase(comparison.designs[axis], comparison.white_var[axis], comparison.axes[axis].best.noise)
+        axis: (
+            WhitenedBase(comparison.designs[axis], comparison.white_var[axis], comparison.axes[axis].best.noise),
+            ScaledBase(comparison.designs[axis], comparison.scales[axis]),
+        )
         for axis in candidate.option
     }
     outputs = {axis: data.error_dps(axis) for axis in candidate.option}
 
     def gain(term: Term) -> float:
         total = 0.0
-        for axis, base in bases.items():
+        for axis, (whitened, scaled) in bases.items():
             option = option_of(data, axis, reference, kind, term)
             if option is None:
                 continue
             rows = np.concatenate([option.rows, outputs[axis][:, :, None]], axis=2)
-            others = non_mean_products(comparison.designs[axis], rows, comparison.scales[axis])
-            left = base.eliminate_from(rows[0], others)
+            left = whitened.eliminate_from(rows[0], scaled.products(rows))
             total += float(gains_of(left, [slice(0, option.rows.shape[2])])[0][0])
         return total
 
