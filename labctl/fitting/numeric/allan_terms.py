@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.nonnegative import nonnegative_least_squares
 
 #: A term is shown when the deviance of the record rises by this without it (about 99.5 %, as octaves share readings).
 SHOWN_DEVIANCE = 9.0
@@ -107,15 +108,13 @@ def _fewest(design: NDArray[np.float64], variance: Array, freedom: Array) -> Arr
 
 def _fit(design: NDArray[np.float64], variance: Array, freedom: Array, kept: list[int]) -> tuple[Array, float]:
     """Return squared coefficients >= 0 that make chi-square distributed variances likeliest, and their deviance."""
-    from scipy.optimize import nnls  # noqa: PLC0415  0.1 s that a recording without a static record does not need
-
     terms = np.zeros(design.shape[1])
     model = variance
     for _ in range(ROUNDS):
         weight = np.sqrt(freedom / 2) / model
         columns = design[:, kept] * weight[:, None]
         size = np.linalg.norm(columns, axis=0)
-        found, _ = nnls(columns / size, variance * weight)
+        found = nonnegative_least_squares(columns / size, variance * weight)
         before = model
         model = np.maximum(design[:, kept] @ (found / size), 1e-12 * variance)
         terms[kept] = found / size

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
@@ -65,7 +64,8 @@ def evidence(
     log_p, gain, k = gains_by_noise(means, others)
     g = float(len(design.t_s))
     log_bf = 0.5 * gain * g / (1 + g) - 0.5 * k * np.log1p(g)
-    total = logsumexp(log_p[:, None] + log_bf, axis=0) - logsumexp(log_p)
+    log_all = float(np.logaddexp.reduce(log_p))
+    total = np.logaddexp.reduce(log_p[:, None] + log_bf, axis=0) - log_all
     best = int(np.argmax(log_p))
     left = WhitenedBase(design, means.white_var, noises[best]).eliminate_from(everything[0], others)
     competes = [
@@ -75,9 +75,9 @@ def evidence(
     return AxisEvidence(
         np.where((k[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
         left,
-        gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows,
+        gain[best], k[best], slices, np.exp(log_p - log_all), noises, rows,
         int((design.precision == 0).sum()),
-        float(logsumexp(log_p) + 0.5 * np.log(design.precision[design.precision > 0]).sum()),
+        float(log_all + 0.5 * np.log(design.precision[design.precision > 0]).sum()),
     )  # fmt: skip
 
 
