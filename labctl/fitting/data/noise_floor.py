@@ -109,7 +109,8 @@ def _drift(surface: NDArray[np.float64], fuller: NDArray[np.float64], error_dps:
         return first
     (rows,), _ = whitened(scatter, [first], scatter.white_var, np.column_stack([fuller, error_dps]))
     # the last column of the triangle: what the surface takes of the data, what the levels take, and what is left
-    reduced = np.linalg.qr(rows, mode="r")[:, -1] ** 2
+    triangle: NDArray[np.float64] = np.asarray(np.linalg.qr(rows, mode="r"))
+    reduced = triangle[:, -1] ** 2
     taken, left = float(np.sum(reduced[k:k_fuller])), float(np.sum(reduced[k_fuller:]))
     if fdtrc(more, free, taken / more / max(left / free, 1e-300)) > FALSE_ALARM:
         return first

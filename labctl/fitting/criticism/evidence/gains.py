@@ -45,9 +45,10 @@ class OptionPairs:
         """Return the pairs of options whose columns are at these places."""
         widths = np.array([where.stop - where.start for where in slices], dtype=np.int64)
         groups, left, right, count = [], [], [], 0
-        for width in np.unique(widths):
+        for width in np.unique(widths).tolist():
             options = np.flatnonzero(widths == width)
-            columns = np.array([np.arange(slices[i].start, slices[i].stop) for i in options])
+            here = [slices[i] for i in options.tolist()]
+            columns = np.array([np.arange(where.start, where.stop) for where in here])
             i, j = np.triu_indices(width)
             among = np.zeros((width, width), dtype=np.int64)
             among[i, j] = among[j, i] = np.arange(len(i))
