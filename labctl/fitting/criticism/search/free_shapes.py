@@ -1,0 +1,114 @@
+"""Free shapes: polynomials over rate and temperature, which what is to be named must not fall behind.
+
+Any law is followed a little by some shape of the catalogue. A name says more: that the shape is this one. So what is to
+be named is weighed, its discrepancy included, against polynomials over rate and temperature that mean nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+from numpy.typing import NDArray
+
+from labctl.fitting.criticism.candidate_shape import CandidateShape
+from labctl.fitting.criticism.candidates import option_of
+from labctl.fitting.criticism.channel_functions import smooth_channels
+from labctl.fitting.criticism.evidence.bayes_factors import evidence
+from labctl.fitting.criticism.evidence.design import Design, Discrepancy
+from labctl.fitting.criticism.model_comparison import Comparison, compare_models, designs_beside
+from labctl.fitting.criticism.verdict import LEAD
+from labctl.fitting.effects import Effect, Term
+from labctl.fitting.numeric.arrays import Array
+from labctl.progress import report_stage
+
+#: Degrees of a polynomial of the rate, and total degrees of one over rate and temperature.
+OF_RATE, OF_BOTH = (5, 7), (4, 5, 6, 8)
+RATE, TEMPERATURE = "table_rate_dps", "temperature_c"
+
+
+def channels_of_free_shape(
+    first: Comparison, terms: tuple[Term, ...], discrepancy: Mapping[str, Discrepancy], catalogue: Mapping[str, Effect]
+) -> tuple[str, ...]:
+    """Return the channels of a polynomial that has clearly more evidence than terms and their discrepancy; () if none.
+
+    `first` is the comparison without the terms. All are weighed at the scatter that remains beside them.
+    """
+    report_stage(f"weighing {', '.join(term.effect for term in terms)} against free shapes")
+    model = first.model.with_terms((*first.model.terms, *(replace(term, steady=True) for term in terms)))
+    wide, narrow = (
+        {axis: replace(design, options=[]) for axis, design in designs_beside(first, model, wrong).items()}
+        for wrong in (discrepancy, {})
+    )
+    beside = compare_models(first.data, model, {}, wide)
+    named, free = 0.0, dict.fromkeys(_shapes(first, first.data.info.axes[0]), 0.0)
+    for axis in first.axes:
+        rivals = _shapes(first, axis)
+        options = [shape for shapes in rivals.values() for shape in shapes]
+        own = _named(first, axis, terms, catalogue)
+        found = _evidence(first, beside, axis, [*options, *own])
+        shape = _log_p(first, beside, axis, wide[axis]) - _log_p(first, beside, axis, narrow[axis])
+        for channels, shapes in rivals.items():
+            here, found = found[: len(shapes)], found[len(shapes) :]
+            free[channels] = free.get(channels, 0.0) + float(here.max(initial=0.0))
+        named += float(found.max(initial=0.0)) + shape
+    best = max(free, key=lambda channels: free[channels], default=())
+    return best if best and free[best] > named + LEAD else ()
+
+
+def _shapes(comparison: Comparison, axis: str) -> dict[tuple[str, ...], list[CandidateShape]]:
+    """Return channels -> polynomials of them, for one axis."""
+    data = comparison.data
+    channels = smooth_channels(data, axis)
+    if RATE not in channels:
+        return {}
+    rate = channels[RATE] / max(float(np.abs(channels[RATE]).max()), 1e-9)
+    of_rate = legvander(rate, max(OF_BOTH))
+    found = {(RATE,): [_shape(comparison, RATE, of_rate[:, : degree + 1]) for degree in OF_RATE]}
+    if TEMPERATURE in channels:
+        warm = channels[TEMPERATURE]
+        of_both = legvander(2 * (warm - warm.min()) / np.ptp(warm) - 1, max(OF_BOTH))
+        found[RATE, TEMPERATURE] = [_shape(comparison, RATE, _products(of_rate, of_both, d)) for d in OF_BOTH]
+    return found
+
+
+def _products(first: NDArray[np.float64], other: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
+    """Return the products of polynomials up to a total degree."""
+    return np.column_stack(
+        [first[:, i] * other[:, j] for i in range(degree + 1) for j in range(degree + 1 - i) if i + j > 0]
+    )
+
+
+def _shape(comparison: Comparison, name: str, columns: NDArray[np.float64]) -> CandidateShape:
+    count = columns.shape[1]
+    return CandidateShape(name, None, comparison.data.rows_of(columns), ("",) * count, ("deg/s",) * count)
+
+
+def _named(
+    comparison: Comparison, axis: str, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]
+) -> list[CandidateShape]:
+    """Return what is to be named on one axis as one option; none where it does not touch the axis."""
+    made = (
+        option_of(comparison.data, axis, comparison.model.reference, catalogue[term.effect], term) for term in terms
+    )
+    options = [option for option in made if option is not None]
+    if not options:
+        return []
+    rows = np.concatenate([option.rows for option in options], axis=2)
+    names, units = (sum(each, ()) for each in ([o.names for o in options], [o.units for o in options]))
+    return [CandidateShape(RATE, None, rows, names, units)]
+
+
+def _evidence(first: Comparison, beside: Comparison, axis: str, options: list[CandidateShape]) -> Array:
+    """Return the log Bayes factors of options against the base of a comparison, at the scatter of another."""
+    design = replace(first.designs[axis], options=options)
+    white, scale, noises = beside.white_var[axis], beside.scales[axis], beside.axes[axis].noises
+    y = first.data.error_dps(axis)
+    return evidence(design, y, white, scale, noises, int(design.present.sum())).log_bf
+
+
+def _log_p(first: Comparison, beside: Comparison, axis: str, design: Design) -> float:
+    white, scale, noises = beside.white_var[axis], beside.scales[axis], beside.axes[axis].noises
+    return evidence(design, first.data.error_dps(axis), white, scale, noises, int(design.present.sum())).log_p
