@@ -16,46 +16,55 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.channel_functions import smooth_channels
-from labctl.fitting.criticism.evidence.bayes_factors import evidence
+from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
 from labctl.fitting.criticism.model_comparison import Comparison, compare_models, designs_beside
 from labctl.fitting.criticism.verdict import LEAD
 from labctl.fitting.effects import Effect, Term
-from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.models.error_model import ErrorModel
 from labctl.progress import report_stage
 
 #: Degrees of a polynomial of the rate, and total degrees of one over rate and temperature.
-OF_RATE, OF_BOTH = (5, 7), (4, 5, 6, 8)
+OF_RATE, OF_BOTH = (5, 7), (5, 8)
 RATE, TEMPERATURE = "table_rate_dps", "temperature_c"
 
 
 def channels_of_free_shape(
-    first: Comparison, terms: tuple[Term, ...], discrepancy: Mapping[str, Discrepancy], catalogue: Mapping[str, Effect]
+    first: Comparison, beside: Comparison, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]
 ) -> tuple[str, ...]:
     """Return the channels of a polynomial that has clearly more evidence than terms and their discrepancy; () if none.
 
-    `first` is the comparison without the terms. All are weighed at the scatter that remains beside them.
+    `first` is the comparison without the terms, `beside` the one with them and their discrepancy in its base, at whose
+    scatter all are weighed. Terms that are exact need no discrepancy.
     """
     report_stage(f"weighing {', '.join(term.effect for term in terms)} against free shapes")
-    model = first.model.with_terms((*first.model.terms, *(replace(term, steady=True) for term in terms)))
-    wide, narrow = (
-        {axis: replace(design, options=[]) for axis, design in designs_beside(first, model, wrong).items()}
-        for wrong in (discrepancy, {})
-    )
-    beside = compare_models(first.data, model, {}, wide)
-    named, free = 0.0, dict.fromkeys(_shapes(first, first.data.info.axes[0]), 0.0)
-    for axis in first.axes:
+    model = with_steady(first, terms)
+    named: float = 0.0
+    free: dict[tuple[str, ...], float] = {}
+    for axis, exact in designs_beside(first, model, {}).items():
         rivals = _shapes(first, axis)
         options = [shape for shapes in rivals.values() for shape in shapes]
         own = _named(first, axis, terms, catalogue)
-        found = _evidence(first, beside, axis, [*options, *own])
-        shape = _log_p(first, beside, axis, wide[axis]) - _log_p(first, beside, axis, narrow[axis])
+        found = _weighed(first, beside, axis, replace(first.designs[axis], options=[*options, *own])).log_bf
         for channels, shapes in rivals.items():
             here, found = found[: len(shapes)], found[len(shapes) :]
             free[channels] = free.get(channels, 0.0) + float(here.max(initial=0.0))
-        named += float(found.max(initial=0.0)) + shape
+        wrong_by = beside.axes[axis].log_p - _weighed(first, beside, axis, replace(exact, options=[])).log_p
+        named += float(found.max(initial=0.0)) + max(wrong_by, 0.0)
     best = max(free, key=lambda channels: free[channels], default=())
     return best if best and free[best] > named + LEAD else ()
+
+
+def with_steady(first: Comparison, terms: tuple[Term, ...]) -> ErrorModel:
+    """Return the model of a comparison with more terms, each of one coefficient for all temperatures."""
+    return first.model.with_terms((*first.model.terms, *(replace(term, steady=True) for term in terms)))
+
+
+def beside_terms(first: Comparison, terms: tuple[Term, ...], discrepancy: Mapping[str, Discrepancy]) -> Comparison:
+    """Return the comparison beside terms and their discrepancy, in which nothing competes."""
+    model = with_steady(first, terms)
+    designs = designs_beside(first, model, discrepancy)
+    return compare_models(first.data, model, {}, {axis: replace(each, options=[]) for axis, each in designs.items()})
 
 
 def _shapes(comparison: Comparison, axis: str) -> dict[tuple[str, ...], list[CandidateShape]]:
@@ -65,12 +74,14 @@ def _shapes(comparison: Comparison, axis: str) -> dict[tuple[str, ...], list[Can
     if RATE not in channels:
         return {}
     rate = channels[RATE] / max(float(np.abs(channels[RATE]).max()), 1e-9)
-    of_rate = legvander(rate, max(OF_BOTH))
-    found = {(RATE,): [_shape(comparison, RATE, of_rate[:, : degree + 1]) for degree in OF_RATE]}
+    of_rate = np.asarray(legvander(rate, max(OF_BOTH)), dtype=np.float64)
+    found: dict[tuple[str, ...], list[CandidateShape]] = {
+        (RATE,): [_shape(comparison, RATE, of_rate[:, 1 : degree + 1]) for degree in OF_RATE]
+    }
     if TEMPERATURE in channels:
         warm = channels[TEMPERATURE]
-        of_both = legvander(2 * (warm - warm.min()) / np.ptp(warm) - 1, max(OF_BOTH))
-        found[RATE, TEMPERATURE] = [_shape(comparison, RATE, _products(of_rate, of_both, d)) for d in OF_BOTH]
+        of_warm = legvander(2 * (warm - warm.min()) / np.ptp(warm) - 1, max(OF_BOTH)).astype(np.float64)
+        found[RATE, TEMPERATURE] = [_shape(comparison, RATE, _products(of_rate, of_warm, d)) for d in OF_BOTH]
     return found
 
 
@@ -101,14 +112,7 @@ def _named(
     return [CandidateShape(RATE, None, rows, names, units)]
 
 
-def _evidence(first: Comparison, beside: Comparison, axis: str, options: list[CandidateShape]) -> Array:
-    """Return the log Bayes factors of options against the base of a comparison, at the scatter of another."""
-    design = replace(first.designs[axis], options=options)
+def _weighed(first: Comparison, beside: Comparison, axis: str, design: Design) -> AxisEvidence:
+    """Return the evidence of a design at the scatter of another comparison."""
     white, scale, noises = beside.white_var[axis], beside.scales[axis], beside.axes[axis].noises
-    y = first.data.error_dps(axis)
-    return evidence(design, y, white, scale, noises, int(design.present.sum())).log_bf
-
-
-def _log_p(first: Comparison, beside: Comparison, axis: str, design: Design) -> float:
-    white, scale, noises = beside.white_var[axis], beside.scales[axis], beside.axes[axis].noises
-    return evidence(design, first.data.error_dps(axis), white, scale, noises, int(design.present.sum())).log_p
+    return evidence(design, first.data.error_dps(axis), white, scale, noises, int(design.present.sum()))

@@ -109,5 +109,5 @@ def is_better_than_smooth(
         shape = (
             evidence(wide, y, white, scale, noises, rows).log_p - evidence(narrow, y, white, scale, noises, rows).log_p
         )
-        lead += max(of.get(False, 0.0), 0.0) + shape - max(of.get(True, 0.0), 0.0)
+        lead += max(of.get(False, 0.0), 0.0) + max(shape, 0.0) - max(of.get(True, 0.0), 0.0)
     return lead > LEAD

@@ -14,6 +14,7 @@ from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean
 from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.evidence.noise_grid import Noise
 from labctl.fitting.criticism.model_comparison import Comparison
+from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.verdict import ENOUGH
 from labctl.fitting.numeric.arrays import Array
 
@@ -22,6 +23,18 @@ TIME = "t_s"
 PLACES, ROUNDS = 48, 3
 #: A step nearer than this share of the campaign to its ends is left out.
 EDGE = 0.02
+#: From this share of the evidence for the leading effect on, time is looked at for a sharp step.
+SHARE = 0.5
+
+
+def may_be_step(comparison: Comparison) -> bool:
+    """Return whether time explains so much that a step, sharp and in its place, could explain more than any effect."""
+    effect, time = comparison.leader(smooth=False), _time(comparison)
+    return effect is not None and time is not None and time.log_bf > SHARE * effect.log_bf
+
+
+def _time(comparison: Comparison) -> Candidate | None:
+    return next((c for c in comparison.candidates if c.smooth and c.id == TIME and c.log_bf >= ENOUGH), None)
 
 
 def refined_steps(comparison: Comparison) -> dict[str, CandidateShape]:
@@ -30,7 +43,7 @@ def refined_steps(comparison: Comparison) -> dict[str, CandidateShape]:
     Nothing where time has no evidence, or the step removes less than the leading effect. All is weighed at white noise:
     beside a model without the step, the step looks like drift and like scatter that grows with the rate.
     """
-    time = next((c for c in comparison.candidates if c.smooth and c.id == TIME and c.log_bf >= ENOUGH), None)
+    time = _time(comparison)
     if time is None:
         return {}
     t_s = np.asarray(comparison.data.nodes[TIME], dtype=np.float64)

@@ -14,11 +14,12 @@ from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside, on_axis
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
-from labctl.fitting.criticism.search.free_shapes import channels_of_free_shape
+from labctl.fitting.criticism.search.free_shapes import beside_terms, channels_of_free_shape
 from labctl.fitting.criticism.search.held_out import held_out_rises
+from labctl.fitting.criticism.search.merging import merged
 from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
 from labctl.fitting.criticism.search.remainder import is_better_than_smooth, is_within_noise, remainder_of
-from labctl.fitting.criticism.search.steps import TIME
+from labctl.fitting.criticism.search.steps import may_be_step
 from labctl.fitting.criticism.verdict import (
     ALIKE,
     ENOUGH,
@@ -51,8 +52,6 @@ NEXT_SHARE = 0.04
 NEXT_SHARE_AMBIGUOUS = 0.08
 #: Least share of an effect that is assumed within data sets, and between them.
 LEAST_PART = 0.05
-#: From this share of the evidence for the leading effect on, time is looked at for a sharp step.
-STEP_SHARE = 0.5
 #: Where what is named leaves more than this share of the excess, it is not the cause.
 MOST_LEFT = 0.5
 #: An effect whose shape may be wrong by a few per cent explains at least this share of what a smooth function does.
@@ -80,29 +79,8 @@ def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple
         return Verdict("adequate", further=verdict.groups), initial, initial
     if verdict.form == "unexplained" and len(first.axes) > 1:
         apart = {axis: _searched(on_axis(first, axis), catalogue)[0] for axis in first.axes}
-        return _merged(apart, verdict), initial, final
+        return merged(apart, verdict), initial, final
     return verdict, initial, final
-
-
-def _merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
-    """Return the verdict of the axes, each with causes of its own; the joint one where an axis stays unexplained."""
-    if any(verdict.form == "unexplained" for verdict in apart.values()):
-        return joint
-    axes: dict[tuple[str, ...], tuple[str, ...]] = {}
-    for axis, verdict in apart.items():
-        for group in verdict.groups:
-            same = next((known for known in axes if known[0] == group[0]), group)
-            axes[same] = (*axes.get(same, ()), axis)
-    if not axes:
-        return joint
-    terms = {name: term for verdict in apart.values() for name, term in verdict.terms.items()}
-    remainders = [verdict.remainder for verdict in apart.values() if verdict.remainder is not None]
-    return Verdict(
-        "missing" if all(len(group) == 1 for group in axes) else "ambiguous", tuple(axes), joint.depends_on,
-        terms={group[0]: terms[group[0]] for group in axes if group[0] in terms},
-        remainder=max(remainders, key=lambda each: float(each["share"]), default=None),
-        axes={group[0]: where for group, where in axes.items()},
-    )  # fmt: skip
 
 
 def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:
@@ -119,10 +97,13 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
     if not findings and form in {"missing", "ambiguous"}:  # what would be named predicts worse than nothing
         form = "unexplained"
     depends = depends or step.depends_on or _driver_of(initial, step)
-    remainder = remainder_of(first, final, tuple(f.term for f in findings), catalogue) if findings else None
-    channels = _free_shape(first, findings, catalogue)
-    if channels:
-        return _unnamed(initial, (*channels, *(name for name in depends if name not in channels)))
+    found = tuple(finding.term for finding in findings)
+    if findings:
+        wrong_by = together([finding.discrepancy for finding in findings])
+        beside = beside_terms(first, found, wrong_by) if final is initial else final  # a pair is not in `final`
+        if channels := channels_of_free_shape(first, beside, found, catalogue):
+            return _unnamed(initial, (*channels, *(name for name in depends if name not in channels)))
+    remainder = remainder_of(first, final, found, catalogue) if findings else None
     if remainder is not None and remainder["share"] > MOST_LEFT:
         return _unnamed(initial, tuple(remainder["depends_on"]))
     terms = {finding.term.effect: finding.term for finding in findings}
@@ -140,14 +121,6 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
 def _unnamed(initial: Comparison, channels: tuple[str, ...]) -> tuple[Verdict, Comparison, Comparison]:
     """Return the verdict that names no effect, for what is better described without one."""
     return Verdict("unexplained", (), channels, confounded=_confounded(initial, channels)), initial, initial
-
-
-def _free_shape(first: Comparison, findings: Sequence[Finding], catalogue: Mapping[str, Effect]) -> tuple[str, ...]:
-    if not findings:
-        return ()
-    terms = tuple(finding.term for finding in findings)
-    discrepancy = together([finding.discrepancy for finding in findings])
-    return channels_of_free_shape(first, terms, discrepancy, catalogue)
 
 
 def _confounded(comparison: Comparison, channels: tuple[str, ...]) -> tuple[str, ...]:
@@ -284,7 +257,7 @@ def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray
 def _judged(comparison: Comparison, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Comparison, Step]:
     """Return the judgement; where it is not clearly one effect, it is made again with the leaders' shapes refined."""
     step = judge(comparison, first=first)
-    clear = step.form == "missing" and not _has_rival(comparison) and not _may_be_step(comparison)
+    clear = step.form == "missing" and not _has_rival(comparison) and not may_be_step(comparison)
     if step.form == "adequate" or clear:
         return comparison, step
     comparison = with_refined_leaders(comparison, catalogue, NOTICED)
@@ -295,13 +268,6 @@ def _has_rival(comparison: Comparison) -> bool:
     """Return whether the evidence for another effect is so near the leader's that its shape may decide."""
     effects = [c for c in comparison.candidates if not c.smooth and c.physical][:2]
     return len(effects) == 2 and effects[1].log_bf > max(NOTICED, effects[0].log_bf - FAR)
-
-
-def _may_be_step(comparison: Comparison) -> bool:
-    """Return whether time explains so much that a step, sharp and in its place, could explain more than any effect."""
-    effect = comparison.leader(smooth=False)
-    time = next((c for c in comparison.candidates if c.smooth and c.id == TIME), None)
-    return effect is not None and time is not None and time.log_bf > max(ENOUGH, STEP_SHARE * effect.log_bf)
 
 
 def _pair(first: Comparison, initial: Comparison, catalogue: Mapping[str, Effect]) -> list[Finding]:
