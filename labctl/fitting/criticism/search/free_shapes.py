@@ -30,14 +30,16 @@ RATE, TEMPERATURE = "table_rate_dps", "temperature_c"
 
 
 def channels_of_free_shape(
-    first: Comparison, beside: Comparison, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]
+    first: Comparison, beside: Comparison, terms: tuple[Term, ...], catalogue: Mapping[str, Effect], least: float = 0.0
 ) -> tuple[str, ...]:
     """Return the channels of a polynomial that has clearly more evidence than terms and their discrepancy; () if none.
+
+    Nor where it has less evidence than `least`.
 
     `first` is the comparison without the terms, `beside` the one with them and their discrepancy in its base, at whose
     scatter all are weighed. Terms that are exact need no discrepancy.
     """
-    report_stage(f"weighing {', '.join(term.effect for term in terms)} against free shapes")
+    report_stage(f"weighing {', '.join(term.effect for term in terms) or 'channels'} against free shapes")
     model = with_steady(first, terms)
     named: float = 0.0
     free: dict[tuple[str, ...], float] = {}
@@ -52,7 +54,13 @@ def channels_of_free_shape(
         wrong_by = beside.axes[axis].log_p - _weighed(first, beside, axis, replace(exact, options=[])).log_p
         named += float(found.max(initial=0.0)) + max(wrong_by, 0.0)
     best = max(free, key=lambda channels: free[channels], default=())
-    return best if best and free[best] > named + LEAD else ()
+    return best if best and free[best] > max(named, least) + LEAD else ()
+
+
+def channels_beside_smooth(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[str, ...]:
+    """Return the channels of a polynomial that has clearly more evidence than every function of one channel."""
+    smooth = first.leader(smooth=True)
+    return channels_of_free_shape(first, first, (), catalogue, least=smooth.log_bf if smooth is not None else 0.0)
 
 
 def with_steady(first: Comparison, terms: tuple[Term, ...]) -> ErrorModel:

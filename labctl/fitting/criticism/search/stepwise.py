@@ -14,7 +14,7 @@ from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside, on_axis
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
-from labctl.fitting.criticism.search.free_shapes import beside_terms, channels_of_free_shape
+from labctl.fitting.criticism.search.free_shapes import beside_terms, channels_beside_smooth, channels_of_free_shape
 from labctl.fitting.criticism.search.held_out import held_out_rises
 from labctl.fitting.criticism.search.merging import merged
 from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
@@ -111,6 +111,9 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
     groups = tuple(finding.group for finding in findings)
     alike = not_physical_group(initial, step.leader) if step.leader is not None and findings else ()
     confounded = _confounded(initial, kept) if form == "unexplained" else ()
+    if form == "unexplained":
+        also = (*confounded, *channels_beside_smooth(first, catalogue))
+        confounded = tuple(dict.fromkeys(name for name in also if name not in kept[:1]))
     verdict = Verdict(
         form, groups, kept, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder,
         axes={finding.group[0]: finding.axes for finding in findings},
