@@ -18,7 +18,14 @@ from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
-from labctl.fitting.criticism.model_comparison import Comparison, compare_models, designs_beside
+from labctl.fitting.criticism.model_comparison import (
+    Comparison,
+    centred,
+    compare_models,
+    constant_coordinates,
+    designs_beside,
+    orthogonalised,
+)
 from labctl.fitting.criticism.verdict import LEAD
 from labctl.fitting.effects import Effect, Term
 from labctl.fitting.models.error_model import ErrorModel
@@ -112,7 +119,10 @@ def _named(
     made = (
         option_of(comparison.data, axis, comparison.model.reference, catalogue[term.effect], term) for term in terms
     )
-    options = [option for option in made if option is not None]
+    base, precision = comparison.designs[axis].base, comparison.designs[axis].precision
+    level = constant_coordinates(base, comparison.data)
+    exact = base[:, :, precision == 0]
+    options = [orthogonalised(centred(option, level), exact) for option in made if option is not None]
     if not options:
         return []
     rows = np.concatenate([option.rows for option in options], axis=2)
