@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 from labctl.fitting.criticism import Verdict
-from labctl.fitting.criticism.model_comparison import compare_models
+from labctl.fitting.criticism.model_comparison import compare_models, design_of
 from labctl.fitting.criticism.reduction import reduce_recording
+from labctl.fitting.criticism.search.discrepancy import discrepancies
+from labctl.fitting.criticism.search.remainder import is_better_than_smooth
 from labctl.fitting.criticism.search.steps import refined_steps
 from labctl.fitting.criticism.verdict import is_at_end, refines_base
 from labctl.fitting.data.fit_data import fit_data_of
@@ -96,8 +98,16 @@ def test_the_place_of_a_step_is_found_and_nothing_where_there_is_none() -> None:
 
 
 def test_a_step_in_time_is_no_re_mounting() -> None:
-    verdict = added("time_step_bias", "informative", "yang2018", 0.03)
-    assert (verdict.form, verdict.named, verdict.depends_on[0]) == ("unexplained", (), "t_s")
+    """Beside a re-mounting of some wrong shape, waves of the Earth's rate, in the base anyway, are no part of it."""
+    recording = KINDS["time_step_bias"].added(plain("informative", 0), 0, 0.03)
+    model, _ = preset_for("yang2018", []).build(fit_data_of(recording))
+    data = reduce_recording(recording)
+    compared = compare_models(data, model, designs={"x": design_of(data, model, "x")})
+    effect, smooth = compared.leader(smooth=False), compared.leader(smooth=True)
+    assert effect is not None
+    assert smooth is not None
+    assert (effect.id, smooth.id) == ("mounting_shift", "t_s")
+    assert not is_better_than_smooth(compared, compared, effect, smooth, discrepancies(compared, effect))
 
 
 def test_a_channel_times_the_rate_is_that_channel_upside_down_too() -> None:
