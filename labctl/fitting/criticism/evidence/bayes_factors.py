@@ -45,6 +45,13 @@ def means_by_noise(design: Design, y: NDArray[np.float64], white_var: Array, noi
     return MeansByNoise.of(design, _with_data(design, y)[0], slices_of(design.options), white_var, noises)
 
 
+def evidence_of(
+    design: Design, y: NDArray[np.float64], white_var: Array, scale: NDArray[np.float64], noises: list[Noise]
+) -> AxisEvidence:
+    """Return the evidence for every option where nothing is weighed before it; parameters as of `evidence`."""
+    return evidence(design, y, means_by_noise(design, y, white_var, noises), scale, int(design.present.sum()))
+
+
 def _with_data(design: Design, y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the columns of all options and the data as the last, (R, m, k)."""
     return np.concatenate([*(o.rows for o in design.options), y[:, :, None]], axis=2)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.candidates import option_of
 from labctl.fitting.criticism.channel_functions import smooth_channels
-from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence
+from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence_of
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
 from labctl.fitting.criticism.model_comparison import (
     Comparison,
@@ -133,4 +133,4 @@ def _named(
 def _weighed(first: Comparison, beside: Comparison, axis: str, design: Design) -> AxisEvidence:
     """Return the evidence of a design at the scatter of another comparison."""
     white, scale, noises = beside.white_var[axis], beside.scales[axis], beside.axes[axis].noises
-    return evidence(design, first.data.error_dps(axis), white, scale, noises, int(design.present.sum()))
+    return evidence_of(design, first.data.error_dps(axis), white, scale, noises)

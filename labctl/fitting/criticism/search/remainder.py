@@ -7,18 +7,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence, means_by_noise
+from labctl.fitting.criticism.evidence.bayes_factors import evidence_of
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
 from labctl.fitting.criticism.evidence.elimination import eliminate_base
-from labctl.fitting.criticism.evidence.noise_grid import Noise
 from labctl.fitting.criticism.model_comparison import Comparison, compare_models, designs_beside
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.verdict import ENOUGH_NEXT, LEAD, channels_behind
 from labctl.fitting.effects import Effect, Term
-from labctl.fitting.numeric.arrays import Array
 
 #: Excess chi2 over its own scatter from which on something is said to remain.
 SIGNIFICANT = 5.0
@@ -106,15 +103,8 @@ def is_better_than_smooth(
         y, design, wide, narrow = first.data.error_dps(axis), initial.designs[axis], none[axis], exact[axis]
         rivals = [design.options[c.option[axis]] for c in (effect, smooth) if axis in c.option]
         white, scale, noises = beside.white_var[axis], beside.scales[axis], beside.axes[axis].noises
-        found = _evidence(replace(first.designs[axis], options=rivals), y, white, scale, noises)
+        found = evidence_of(replace(first.designs[axis], options=rivals), y, white, scale, noises)
         of = dict(zip([c.smooth for c in (effect, smooth) if axis in c.option], found.log_bf, strict=True))
-        shape = _evidence(wide, y, white, scale, noises).log_p - _evidence(narrow, y, white, scale, noises).log_p
+        shape = evidence_of(wide, y, white, scale, noises).log_p - evidence_of(narrow, y, white, scale, noises).log_p
         lead += max(of.get(False, 0.0), 0.0) + max(shape, 0.0) - max(of.get(True, 0.0), 0.0)
     return lead > LEAD
-
-
-def _evidence(
-    design: Design, y: NDArray[np.float64], white_var: Array, scale: NDArray[np.float64], noises: list[Noise]
-) -> AxisEvidence:
-    means = means_by_noise(design, y, white_var, noises)
-    return evidence(design, y, means, scale, int(design.present.sum()))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape
-from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
+from labctl.fitting.criticism.evidence.elimination import ScaledBase, WhitenedBase
 from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.evidence.noise_grid import Noise
 from labctl.fitting.criticism.model_comparison import Comparison
@@ -94,5 +94,5 @@ class _Axis:
 
     def _removed(self, rows: NDArray[np.float64], options: list[slice]) -> Array:
         everything = np.concatenate([rows, self._y], axis=2)
-        others = non_mean_products(self._design, everything, self._scale)
+        others = ScaledBase(self._design, self._scale).products(everything)
         return gains_of(self._base.eliminate_from(everything[0], others), options)[0]
