@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
@@ -36,22 +35,30 @@ def rank_candidates(
     designs: Mapping[str, Design], axes: Mapping[str, AxisEvidence], technology: str
 ) -> tuple[Candidate, ...]:
     """Return every candidate of the designs, the one with the most evidence first."""
-    names: dict[tuple[str, bool], None] = {}
-    for design in designs.values():
-        for option in design.options:
-            names[option.candidate, option.smooth] = None
+    places = {axis: _places(design) for axis, design in designs.items()}
     priors = {axis: _size_priors(design, axes[axis], technology) for axis, design in designs.items()}
-    found = [_physical_or_not(name, smooth, designs, axes, priors) for name, smooth in names]
+    found = []
+    for key in dict.fromkeys(key for each in places.values() for key in each):
+        which = {axis: each[key] for axis, each in places.items() if key in each}
+        found.append(_physical_or_not(key, which, designs, axes, priors))
     return tuple(sorted((c for c in found if c is not None), key=lambda c: -c.log_bf))
 
 
+def _places(design: Design) -> dict[tuple[str, bool], list[int]]:
+    """Return (candidate, whether it is smooth) -> the indices of its options."""
+    found: dict[tuple[str, bool], list[int]] = {}
+    for index, option in enumerate(design.options):
+        found.setdefault((option.candidate, option.smooth), []).append(index)
+    return found
+
+
 def _physical_or_not(
-    name: str, smooth: bool, designs: Mapping[str, Design], axes: Mapping[str, AxisEvidence],
-    priors: Mapping[str, Array],
+    key: tuple[str, bool], which: Mapping[str, list[int]], designs: Mapping[str, Design],
+    axes: Mapping[str, AxisEvidence], priors: Mapping[str, Array],
 ) -> Candidate | None:  # fmt: skip
     """Return a candidate at its physical sizes; where these have no evidence, at those that it is fitted with."""
-    physical = _candidate(name, smooth, designs, axes, priors)
-    whatever = _candidate(name, smooth, designs, axes, None)
+    physical = _candidate(key, which, designs, axes, priors)
+    whatever = _candidate(key, which, designs, axes, None)
     if physical is None or whatever is None:
         return whatever
     return whatever if physical.log_bf <= 0 and whatever.log_bf > UNPHYSICAL_FROM else physical
@@ -63,8 +70,8 @@ def _size_priors(design: Design, found: AxisEvidence, technology: str) -> Array:
 
 
 def _candidate(
-    name: str, smooth: bool, designs: Mapping[str, Design], axes: Mapping[str, AxisEvidence],
-    priors: Mapping[str, Array] | None,
+    key: tuple[str, bool], which: Mapping[str, list[int]], designs: Mapping[str, Design],
+    axes: Mapping[str, AxisEvidence], priors: Mapping[str, Array] | None,
 ) -> Candidate | None:  # fmt: skip
     """Return one candidate over all axes; None where no option of it has any direction beside the base.
 
@@ -75,29 +82,28 @@ def _candidate(
     best: dict[str, int] = {}
     terms: dict[tuple[object, ...], tuple[Term | None, float]] = {}
     gain = 0.0
-    for axis, design in designs.items():
-        which = [i for i, o in enumerate(design.options) if (o.candidate, o.smooth) == (name, smooth)]
-        values = axes[axis].log_bf[which] if which else np.zeros(0)
+    for axis, places in which.items():
+        options, values = designs[axis].options, axes[axis].log_bf[places]
         tried = np.isfinite(values).sum()
-        if priors is not None and len(values):
-            values = values + priors[axis][which]
-        if not len(values) or not np.any(np.isfinite(values)):
+        if priors is not None:
+            values = values + priors[axis][places]
+        if not np.any(np.isfinite(values)):
             continue
-        per_axis.append(float(logsumexp(values) - np.log(tried)))
-        best[axis] = which[int(np.argmax(values))]
+        per_axis.append(float(np.logaddexp.reduce(values) - np.log(tried)))
+        best[axis] = places[int(np.argmax(values))]
         gain += float(axes[axis].gain[best[axis]])
-        for i, value in zip(which, values, strict=True):
-            key = _key(design.options[i])
-            terms[key] = (design.options[i].term, terms.get(key, (None, 0.0))[1] + float(value))
+        for i, value in zip(places, values.tolist(), strict=True):
+            shape = _shape_of(options[i])
+            terms[shape] = (options[i].term, terms.get(shape, (None, 0.0))[1] + value)
     if not per_axis:
         return None
     n = len(per_axis)
     joint = sum(per_axis)
     alternatives = [joint - np.log(2.0), *(value - np.log(2.0 * n) for value in per_axis)] if n > 1 else [joint]
     term = max(terms.values(), key=lambda pair: pair[1])[0]
-    return Candidate(name, smooth, float(logsumexp(alternatives)), best, term, gain, priors is not None)
+    return Candidate(*key, float(np.logaddexp.reduce(alternatives)), best, term, gain, priors is not None)
 
 
-def _key(option: CandidateShape) -> tuple[object, ...]:
+def _shape_of(option: CandidateShape) -> tuple[object, ...]:
     term = option.term
     return () if term is None else (term.effect, term.order, *sorted(term.parameters.items()))

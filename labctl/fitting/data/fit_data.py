@@ -16,7 +16,7 @@ from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.mean_noise import white_var_of
 from labctl.fitting.data.noise_floor import NoiseFloor, noise_floor_of
 from labctl.fitting.data.temperature_channel import with_temperature
-from labctl.fitting.data.temperature_levels import temperature_levels
+from labctl.fitting.data.temperature_levels import folds, temperature_levels
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.recording import Recording, RecordingInfo, to_points
@@ -44,6 +44,15 @@ class FitData:
     def levels(self) -> NDArray[np.int64] | None:
         """The temperature level of each data set, (m,); None where there are no discrete levels."""
         return temperature_levels(self.temperature_c)
+
+    @cached_property
+    def without_each_temperature(self) -> list[tuple[FitData, FitData]]:
+        """For each temperature left out (`folds`), rising: the other data sets, and those at it."""
+        return [(self.take(~mask), self.take(mask)) for mask in folds(self.temperature_c)]
+
+    @cached_property
+    def _rate_counts(self) -> dict[str, int]:
+        return {}
 
     @cached_property
     def noise_floor(self) -> NoiseFloor:
@@ -88,9 +97,11 @@ class FitData:
         """
         if not np.any(self.channels.table_rate_dps()):
             return 1
-        rates = self.true_rate_dps(axis)
-        step = max(float(np.max(np.abs(rates), initial=0.0)) * 1e-3, 1e-9)
-        return len(np.unique(np.round(rates / step)))
+        if axis not in self._rate_counts:
+            rates = self.true_rate_dps(axis)
+            step = max(float(np.max(np.abs(rates), initial=0.0)) * 1e-3, 1e-9)
+            self._rate_counts[axis] = len(np.unique(np.round(rates / step)))
+        return self._rate_counts[axis]
 
     def distinct_temperatures(self) -> int:
         """Return how many different temperatures there are; without discrete levels, how many whole degrees."""

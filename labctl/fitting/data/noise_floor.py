@@ -20,7 +20,7 @@ from labctl.fitting.data.levels import SAME_TEMPERATURE_C
 from labctl.fitting.data.rich_surface import LEAST_FREE, rich_surface, with_levels_of_temperature
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Drift, Scatter, whitened
-from labctl.fitting.numeric.least_squares import solve
+from labctl.fitting.numeric.least_squares import drift_beside
 
 #: Data sets closer than this in rate (of the fastest) and temperature repeat each other.
 REPEAT_RATE = 1e-3
@@ -102,17 +102,19 @@ def _with_known_white(
 
 def _drift(surface: NDArray[np.float64], fuller: NDArray[np.float64], error_dps: Array, scatter: Scatter) -> Drift:
     """Return the drift beside a surface (m, k), or a fuller one where an F-test at the first drift asks for it."""
-    first = solve(surface, error_dps, scatter).drift
-    more, free = fuller.shape[1] - surface.shape[1], len(surface) - fuller.shape[1]
+    first = drift_beside(surface, error_dps, scatter)
+    k, k_fuller = surface.shape[1], fuller.shape[1]
+    more, free = k_fuller - k, len(surface) - k_fuller
     if more == 0 or scatter.white_var is None:
         return first
-    together = np.column_stack([fuller, error_dps])
-    ((*columns, y),) = (rows.T for rows in whitened(scatter, [first], scatter.white_var, together)[0])
-    design = np.column_stack(columns)
-    left = [float(np.sum((y - part @ np.linalg.lstsq(part, y)[0]) ** 2)) for part in (design[:, :-more], design)]
-    if fdtrc(more, free, (left[0] - left[1]) / more / max(left[1] / free, 1e-300)) > FALSE_ALARM:
+    (rows,), _ = whitened(scatter, [first], scatter.white_var, np.column_stack([fuller, error_dps]))
+    # the last column of the triangle: what the surface takes of the data, what the levels take, and what is left
+    triangle: NDArray[np.float64] = np.asarray(np.linalg.qr(rows, mode="r"))
+    reduced = triangle[:, -1] ** 2
+    taken, left = float(np.sum(reduced[k:k_fuller])), float(np.sum(reduced[k_fuller:]))
+    if fdtrc(more, free, taken / more / max(left / free, 1e-300)) > FALSE_ALARM:
         return first
-    return solve(fuller, error_dps, scatter).drift
+    return drift_beside(fuller, error_dps, scatter)
 
 
 def _of_scatter(m: int, scatter_dps: Mapping[str, float], source: str) -> NoiseFloor:

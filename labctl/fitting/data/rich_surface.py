@@ -51,25 +51,25 @@ def with_levels_of_temperature(surface: NDArray[np.float64], channels: Channels,
 def _orthonormal(
     blocks: Iterator[NDArray[np.float64]], begin: NDArray[np.float64], share: float
 ) -> NDArray[np.float64]:
-    m = len(begin)
+    m, k = begin.shape
     most = min(int(share * m), m - LEAST_FREE)
-    found = list(begin.T)
+    found = np.empty((m, max(most, k)), order="F")
+    found[:, :k] = begin
     for block in blocks:
         for column in block.T:
-            if len(found) < most and (new := _new_part(column, found)) is not None:
-                found.append(new)
-    return np.column_stack(found) if found else np.zeros((m, 0))
+            if k < most and (new := _new_part(column, found[:, :k])) is not None:
+                found[:, k] = new
+                k += 1
+    return found[:, :k]
 
 
-def _new_part(column: Array, found: list[Array]) -> Array | None:
+def _new_part(column: Array, found: NDArray[np.float64]) -> Array | None:
     size = float(np.linalg.norm(column))
     if size == 0:
         return None
     left = column / size
-    if found:
-        basis = np.column_stack(found)
-        for _ in range(2):  # the second time takes out what rounding left
-            left = left - basis @ (basis.T @ left)
+    for _ in range(2):  # the second time takes out what rounding left
+        left = left - found @ (found.T @ left)
     new = float(np.linalg.norm(left))
     return np.asarray(left / new) if new > LEAST_NEW else None
 

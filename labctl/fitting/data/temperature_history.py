@@ -19,6 +19,8 @@ from labctl.recording import Recording
 
 #: Logged columns by name, (n,) each.
 LoggedColumns = Mapping[str, NDArray[Any]]
+#: What an effect asks of a temperature course (k,) with one parameter, (k,).
+CourseFunction = Callable[[Array, float], Array]
 #: Spacing of a resampled temperature course, s.
 SPACING_S = 10.0
 
@@ -48,6 +50,8 @@ class TemperatureHistory:
     counted: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  #: "run", "mounting" -> numbers, rising
     rate_dps: float = 1.0  #: largest table rate, deg/s, without sign
     span_c: tuple[float, float] = (0.0, 1.0)  #: lowest and highest temperature, deg C
+    #: What was computed of the courses, by function and its parameter: every axis asks for the same.
+    _known: dict[tuple[CourseFunction, float], dict[int, Array]] = field(default_factory=dict, repr=False)
 
     def numbers(self, name: str) -> tuple[int, ...]:
         """Return the numbers of the runs ("run") or mountings ("mounting") of the recording, rising."""
@@ -55,27 +59,30 @@ class TemperatureHistory:
 
     def rate_k_min(self, columns: LoggedColumns, over_s: float) -> Array:
         """Return the rate of change of the temperature, (n,) K/min: slope of a line over `over_s` seconds."""
-        return self._evaluate(columns, lambda temperature_c: _slope(temperature_c, over_s))
+        return self._evaluate(columns, _slope, over_s)
 
     def lag_k(self, columns: LoggedColumns, tau_s: float) -> Array:
         """Return by how much a first-order follower with time constant `tau_s` lags the thermometer, (n,) K."""
-        return self._evaluate(columns, lambda temperature_c: _lag(temperature_c, tau_s))
+        return self._evaluate(columns, _lag, tau_s)
 
     def hysteresis_state(self, columns: LoggedColumns, width_k: float) -> Array:
         """Return the state of a play hysteresis of width `width_k`, (n,), 1: approached from below, -1: from above."""
-        return self._evaluate(columns, lambda temperature_c: _play(temperature_c, width_k))
+        return self._evaluate(columns, _play, width_k)
 
-    def _evaluate(self, columns: LoggedColumns, function: Callable[[Array], Array]) -> Array:
+    def _evaluate(self, columns: LoggedColumns, function: CourseFunction, parameter: float) -> Array:
         """Return a function of each run's temperature course, (k,) to (k,), at the times of the rows, (n,)."""
         if not self.courses:
             return np.zeros(len(next(iter(columns.values()), ())))
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
+        known = self._known.setdefault((function, parameter), {})
         found = np.zeros(len(t_s))
         for number, course in self.courses.items():
             here = run == number
             if here.any():
-                found[here] = course.at(function(course.temperature_c), t_s[here])
+                if number not in known:
+                    known[number] = function(course.temperature_c, parameter)
+                found[here] = course.at(known[number], t_s[here])
         return found
 
 
@@ -102,12 +109,15 @@ def _lag(temperature_c: Array, tau_s: float) -> Array:
 def _play(temperature_c: Array, width_k: float) -> Array:
     """Return temperature minus a follower with play, over half of the play, (k,): -1 to 1."""
     half = width_k / 2
-    behind = np.empty(len(temperature_c))
-    follower = temperature_c[0]
-    for index, now in enumerate(temperature_c.tolist()):
-        follower = min(max(follower, now - half), now + half)
-        behind[index] = now - follower
-    return behind / half
+    behind = []
+    follower = float(temperature_c[0])
+    for now in temperature_c.tolist():
+        if follower < now - half:
+            follower = now - half
+        elif follower > now + half:
+            follower = now + half
+        behind.append(now - follower)
+    return np.array(behind) / half
 
 
 def history_of(recording: Recording) -> TemperatureHistory:

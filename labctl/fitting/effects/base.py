@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -75,6 +75,10 @@ class Column:
     def mean(self, channels: Channels) -> Array:
         """Return the regressor as each row of the channels sees it on average, (n,)."""
         return self.values if self.carrier is None else self.values * channels.harmonic(self.carrier)
+
+    def averaged(self, channels: Channels) -> Column:
+        """Return this regressor without its carrier, as each row of the channels sees it on average."""
+        return self if self.carrier is None else replace(self, values=self.mean(channels), carrier=None)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import numpy as np
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.temperature_levels import folds
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.models.fitted_model import FittedModel
@@ -23,21 +22,19 @@ def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solut
 
     The drift of each axis stays that of `solutions`, the fit to all data sets. Empty where a fold leaves too little.
     """
-    masks = folds(data.temperature_c)
+    pairs = data.without_each_temperature
     if preset.inner_only:
-        masks = masks[1:-1]
+        pairs = pairs[1:-1]
     errors: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
-    for mask in masks:
-        if mask.all():
+    for seen, left_out in pairs:
+        if len(seen) == 0:
             return {}
-        seen = data.take(~mask)
         try:
             model, rows = preset.build(seen)
             require_enough_data(seen.take(rows), model)
             found = solve_axes(seen.take(rows), model, solutions)
         except NotEnoughData:
             return {}
-        left_out = data.take(mask)
         try:
             left = residuals(FittedModel(model, found.fits), left_out, found.turning)
         except NotConverged as error:

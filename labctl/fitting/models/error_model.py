@@ -49,10 +49,7 @@ class ErrorModel:
 
     def columns(self, channels: Channels, axis: str) -> list[tuple[str, Column]]:
         """Return (effect id, regressor) of one output axis, before temperature multiplies the regressors."""
-        return [
-            (effect_id, replace(column, values=column.mean(channels), carrier=None))
-            for effect_id, column in self.carried(channels, axis)
-        ]
+        return [(effect_id, column.averaged(channels)) for effect_id, column in self.carried(channels, axis)]
 
     def carried(self, channels: Channels, axis: str) -> list[tuple[str, Column]]:
         """Return the same with each column's carrier: the wave in the table angle whose amplitude the column is."""

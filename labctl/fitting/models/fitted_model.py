@@ -43,14 +43,19 @@ class FittedModel:
 
     def error_dps(self, channels: Channels, axis: str) -> Array:
         """Return the modelled error of an output axis, (n,) deg/s: gyro minus true rate."""
+        return self._error_with(self._coefficients(channels, axis), channels, axis)
+
+    def _coefficients(self, channels: Channels, axis: str) -> dict[str, Array]:
+        """Return name -> (n,), the coefficients of an axis at the temperatures of the rows."""
         fit = self.axes[axis]
         basis = self.model.temperature.basis(channels.temperature_c(axis))
-        at_temperature = fit.values @ basis.T  # (k, n)
+        return dict(zip(fit.names, fit.values @ basis.T, strict=True))
+
+    def _error_with(self, coefficients: Mapping[str, Array], channels: Channels, axis: str) -> Array:
         error = np.zeros(len(channels))
-        by_name = dict(zip(fit.names, at_temperature, strict=True))
         for _, column in self.model.columns(channels, axis):
-            if column.name in by_name:
-                error += column.error_dps(by_name[column.name])
+            if column.name in coefficients:
+                error += column.error_dps(coefficients[column.name])
         return error
 
     def compensate(self, outputs: Mapping[str, Array], channels: Channels) -> dict[str, Array]:
@@ -62,7 +67,12 @@ class FittedModel:
         if self.model.argument == "output":
             seen = channels.with_rates(outputs)
             return {axis: outputs[axis] - self.error_dps(seen, axis) for axis in outputs}
-        return invert(outputs, lambda rates, axis: self.error_dps(channels.with_rates(rates), axis), self.model.name)
+        known = {axis: self._coefficients(channels, axis) for axis in outputs}
+        return invert(
+            outputs,
+            lambda rates, axis: self._error_with(known[axis], channels.with_rates(rates), axis),
+            self.model.name,
+        )
 
     def exported(self) -> tuple[FittedModel, list[dict[str, str]]]:
         """Return the part that belongs to the unit, and what was left out with its origin."""

@@ -13,10 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.nonnegative import nonnegative_least_squares
 
 #: A term is shown when the deviance of the record rises by this without it (about 99.5 %, as octaves share readings).
 SHOWN_DEVIANCE = 9.0
 ROUNDS = 30
+#: A model of the variances has converged when none changes by more than this share and this amount, (deg/s)^2.
+CONVERGED, CONVERGED_VAR = 1e-8, 1e-8
 DEG_PER_ROOT_HOUR = 60.0
 DEG_PER_HOUR = 3600.0
 
@@ -105,19 +108,17 @@ def _fewest(design: NDArray[np.float64], variance: Array, freedom: Array) -> Arr
 
 def _fit(design: NDArray[np.float64], variance: Array, freedom: Array, kept: list[int]) -> tuple[Array, float]:
     """Return squared coefficients >= 0 that make chi-square distributed variances likeliest, and their deviance."""
-    from scipy.optimize import nnls  # noqa: PLC0415  0.1 s that a recording without a static record does not need
-
     terms = np.zeros(design.shape[1])
     model = variance
     for _ in range(ROUNDS):
         weight = np.sqrt(freedom / 2) / model
         columns = design[:, kept] * weight[:, None]
         size = np.linalg.norm(columns, axis=0)
-        found, _ = nnls(columns / size, variance * weight)
+        found = nonnegative_least_squares(columns / size, variance * weight)
         before = model
         model = np.maximum(design[:, kept] @ (found / size), 1e-12 * variance)
         terms[kept] = found / size
-        if np.allclose(model, before, rtol=1e-8):
+        if np.all(np.abs(model - before) <= CONVERGED_VAR + CONVERGED * before):
             break
     ratio = variance / model
     return terms, float(np.sum(freedom * (ratio - np.log(ratio) - 1.0)))

@@ -60,25 +60,48 @@ class Drift:
 def whitened(
     scatter: Scatter, drifts: Sequence[Drift], white_var: Array, values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], Array]:
-    """Return values (m, k) with each drift's correlation taken out, (drifts, m, k), and the log determinants of the
-    covariances, (drifts,).
+    """Return values (m, k) with each drift's correlation taken out, (drifts, m, k) with the rows in order of time, and
+    the log determinants of the covariances, (drifts,).
 
     Row by row in time, as a Kalman filter goes: of an Ornstein-Uhlenbeck process only the last value matters, so it is
     the same as by the Cholesky factors, in a number of operations that grows with m and not with its cube. What is
     expected of each row is a linear recurrence, solved for all columns at once.
     """
     order = np.lexsort((scatter.t_s, scatter.run))
-    ordered = np.asfortranarray(values[order])
+    ordered = values[order]
     kept, total, share = _filter(scatter, drifts, white_var, order)
-    found = np.empty((len(drifts), *values.shape))
-    band = np.ones((2, len(order)))
-    for k in range(len(drifts)):
-        band[1, :-1] = -kept[k, 1:] * (1.0 - share[k, :-1])
-        expected = np.zeros_like(ordered)
-        expected[1:] = (kept[k, 1:] * share[k, :-1])[:, None] * ordered[:-1]
-        expected, _ = dtbtrs(band, expected, uplo="L", diag="U", overwrite_b=True)
-        found[k, order] = (ordered - expected) / np.sqrt(total[k])[:, None]
-    return found, np.log(total).sum(axis=1)
+    before, own = kept * np.roll(share, 1, axis=1), kept * np.roll(1.0 - share, 1, axis=1)  # kept is 0 in the first row
+    expect = _expected_of_one if len(drifts) == 1 else _expected_of_many
+    expected = expect(ordered, before, own)
+    np.subtract(ordered, expected, out=expected)
+    expected /= np.sqrt(total)[:, :, None]
+    return expected, np.log(total).sum(axis=1)
+
+
+def _expected_of_one(
+    ordered: NDArray[np.float64], before: NDArray[np.float64], own: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return what is expected of each row (m, k) from those before it, (1, m, k): the solution of a banded system."""
+    band = np.ones((2, len(ordered)))
+    band[1, :-1] = -own[0, 1:]
+    pull = np.zeros_like(ordered, order="F")
+    pull[1:] = before[0, 1:, None] * ordered[:-1]
+    found, _ = dtbtrs(band, pull, uplo="L", diag="U", overwrite_b=True)
+    return np.asarray(found)[None]
+
+
+def _expected_of_many(
+    ordered: NDArray[np.float64], before: NDArray[np.float64], own: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the same for many drifts, (drifts, m, k), row by row for all of them at once."""
+    found = np.empty((len(ordered), len(before), ordered.shape[1]))
+    found[0] = 0.0
+    np.multiply(before.T[1:, :, None], ordered[:-1, None, :], out=found[1:])
+    pull = np.empty(found.shape[1:])
+    for row, last, share in zip(found[1:], found[:-1], own.T[1:, :, None], strict=True):
+        np.multiply(share, last, out=pull)
+        np.add(row, pull, out=row)
+    return np.ascontiguousarray(found.transpose(1, 0, 2))
 
 
 def _filter(

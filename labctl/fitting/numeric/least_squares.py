@@ -6,11 +6,13 @@ unit length have about 1e1 to 1e2 (papers' trap O5), and no normal equations are
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric import drift_noise
@@ -19,6 +21,8 @@ from labctl.fitting.numeric.drift_noise import Drift, Scatter
 
 #: Scaled columns are taken as linearly dependent below this ratio of singular values.
 RANK_TOLERANCE = 1e-9
+#: Points of the noise grid of which the evidence is less than this share of all are not averaged over.
+NEGLIGIBLE = 1e-20
 
 
 @dataclass(frozen=True)
@@ -35,14 +39,58 @@ class Solution:
 
 
 @dataclass(frozen=True)
-class _Point:
-    """The fit at one point of the noise grid."""
+class _Fits:
+    """The fits at d points of the noise grid, as triangles: whitened columns and data (m, k + 1) reduced to k rows."""
 
-    drift: Drift
-    values: Array
-    covariance: NDArray[np.float64]
-    log_evidence: float
-    scale: float
+    drifts: Sequence[Drift]
+    r: NDArray[np.float64]  #: (d, k, k) upper triangles of the columns
+    projected: NDArray[np.float64]  #: (d, k) the data's projection on them
+    log_evidence: Array  #: (d,) restricted log likelihoods, with the prior of each drift
+    scale: Array  #: (d,) factors on the covariance
+
+    @property
+    def best(self) -> int:
+        """The point with the most evidence."""
+        return int(np.argmax(self.log_evidence))
+
+    def values(self, point: int) -> Array:
+        """Return the coefficients at one point, (k,)."""
+        return np.asarray(solve_triangular(self.r[point], self.projected[point], check_finite=False))
+
+    def weights(self) -> Array:
+        """Return the share of each point in the evidence, (d,)."""
+        weights = np.exp(self.log_evidence - self.log_evidence.max())
+        return np.asarray(weights / weights.sum())
+
+    def drift(self) -> Drift:
+        """Return the likeliest drift, with a size that is averaged over the points."""
+        best = self.drifts[self.best]
+        size_dps = np.array([drift.drift_dps for drift in self.drifts])
+        return Drift(
+            float(np.sqrt(np.sum(self.weights() * self.scale * size_dps**2))),
+            best.tau_s,
+            best.per_rate * float(np.sqrt(self.scale[self.best])),
+        )
+
+
+#: Whitened columns and data, (d, m, k + 1) -> triangles (d, k, k), projected data (d, k) and the chi2 left (d,).
+_Reduce = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64], Array]]
+
+
+def _by_qr(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], Array]:
+    """Reduce by orthogonal triangles: below the data's projection on the columns stands what is left of them."""
+    k = rows.shape[2] - 1
+    triangles: NDArray[np.float64] = np.asarray(np.linalg.qr(rows, mode="r"))
+    return triangles[:, :k, :k], triangles[:, :k, k], np.sum(triangles[:, k:, k] ** 2, axis=1)
+
+
+def _by_normal_equations(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], Array]:
+    """Reduce by the Cholesky factors of inner products."""
+    gram = rows.transpose(0, 2, 1) @ rows
+    factor: NDArray[np.float64] = np.asarray(np.linalg.cholesky(gram[:, :-1, :-1]))
+    projected: Array = np.asarray(np.linalg.solve(factor, gram[:, :-1, -1:])[:, :, 0], dtype=np.float64)
+    left = np.maximum(gram[:, -1, -1] - np.sum(projected**2, axis=1), 0.0)
+    return factor.transpose(0, 2, 1), projected, np.asarray(left)
 
 
 def rank_of(design: NDArray[np.float64]) -> int:
@@ -64,53 +112,52 @@ def solve(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift 
         )
     if drift is not None:
         return _collect(_at(design, y, scatter, [drift]), design, y, scatter)
-    (ordinary,) = _at(design, y, scatter, [Drift(0.0, 1.0)])
-    unexplained = _unexplained(design, y, scatter, ordinary)
-    points = _at(design, y, scatter, drift_noise.grid(scatter, unexplained))
-    growing = _per_rate(design, y, scatter, max(points, key=lambda p: p.log_evidence))
+    return _collect(_over_grid(design, y, scatter), design, y, scatter)
+
+
+def drift_beside(columns: NDArray[np.float64], y: Array, scatter: Scatter) -> Drift:
+    """Return the drift that `solve` would find beside orthonormal columns (m, k), many times faster.
+
+    No coefficient is wanted of them, and orthonormal columns, with their part of y taken off, have no condition that
+    normal equations could spoil.
+    """
+    return _over_grid(columns, y - columns @ (columns.T @ y), scatter, _by_normal_equations).drift()
+
+
+def _over_grid(design: NDArray[np.float64], y: Array, scatter: Scatter, reduce: _Reduce = _by_qr) -> _Fits:
+    """Return the fits over the grid of drifts; with noise that grows with the rate where that is clearly likelier."""
+    at = partial(_at, design, y, scatter, reduce=reduce)
+    unexplained = _unexplained(design, y, scatter, at([Drift(0.0, 1.0)]).values(0))
+    fits = at(drift_noise.grid(scatter, unexplained))
+    growing = _per_rate(design, y, scatter, fits)
     if growing > 0:
-        more = _at(design, y, scatter, drift_noise.grid(scatter, unexplained, growing))
-        if max(p.log_evidence for p in more) > max(p.log_evidence for p in points) + 3.0:
-            points = more
-    return _collect(points, design, y, scatter)
+        more = at(drift_noise.grid(scatter, unexplained, growing))
+        if more.log_evidence.max() > fits.log_evidence.max() + 3.0:
+            return more
+    return fits
 
 
-def _at(design: NDArray[np.float64], y: Array, scatter: Scatter, drifts: Sequence[Drift]) -> list[_Point]:
+def _at(
+    design: NDArray[np.float64], y: Array, scatter: Scatter, drifts: Sequence[Drift], reduce: _Reduce = _by_qr
+) -> _Fits:
     """Return the weighted fit and its restricted log likelihood at each drift."""
+    known = scatter.white_var is not None
     white = scatter.white_var if scatter.white_var is not None else np.ones(len(y))
     m, k = design.shape
     rows, log_dets = drift_noise.whitened(scatter, drifts, white, np.column_stack([design, y]))
-    norms = np.linalg.norm(rows[:, :, :k], axis=1)
-    rows[:, :, :k] /= norms[:, None, :]
-    # the triangle of columns and data together holds the data's projection on the columns, and below it what is left
-    triangles: NDArray[np.float64] = np.asarray(np.linalg.qr(rows, mode="r"))
-    r, projected = triangles[:, :k, :k], triangles[:, :k, k:]
-    identity = np.broadcast_to(np.eye(k), r.shape)
-    solved = np.linalg.solve(r, np.concatenate([projected, identity], axis=2)) / norms[:, :, None]
-    chi2 = np.sum(triangles[:, k:, k] ** 2, axis=1)
-    log_dets = log_dets + 2 * np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)) * norms).sum(axis=1)
-    return [
-        _point(drift, one, float(c), float(log_det), drift_noise.log_prior(scatter, drift), freedom=max(m - k, 1),
-               known=scatter.white_var is not None)
-        for drift, one, c, log_det in zip(drifts, solved, chi2, log_dets, strict=True)
-    ]  # fmt: skip
-
-
-def _point(
-    drift: Drift, solved: NDArray[np.float64], chi2: float, log_det: float, log_prior: float, *, freedom: int,
-    known: bool,
-) -> _Point:  # fmt: skip
-    """Return the fit at one drift: `solved` (k, 1 + k) holds the coefficients and a square root of their covariance."""
-    values, inverse = solved[:, 0], solved[:, 1:]
+    r, projected, chi2 = reduce(rows)
+    log_dets = log_dets + 2 * np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))).sum(axis=1)
+    freedom = max(m - k, 1)
     # what no noise explains is the model's fault, and makes its coefficients that much less certain
-    scale = max(chi2 / freedom, 1.0) if known else max(chi2, 1e-300) / freedom
-    fit_term = chi2 if known else freedom * np.log(max(chi2, 1e-300))
-    return _Point(drift, values, inverse @ inverse.T * scale, -0.5 * (log_det + fit_term) + log_prior, scale)
+    scale = np.maximum(chi2 / freedom, 1.0) if known else np.maximum(chi2, 1e-300) / freedom
+    fit_terms = chi2 if known else freedom * np.log(np.maximum(chi2, 1e-300))
+    priors = np.array([drift_noise.log_prior(scatter, drift) for drift in drifts])
+    return _Fits(drifts, r, projected, -0.5 * (log_dets + fit_terms) + priors, scale)
 
 
-def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, fit: _Point) -> float:
+def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, values: Array) -> float:
     """Return the scatter that white noise does not explain, deg/s; in units of the white part when that is unknown."""
-    residual = y - design @ fit.values
+    residual = y - design @ values
     freedom = max(len(y) - design.shape[1], 1)
     total = float(residual @ residual) / freedom
     largest = scatter.largest_drift_dps / max(drift_noise.DRIFT_SIZES)
@@ -120,9 +167,9 @@ def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, fit: _
     return float(min(unexplained, largest))
 
 
-def _per_rate(design: NDArray[np.float64], y: Array, scatter: Scatter, fit: _Point) -> float:
+def _per_rate(design: NDArray[np.float64], y: Array, scatter: Scatter, fits: _Fits) -> float:
     """Return a robust first guess of the noise that grows with rate: a part of the table's, not of the gyro's."""
-    residual = np.abs(y - design @ fit.values)
+    residual = np.abs(y - design @ fits.values(fits.best))
     rate = np.abs(scatter.rate_dps)
     fast = rate > np.quantile(rate, 2 / 3)
     slow = rate < np.quantile(rate, 1 / 3)
@@ -130,29 +177,24 @@ def _per_rate(design: NDArray[np.float64], y: Array, scatter: Scatter, fit: _Poi
         return 0.0
     high, low = 1.4826 * np.median(residual[fast]), 1.4826 * np.median(residual[slow])
     excess = np.sqrt(max(high**2 - low**2, 0.0)) / max(float(np.median(rate[fast])), 1e-12)
-    return float(excess if scatter.white_var is not None else excess / np.sqrt(max(fit.scale, 1e-300)))
+    return float(excess if scatter.white_var is not None else excess / np.sqrt(max(fits.scale[fits.best], 1e-300)))
 
 
-def _collect(points: list[_Point], design: NDArray[np.float64], y: Array, scatter: Scatter) -> Solution:
+def _collect(fits: _Fits, design: NDArray[np.float64], y: Array, scatter: Scatter) -> Solution:
     """Average the fits over the noise grid by their evidence (law of total variance)."""
-    evidence = np.array([point.log_evidence for point in points])
-    weights = np.exp(evidence - evidence.max())
-    weights /= weights.sum()
-    values = sum(w * point.values for w, point in zip(weights, points, strict=True))
-    covariance = sum(
-        w * (point.covariance + np.outer(point.values - values, point.values - values))
-        for w, point in zip(weights, points, strict=True)
-    )
-    best = points[int(np.argmax(weights))]
-    size = np.sqrt(sum(w * p.scale * p.drift.drift_dps**2 for w, p in zip(weights, points, strict=True)))
+    weights = fits.weights()
+    counting = np.flatnonzero(~(weights < NEGLIGIBLE))
+    r, weights = fits.r[counting], weights[counting]
+    identity = np.broadcast_to(np.eye(r.shape[1]), r.shape)
+    solved = np.linalg.solve(r, np.concatenate([fits.projected[counting, :, None], identity], axis=2))
+    each, inverse = solved[:, :, 0], solved[:, :, 1:]
+    values = weights @ each
+    # side by side, the square roots of all parts of the covariance
+    parts = inverse * np.sqrt(weights * fits.scale[counting])[:, None, None]
+    roots = np.column_stack([np.concatenate(list(parts), axis=1), (np.sqrt(weights)[:, None] * (each - values)).T])
     white = None if scatter.white_var is None else float(np.sqrt(scatter.white_var.mean()))
     # as many coefficients as data sets leave no residuals, and so nothing to be uncertain by
     blind = np.nan if white is None and design.shape[0] == design.shape[1] else 1.0
     return Solution(
-        np.asarray(values),
-        np.asarray(covariance) * blind,
-        y - design @ np.asarray(values),
-        white,
-        Drift(float(size), best.drift.tau_s, best.drift.per_rate * float(np.sqrt(best.scale))),
-        best.scale * blind,
+        values, roots @ roots.T * blind, y - design @ values, white, fits.drift(), float(fits.scale[fits.best]) * blind
     )

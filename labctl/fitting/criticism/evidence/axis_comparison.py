@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence
+from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence, means_by_noise
 from labctl.fitting.criticism.evidence.design import Design
+from labctl.fitting.criticism.evidence.elimination import MeansByNoise
 from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.evidence.noise_grid import Noise, noise_grid
 from labctl.fitting.criticism.reduction import ReducedRecording
@@ -35,10 +36,13 @@ def compare_axis(data: ReducedRecording, design: Design, axis: str) -> AxisCompa
     y = data.error_dps(axis)
     white, noises = _noise_of(data, design, y, axis)
     explained = np.zeros_like(y)
+    means: MeansByNoise | None = None
     for estimate in range(2):
         scale = _scales(design, y, white, explained)
         white_now = white + _growing(data, design, y, white, explained)
-        found = evidence(design, y, white_now, scale, noises, int(design.present.sum()))
+        if means is None or not np.array_equal(white_now, means.white_var):
+            means = means_by_noise(design, y, white_now, noises)
+        found = evidence(design, y, means, scale, int(design.present.sum()))
         leader = int(np.argmax(found.log_bf)) if len(found.log_bf) else -1
         if estimate == 1 or leader < 0 or found.log_bf[leader] < REESTIMATE_FROM:
             break

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
-from labctl.fitting.criticism.evidence.elimination import WhitenedBase, gains_by_noise, non_mean_products
+from labctl.fitting.criticism.evidence.elimination import MeansByNoise, ScaledBase, WhitenedBase, gains_by_noise
 from labctl.fitting.criticism.evidence.gains import visible_share
 from labctl.fitting.criticism.evidence.noise_grid import Noise
 from labctl.fitting.effects import kind_of
@@ -41,23 +40,41 @@ class AxisEvidence:
     log_p: float  #: restricted log likelihood of the base, averaged over the noise, its priors normalised
 
 
+def means_by_noise(design: Design, y: NDArray[np.float64], white_var: Array, noises: list[Noise]) -> MeansByNoise:
+    """Return the inner products of the means at every noise; `white_var` (m,) is their white variance, (deg/s)^2."""
+    return MeansByNoise.of(design, _with_data(design, y)[0], slices_of(design.options), white_var, noises)
+
+
+def evidence_of(
+    design: Design, y: NDArray[np.float64], white_var: Array, scale: NDArray[np.float64], noises: list[Noise]
+) -> AxisEvidence:
+    """Return the evidence for every option where nothing is weighed before it; parameters as of `evidence`."""
+    return evidence(design, y, means_by_noise(design, y, white_var, noises), scale, int(design.present.sum()))
+
+
+def _with_data(design: Design, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the columns of all options and the data as the last, (R, m, k)."""
+    return np.concatenate([*(o.rows for o in design.options), y[:, :, None]], axis=2)
+
+
 def evidence(
-    design: Design, y: NDArray[np.float64], white_var: Array, scale: NDArray[np.float64], noises: list[Noise], rows: int
+    design: Design, y: NDArray[np.float64], means: MeansByNoise, scale: NDArray[np.float64], rows: int
 ) -> AxisEvidence:
     """Return the evidence for every option, averaged over the noises.
 
-    `y` (R, m) deg/s are the data, `white_var` (m,) the white variance of the means in (deg/s)^2, `scale` (R, m) the
-    standard deviation of the other coordinates in deg/s, `rows` the number of coordinates that exist.
+    `y` (R, m) deg/s are the data, `means` the products of their means, `scale` (R, m) the standard deviation of the
+    other coordinates in deg/s, `rows` the number of coordinates that exist.
     """
-    slices = slices_of(design.options)
-    everything = np.concatenate([*(o.rows for o in design.options), y[:, :, None]], axis=2)
-    others = non_mean_products(design, everything, scale)
-    log_p, gain, k = gains_by_noise(design, white_var, everything[0], others, slices, noises)
+    slices, noises = means.slices, means.noises
+    everything = _with_data(design, y)
+    others = ScaledBase(design, scale).products(everything)
+    log_p, gain, k = gains_by_noise(means, others)
     g = float(len(design.t_s))
     log_bf = 0.5 * gain * g / (1 + g) - 0.5 * k * np.log1p(g)
-    total = logsumexp(log_p[:, None] + log_bf, axis=0) - logsumexp(log_p)
+    log_all = float(np.logaddexp.reduce(log_p))
+    total = np.logaddexp.reduce(log_p[:, None] + log_bf, axis=0) - log_all
     best = int(np.argmax(log_p))
-    left = WhitenedBase(design, white_var, noises[best]).eliminate_from(everything[0], others)
+    left = WhitenedBase(design, means.white_var, noises[best]).eliminate_from(everything[0], others)
     competes = [
         _is_of_base(option) or visible_share(left, where) >= LEAST_COMPETING
         for option, where in zip(design.options, slices, strict=True)
@@ -65,9 +82,9 @@ def evidence(
     return AxisEvidence(
         np.where((k[best] > 0) & np.array(competes, dtype=bool), total, -np.inf),
         left,
-        gain[best], k[best], slices, np.exp(log_p - logsumexp(log_p)), noises, rows,
+        gain[best], k[best], slices, np.exp(log_p - log_all), noises, rows,
         int((design.precision == 0).sum()),
-        float(logsumexp(log_p) + 0.5 * np.log(design.precision[design.precision > 0]).sum()),
+        float(log_all + 0.5 * np.log(design.precision[design.precision > 0]).sum()),
     )  # fmt: skip
 
 

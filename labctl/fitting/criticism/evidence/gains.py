@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import groupby
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,35 +16,77 @@ from labctl.fitting.numeric.arrays import Array
 LEAST_LEFT = 1e-4
 
 
-def gains_of(left: EliminatedBase, slices: list[slice]) -> tuple[Array, NDArray[np.int64]]:
+@dataclass(frozen=True)
+class _Group:
+    """Options of one width w, which are solved together."""
+
+    options: NDArray[np.int64]  #: (o,) their numbers
+    columns: NDArray[np.int64]  #: (o, w) their columns
+    pairs: NDArray[np.int64]  #: (o, w, w) the place of each inner product among the pairs
+
+
+@dataclass(frozen=True)
+class OptionPairs:
+    """Pairs of columns that belong to one option: the inner products of which its gain takes, and no others."""
+
+    groups: tuple[_Group, ...]
+    left: NDArray[np.int64]  #: (p,) column
+    right: NDArray[np.int64]  #: (p,) column of the same option
+    number: int  #: of options
+
+    @cached_property
+    def single(self) -> NDArray[np.int64]:
+        """The place of each column's pair with itself, (k,)."""
+        alone = np.flatnonzero(self.left == self.right)
+        return alone[np.argsort(self.left[alone])]
+
+    @staticmethod
+    def of(slices: Sequence[slice]) -> OptionPairs:
+        """Return the pairs of options whose columns are at these places."""
+        widths = np.array([where.stop - where.start for where in slices], dtype=np.int64)
+        groups, left, right, count = [], [], [], 0
+        for width in np.unique(widths).tolist():
+            options = np.flatnonzero(widths == width)
+            here = [slices[i] for i in options.tolist()]
+            columns = np.array([np.arange(where.start, where.stop) for where in here])
+            i, j = np.triu_indices(width)
+            among = np.zeros((width, width), dtype=np.int64)
+            among[i, j] = among[j, i] = np.arange(len(i))
+            first = count + len(i) * np.arange(len(options))
+            groups.append(_Group(options, columns, first[:, None, None] + among))
+            left.append(columns[:, i].ravel())
+            right.append(columns[:, j].ravel())
+            count += len(i) * len(options)
+        none = np.zeros(0, dtype=np.int64)
+        return OptionPairs(tuple(groups), np.concatenate([none, *left]), np.concatenate([none, *right]), len(slices))
+
+    def gains(self, products: Array, squared_norms: Array, data_products: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Return gain in chi2 and number of directions, (options,) each.
+
+        `products` (p,) are the inner products of the pairs, base eliminated, `squared_norms` (k,) those of the columns
+        before, `data_products` (k,) those with the data, base eliminated.
+        """
+        gain, dimensions = np.zeros(self.number), np.zeros(self.number, dtype=np.int64)
+        size = np.sqrt(np.maximum(squared_norms, 1e-300))
+        for group in self.groups:
+            here = size[group.columns]
+            scaled = products[group.pairs] / (here[:, :, None] * here[:, None, :])
+            inner = data_products[group.columns] / here
+            if scaled.shape[1] == 1:
+                values = scaled[:, :, 0]
+            else:
+                values, vectors = np.linalg.eigh(scaled)
+                inner = np.einsum("oij,oi->oj", vectors, inner)
+            kept = values > LEAST_LEFT
+            gain[group.options] = np.where(kept, inner**2 / np.where(kept, values, 1.0), 0.0).sum(axis=1)
+            dimensions[group.options] = kept.sum(axis=1)
+        return gain, dimensions
+
+
+def gains_of(left: EliminatedBase, slices: Sequence[slice]) -> tuple[Array, NDArray[np.int64]]:
     """Return the chi2 that each option removes, (options,), and the number of its directions beside the base."""
-    return option_gains(
-        slices, lambda index: left.gram[index[:, :, None], index[:, None, :]], left.squared_norms, left.data_products
-    )
-
-
-def option_gains(
-    slices: list[slice],
-    within: Callable[[NDArray[np.int64]], NDArray[np.float64]],
-    squared_norms: Array,
-    data_products: Array,
-) -> tuple[Array, NDArray[np.int64]]:
-    """Return gain in chi2 and number of directions, (options,) each; options of one width are solved together.
-
-    `within` returns the inner products inside each option, base eliminated, (o, w, w) for column indices (o, w).
-    """
-    gain, dimensions = np.zeros(len(slices)), np.zeros(len(slices), dtype=np.int64)
-    size = np.sqrt(np.maximum(squared_norms, 1e-300))
-    order = sorted(range(len(slices)), key=lambda i: slices[i].stop - slices[i].start)
-    for _, members in groupby(order, key=lambda i: slices[i].stop - slices[i].start):
-        which = list(members)
-        index = np.array([np.arange(slices[i].start, slices[i].stop) for i in which])
-        values, vectors = np.linalg.eigh(within(index) / (size[index][:, :, None] * size[index][:, None, :]))
-        inner = np.einsum("oij,oi->oj", vectors, (data_products / size)[index])
-        kept = values > LEAST_LEFT
-        gain[which] = np.where(kept, inner**2 / np.where(kept, values, 1.0), 0.0).sum(axis=1)
-        dimensions[which] = kept.sum(axis=1)
-    return gain, dimensions
+    pairs = OptionPairs.of(slices)
+    return pairs.gains(left.gram[pairs.left, pairs.right], left.squared_norms, left.data_products)
 
 
 def solve_option(left: EliminatedBase, where: slice) -> tuple[Array, NDArray[np.float64]]:

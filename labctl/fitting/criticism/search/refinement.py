@@ -12,10 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from labctl.fitting.criticism.candidates import option_of
-from labctl.fitting.criticism.evidence.elimination import WhitenedBase, non_mean_products
+from labctl.fitting.criticism.evidence.elimination import ScaledBase, WhitenedBase
 from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.model_comparison import Comparison, centred, compare_models, constant_coordinates
 from labctl.fitting.criticism.ranking import Candidate
+from labctl.fitting.criticism.search.steps import refined_steps
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.progress import report_stage
 
@@ -27,18 +28,19 @@ LEADERS = 5
 
 
 def with_refined_leaders(comparison: Comparison, catalogue: Mapping[str, Effect], least: float) -> Comparison:
-    """Return the comparison with the leaders (log evidence at least `least`) also in their refined shapes."""
+    """Return the comparison with its leaders (log evidence at least `least`), and a step in time, refined as well."""
     leaders = [c for c in comparison.candidates if not c.smooth and c.physical and c.log_bf >= least][:LEADERS]
     shapes = {c.id: refined_term(comparison, c) for c in leaders if c.term is not None}
     new = {c.id: shapes[c.id] for c in leaders if c.id in shapes and shapes[c.id] != c.term}
-    if not new:
+    steps = refined_steps(comparison)
+    if not new and not steps:
         return comparison
     data, model = comparison.data, comparison.model
     designs = {}
     for axis, design in comparison.designs.items():
         made = (option_of(data, axis, model.reference, catalogue[name], term) for name, term in new.items())
         level = constant_coordinates(design.base, data)
-        more = [centred(option, level) for option in made if option is not None]
+        more = [centred(option, level) for option in (*made, steps.get(axis)) if option is not None]
         designs[axis] = replace(design, options=[*design.options, *more])
     return compare_models(data, model, catalogue, designs)
 
@@ -81,20 +83,22 @@ def _gain_function(comparison: Comparison, candidate: Candidate, kind: Effect) -
     """Return the function shape -> chi2 that it removes over the candidate's axes, at the base's likeliest noise."""
     data, reference = comparison.data, comparison.model.reference
     bases = {
-        axis: WhitenedBase(comparison.designs[axis], comparison.white_var[axis], comparison.axes[axis].best.noise)
+        axis: (
+            WhitenedBase(comparison.designs[axis], comparison.white_var[axis], comparison.axes[axis].best.noise),
+            ScaledBase(comparison.designs[axis], comparison.scales[axis]),
+        )
         for axis in candidate.option
     }
     outputs = {axis: data.error_dps(axis) for axis in candidate.option}
 
     def gain(term: Term) -> float:
         total = 0.0
-        for axis, base in bases.items():
+        for axis, (whitened, scaled) in bases.items():
             option = option_of(data, axis, reference, kind, term)
             if option is None:
                 continue
             rows = np.concatenate([option.rows, outputs[axis][:, :, None]], axis=2)
-            others = non_mean_products(comparison.designs[axis], rows, comparison.scales[axis])
-            left = base.eliminate_from(rows[0], others)
+            left = whitened.eliminate_from(rows[0], scaled.products(rows))
             total += float(gains_of(left, [slice(0, option.rows.shape[2])])[0][0])
         return total
 

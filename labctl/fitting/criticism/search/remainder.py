@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
-from labctl.fitting.criticism.evidence.bayes_factors import evidence
+from labctl.fitting.criticism.evidence.bayes_factors import evidence_of
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
 from labctl.fitting.criticism.evidence.elimination import eliminate_base
 from labctl.fitting.criticism.model_comparison import Comparison, compare_models, designs_beside
@@ -93,21 +93,18 @@ def is_better_than_smooth(
     if effect.term is None:
         return False
     model = first.model.with_terms((*first.model.terms, replace(effect.term, steady=True)))
-    none: dict[str, Design] = {
-        axis: replace(design, options=[]) for axis, design in designs_beside(first, model, discrepancy).items()
-    }
+    none, exact = (
+        {axis: replace(design, options=[]) for axis, design in designs_beside(first, model, wrong).items()}
+        for wrong in (discrepancy, {})
+    )
     beside = compare_models(first.data, model, {}, none)
     lead = 0.0
     for axis in first.axes:
-        y, design, wide = first.data.error_dps(axis), initial.designs[axis], none[axis]
+        y, design, wide, narrow = first.data.error_dps(axis), initial.designs[axis], none[axis], exact[axis]
         rivals = [design.options[c.option[axis]] for c in (effect, smooth) if axis in c.option]
         white, scale, noises = beside.white_var[axis], beside.scales[axis], beside.axes[axis].noises
-        rows = int(design.present.sum())
-        found = evidence(replace(first.designs[axis], options=rivals), y, white, scale, noises, rows)
+        found = evidence_of(replace(first.designs[axis], options=rivals), y, white, scale, noises)
         of = dict(zip([c.smooth for c in (effect, smooth) if axis in c.option], found.log_bf, strict=True))
-        narrow = replace(wide, base=wide.base[:, :, wide.precision == 0], precision=wide.precision[wide.precision == 0])
-        shape = (
-            evidence(wide, y, white, scale, noises, rows).log_p - evidence(narrow, y, white, scale, noises, rows).log_p
-        )
-        lead += max(of.get(False, 0.0), 0.0) + shape - max(of.get(True, 0.0), 0.0)
+        shape = evidence_of(wide, y, white, scale, noises).log_p - evidence_of(narrow, y, white, scale, noises).log_p
+        lead += max(of.get(False, 0.0), 0.0) + max(shape, 0.0) - max(of.get(True, 0.0), 0.0)
     return lead > LEAD

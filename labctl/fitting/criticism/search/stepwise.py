@@ -14,9 +14,12 @@ from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside, on_axis
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
+from labctl.fitting.criticism.search.free_shapes import beside_terms, channels_beside_smooth, channels_of_free_shape
 from labctl.fitting.criticism.search.held_out import held_out_rises
+from labctl.fitting.criticism.search.merging import merged
 from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
 from labctl.fitting.criticism.search.remainder import is_better_than_smooth, is_within_noise, remainder_of
+from labctl.fitting.criticism.search.steps import may_be_step
 from labctl.fitting.criticism.verdict import (
     ALIKE,
     ENOUGH,
@@ -76,34 +79,13 @@ def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple
         return Verdict("adequate", further=verdict.groups), initial, initial
     if verdict.form == "unexplained" and len(first.axes) > 1:
         apart = {axis: _searched(on_axis(first, axis), catalogue)[0] for axis in first.axes}
-        return _merged(apart, verdict), initial, final
+        return merged(apart, verdict), initial, final
     return verdict, initial, final
 
 
-def _merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
-    """Return the verdict of the axes, each with causes of its own; the joint one where an axis stays unexplained."""
-    if any(verdict.form == "unexplained" for verdict in apart.values()):
-        return joint
-    axes: dict[tuple[str, ...], tuple[str, ...]] = {}
-    for axis, verdict in apart.items():
-        for group in verdict.groups:
-            same = next((known for known in axes if known[0] == group[0]), group)
-            axes[same] = (*axes.get(same, ()), axis)
-    if not axes:
-        return joint
-    terms = {name: term for verdict in apart.values() for name, term in verdict.terms.items()}
-    remainders = [verdict.remainder for verdict in apart.values() if verdict.remainder is not None]
-    return Verdict(
-        "missing" if all(len(group) == 1 for group in axes) else "ambiguous", tuple(axes), joint.depends_on,
-        terms={group[0]: terms[group[0]] for group in axes if group[0] in terms},
-        remainder=max(remainders, key=lambda each: float(each["share"]), default=None),
-        axes={group[0]: where for group, where in axes.items()},
-    )  # fmt: skip
-
-
 def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:
-    depends = channels_behind(first)
     initial, step = _judged(first, catalogue)
+    depends = channels_behind(initial)
     if step.form == "unexplained":
         step = _explained_but_for_shape(first, initial, step)
     if step.form == "unexplained":
@@ -115,20 +97,33 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
     if not findings and form in {"missing", "ambiguous"}:  # what would be named predicts worse than nothing
         form = "unexplained"
     depends = depends or step.depends_on or _driver_of(initial, step)
-    remainder = remainder_of(first, final, tuple(f.term for f in findings), catalogue) if findings else None
+    found = tuple(finding.term for finding in findings)
+    if findings:
+        wrong_by = together([finding.discrepancy for finding in findings])
+        beside = beside_terms(first, found, wrong_by) if final is initial else final  # a pair is not in `final`
+        if channels := channels_of_free_shape(first, beside, found, catalogue):
+            return _unnamed(initial, (*channels, *(name for name in depends if name not in channels)))
+    remainder = remainder_of(first, final, found, catalogue) if findings else None
     if remainder is not None and remainder["share"] > MOST_LEFT:
-        channels = tuple(remainder["depends_on"])
-        return Verdict("unexplained", (), channels, confounded=_confounded(initial, channels)), initial, initial
+        return _unnamed(initial, tuple(remainder["depends_on"]))
     terms = {finding.term.effect: finding.term for finding in findings}
     kept = depends if findings or form == "unexplained" else ()
     groups = tuple(finding.group for finding in findings)
     alike = not_physical_group(initial, step.leader) if step.leader is not None and findings else ()
     confounded = _confounded(initial, kept) if form == "unexplained" else ()
+    if form == "unexplained":
+        also = (*confounded, *channels_beside_smooth(first, catalogue))
+        confounded = tuple(dict.fromkeys(name for name in also if name not in kept[:1]))
     verdict = Verdict(
         form, groups, kept, terms=terms, confounded=confounded, not_physical=alike, remainder=remainder,
         axes={finding.group[0]: finding.axes for finding in findings},
     )  # fmt: skip
     return verdict, initial, final
+
+
+def _unnamed(initial: Comparison, channels: tuple[str, ...]) -> tuple[Verdict, Comparison, Comparison]:
+    """Return the verdict that names no effect, for what is better described without one."""
+    return Verdict("unexplained", (), channels, confounded=_confounded(initial, channels)), initial, initial
 
 
 def _confounded(comparison: Comparison, channels: tuple[str, ...]) -> tuple[str, ...]:
@@ -265,7 +260,8 @@ def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray
 def _judged(comparison: Comparison, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Comparison, Step]:
     """Return the judgement; where it is not clearly one effect, it is made again with the leaders' shapes refined."""
     step = judge(comparison, first=first)
-    if step.form == "adequate" or (step.form == "missing" and not _has_rival(comparison)):
+    clear = step.form == "missing" and not _has_rival(comparison) and not may_be_step(comparison)
+    if step.form == "adequate" or clear:
         return comparison, step
     comparison = with_refined_leaders(comparison, catalogue, NOTICED)
     return comparison, judge(comparison, first=first)

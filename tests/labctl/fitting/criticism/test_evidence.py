@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labctl.fitting.criticism.evidence.design import Design
-from labctl.fitting.criticism.evidence.elimination import WhitenedBase, gains_by_noise, non_mean_products
+from labctl.fitting.criticism.evidence.elimination import MeansByNoise, ScaledBase, WhitenedBase, gains_by_noise
 from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.evidence.noise_grid import noise_grid
 from labctl.fitting.criticism.reduction.outliers import FEW, inlier_mask
@@ -23,8 +23,9 @@ def test_gains_at_every_noise_are_those_at_each_by_itself() -> None:
     columns = rng.normal(size=(2, m, 6))
     slices = [slice(0, 1), slice(1, 3), slice(3, 5)]
     noises = noise_grid("mems", 0.003, 1e-3)
-    others = non_mean_products(design, columns, scale)
-    log_p, gain, dimensions = gains_by_noise(design, white, columns[0], others, slices, noises)
+    others = ScaledBase(design, scale).products(columns)
+    means = MeansByNoise.of(design, columns[0], slices, white, noises)
+    log_p, gain, dimensions = gains_by_noise(means, others)
     for i, noise in enumerate(noises):
         left = WhitenedBase(design, white, noise).eliminate_from(columns[0], others)
         expected, number = gains_of(left, slices)

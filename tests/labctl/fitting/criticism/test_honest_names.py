@@ -5,14 +5,19 @@ from __future__ import annotations
 import pytest
 
 from labctl.fitting.criticism import Verdict
-from labctl.fitting.criticism.model_comparison import compare_models
+from labctl.fitting.criticism.model_comparison import compare_models, design_of
 from labctl.fitting.criticism.reduction import reduce_recording
+from labctl.fitting.criticism.search.discrepancy import discrepancies
+from labctl.fitting.criticism.search.remainder import is_better_than_smooth
+from labctl.fitting.criticism.search.steps import refined_steps
 from labctl.fitting.criticism.verdict import is_at_end, refines_base
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
+from studies.campaigns import campaign
+from studies.effect_sizes import sizes
 from studies.outside_catalogue import KINDS
 from tests.helpers.criticism import held
 from tests.helpers.simulated_recordings import single_axis
@@ -59,6 +64,50 @@ def test_a_table_is_not_blamed_for_how_steep_the_law_is_at_its_nodes(seed: int) 
 def test_a_wave_in_time_is_no_warm_up() -> None:
     verdict = added("daily_wave", "gyrostar", "weiss1995", 0.5)
     assert (verdict.form, verdict.named, verdict.depends_on[0]) == ("unexplained", (), "t_s")
+
+
+@pytest.mark.parametrize(
+    ("recipe", "model", "size_dps"), [("gyrostar", "weiss1995", 0.5), ("ojeda2000", "ojeda2000", 0.03)]
+)
+def test_a_random_surface_over_rate_and_temperature_is_no_effect(recipe: str, model: str, size_dps: float) -> None:
+    """A cubic, and a resonance with a saturation, follow it, and a polynomial over both has far more evidence."""
+    verdict = added("field", recipe, model, size_dps, seed=1)
+    assert (verdict.form, verdict.named) == ("unexplained", ())
+    assert verdict.depends_on[:2] == ("table_rate_dps", "temperature_c")
+
+
+@pytest.mark.parametrize("z", [100, 1000])
+def test_a_saturation_that_bends_softly_is_still_named(z: int) -> None:
+    """A polynomial follows a soft bend nearly as well as the knee of the catalogue does."""
+    hidden = {"saturation": sizes("O")["saturation"]["100"] * z / 100}
+    assert held(campaign("O", 20_013, hidden)).verdict.named[:1] == ("saturation",)
+
+
+def test_a_step_of_the_scale_factor_within_a_data_set_is_time() -> None:
+    verdict = added("time_step_scale", "ojeda2000", "ojeda2000", 1.0)
+    assert (verdict.form, verdict.named, verdict.depends_on[0]) == ("unexplained", (), "t_s")
+
+
+def test_the_place_of_a_step_is_found_and_nothing_where_there_is_none() -> None:
+    recording = KINDS["time_step_bias"].added(plain("ojeda2000", 0), 0, 1.0)
+    model, _ = preset_for("ojeda2000", []).build(fit_data_of(recording))
+    (name,) = refined_steps(compare_models(reduce_recording(recording), model))["z"].names
+    t_s = recording.columns["t_s"]
+    assert float(name.removeprefix("t_s>")) == pytest.approx(t_s[0] + 0.6 * (t_s[-1] - t_s[0]), abs=60.0)
+    assert not refined_steps(compare_models(reduce_recording(plain("ojeda2000", 0)), model))
+
+
+def test_a_step_in_time_is_no_re_mounting() -> None:
+    """Beside a re-mounting of some wrong shape, waves of the Earth's rate, in the base anyway, are no part of it."""
+    recording = KINDS["time_step_bias"].added(plain("informative", 0), 0, 0.03)
+    model, _ = preset_for("yang2018", []).build(fit_data_of(recording))
+    data = reduce_recording(recording)
+    compared = compare_models(data, model, designs={"x": design_of(data, model, "x")})
+    effect, smooth = compared.leader(smooth=False), compared.leader(smooth=True)
+    assert effect is not None
+    assert smooth is not None
+    assert (effect.id, smooth.id) == ("mounting_shift", "t_s")
+    assert not is_better_than_smooth(compared, compared, effect, smooth, discrepancies(compared, effect))
 
 
 def test_a_channel_times_the_rate_is_that_channel_upside_down_too() -> None:

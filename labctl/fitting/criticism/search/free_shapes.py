@@ -1,0 +1,136 @@
+"""Free shapes: polynomials over rate and temperature, which what is to be named must not fall behind.
+
+Any law is followed a little by some shape of the catalogue. A name says more: that the shape is this one. So what is to
+be named is weighed, its discrepancy included, against polynomials over rate and temperature that mean nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+from numpy.typing import NDArray
+
+from labctl.fitting.criticism.candidate_shape import CandidateShape
+from labctl.fitting.criticism.candidates import option_of
+from labctl.fitting.criticism.channel_functions import smooth_channels
+from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence, evidence_of
+from labctl.fitting.criticism.evidence.design import Design, Discrepancy
+from labctl.fitting.criticism.model_comparison import (
+    Comparison,
+    centred,
+    compare_models,
+    constant_coordinates,
+    designs_beside,
+    orthogonalised,
+)
+from labctl.fitting.criticism.verdict import LEAD
+from labctl.fitting.effects import Effect, Term
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.progress import report_stage
+
+#: Degrees of a polynomial of the rate, and total degrees of one over rate and temperature.
+OF_RATE, OF_BOTH = (5, 7), (5, 8)
+RATE, TEMPERATURE = "table_rate_dps", "temperature_c"
+
+
+def channels_of_free_shape(
+    first: Comparison, beside: Comparison, terms: tuple[Term, ...], catalogue: Mapping[str, Effect], least: float = 0.0
+) -> tuple[str, ...]:
+    """Return the channels of a polynomial that has clearly more evidence than terms and their discrepancy; () if none.
+
+    Nor where it has less evidence than `least`.
+
+    `first` is the comparison without the terms, `beside` the one with them and their discrepancy in its base, at whose
+    scatter all are weighed. Terms that are exact need no discrepancy.
+    """
+    report_stage(f"weighing {', '.join(term.effect for term in terms) or 'channels'} against free shapes")
+    model = with_steady(first, terms)
+    named: float = 0.0
+    free: dict[tuple[str, ...], float] = {}
+    for axis, exact in designs_beside(first, model, {}).items():
+        rivals = _shapes(first, axis)
+        options = [shape for shapes in rivals.values() for shape in shapes]
+        own = _named(first, axis, terms, catalogue)
+        found = _weighed(first, beside, axis, replace(first.designs[axis], options=[*options, *own])).log_bf
+        for channels, shapes in rivals.items():
+            here, found = found[: len(shapes)], found[len(shapes) :]
+            free[channels] = free.get(channels, 0.0) + float(here.max(initial=0.0))
+        wrong_by = beside.axes[axis].log_p - _weighed(first, beside, axis, replace(exact, options=[])).log_p
+        named += float(found.max(initial=0.0)) + max(wrong_by, 0.0)
+    best = max(free, key=lambda channels: free[channels], default=())
+    return best if best and free[best] > max(named, least) + LEAD else ()
+
+
+def channels_beside_smooth(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[str, ...]:
+    """Return the channels of a polynomial that has clearly more evidence than every function of one channel."""
+    smooth = first.leader(smooth=True)
+    return channels_of_free_shape(first, first, (), catalogue, least=smooth.log_bf if smooth is not None else 0.0)
+
+
+def with_steady(first: Comparison, terms: tuple[Term, ...]) -> ErrorModel:
+    """Return the model of a comparison with more terms, each of one coefficient for all temperatures."""
+    return first.model.with_terms((*first.model.terms, *(replace(term, steady=True) for term in terms)))
+
+
+def beside_terms(first: Comparison, terms: tuple[Term, ...], discrepancy: Mapping[str, Discrepancy]) -> Comparison:
+    """Return the comparison beside terms and their discrepancy, in which nothing competes."""
+    model = with_steady(first, terms)
+    designs = designs_beside(first, model, discrepancy)
+    return compare_models(first.data, model, {}, {axis: replace(each, options=[]) for axis, each in designs.items()})
+
+
+def _shapes(comparison: Comparison, axis: str) -> dict[tuple[str, ...], list[CandidateShape]]:
+    """Return channels -> polynomials of them, for one axis."""
+    data = comparison.data
+    channels = smooth_channels(data, axis)
+    if RATE not in channels:
+        return {}
+    rate = channels[RATE] / max(float(np.abs(channels[RATE]).max()), 1e-9)
+    of_rate = np.asarray(legvander(rate, max(OF_BOTH)), dtype=np.float64)
+    found: dict[tuple[str, ...], list[CandidateShape]] = {
+        (RATE,): [_shape(comparison, RATE, of_rate[:, 1 : degree + 1]) for degree in OF_RATE]
+    }
+    if TEMPERATURE in channels:
+        warm = channels[TEMPERATURE]
+        of_warm = legvander(2 * (warm - warm.min()) / np.ptp(warm) - 1, max(OF_BOTH)).astype(np.float64)
+        found[RATE, TEMPERATURE] = [_shape(comparison, RATE, _products(of_rate, of_warm, d)) for d in OF_BOTH]
+    return found
+
+
+def _products(first: NDArray[np.float64], other: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
+    """Return the products of polynomials up to a total degree."""
+    return np.column_stack(
+        [first[:, i] * other[:, j] for i in range(degree + 1) for j in range(degree + 1 - i) if i + j > 0]
+    )
+
+
+def _shape(comparison: Comparison, name: str, columns: NDArray[np.float64]) -> CandidateShape:
+    count = columns.shape[1]
+    return CandidateShape(name, None, comparison.data.rows_of(columns), ("",) * count, ("deg/s",) * count)
+
+
+def _named(
+    comparison: Comparison, axis: str, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]
+) -> list[CandidateShape]:
+    """Return what is to be named on one axis as one option; none where it does not touch the axis."""
+    made = (
+        option_of(comparison.data, axis, comparison.model.reference, catalogue[term.effect], term) for term in terms
+    )
+    base, precision = comparison.designs[axis].base, comparison.designs[axis].precision
+    level = constant_coordinates(base, comparison.data)
+    exact = base[:, :, precision == 0]
+    options = [orthogonalised(centred(option, level), exact) for option in made if option is not None]
+    if not options:
+        return []
+    rows = np.concatenate([option.rows for option in options], axis=2)
+    names, units = (sum(each, ()) for each in ([o.names for o in options], [o.units for o in options]))
+    return [CandidateShape(RATE, None, rows, names, units)]
+
+
+def _weighed(first: Comparison, beside: Comparison, axis: str, design: Design) -> AxisEvidence:
+    """Return the evidence of a design at the scatter of another comparison."""
+    white, scale, noises = beside.white_var[axis], beside.scales[axis], beside.axes[axis].noises
+    return evidence_of(design, first.data.error_dps(axis), white, scale, noises)

@@ -1,0 +1,39 @@
+"""Least squares with coefficients that cannot be negative, for a handful of columns."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.numeric.arrays import Array
+
+
+def nonnegative_least_squares(columns: NDArray[np.float64], y: Array) -> Array:
+    """Return the coefficients >= 0, (k,), of columns (m, k) of about unit length that come nearest to y (m,).
+
+    By active sets (Lawson and Hanson 1974, chapter 23). SciPy's takes longer to import than this takes altogether.
+    """
+    gram, inner = columns.T @ columns, columns.T @ y
+    found, kept = np.zeros(len(inner)), np.zeros(len(inner), dtype=np.bool_)
+    tolerance = 10 * max(columns.shape) * np.finfo(np.float64).eps * float(np.abs(columns).sum(axis=0).max())
+    for _ in range(3 * len(inner)):
+        slope = np.where(kept, -np.inf, inner - gram @ found)
+        if not slope.max() > tolerance:
+            break
+        kept[np.argmax(slope)] = True
+        found = _feasible(gram, inner, found, kept)
+    return found
+
+
+def _feasible(gram: NDArray[np.float64], inner: Array, found: Array, kept: NDArray[np.bool_]) -> Array:
+    """Return the solution of the columns that are kept, after leaving out of `kept` those it makes negative."""
+    while True:
+        wanted = np.zeros(len(found))
+        wanted[kept] = np.linalg.solve(gram[kept][:, kept], inner[kept])
+        negative = kept & (wanted <= 0)
+        if not negative.any():
+            return wanted
+        share = found[negative] / (found[negative] - wanted[negative])
+        found = found + share.min() * (wanted - found)
+        kept[np.flatnonzero(negative)[share <= share.min()]] = False
+        found = np.where(kept, found, 0.0)
