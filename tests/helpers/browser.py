@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import httpx
 import uvicorn
-from labctl.api.server import WORKER_MODULES
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.api.middleware import AccessPolicy
+from labctl.processes.web_process import WORKER_MODULES
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.computation import InWorkers, Limits
 from labctl.services.lab_service import LabService

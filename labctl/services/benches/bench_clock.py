@@ -12,6 +12,6 @@ def has_simulated_time(bench: Mapping[str, Any]) -> bool:
     """Return whether a bench, as its file says it, keeps a simulated clock, which may run faster than the wall's."""
     if (bench.get("simulation") or {}).get("control"):  # simulators in another process set the pace
         return True
-    devices = [bench["table"], bench["chamber"], *bench["gyros"]]
+    devices = [each for each in (bench.get("table"), bench.get("chamber"), *bench.get("gyros", ())) if each]
     links = [link for device in devices for key in ("port", "host") if (link := device.get(key)) is not None]
-    return all(is_simulated_address(link) for link in links)
+    return bool(links) and all(is_simulated_address(link) for link in links)

@@ -269,28 +269,3 @@ def test_calibrations_can_be_asked_for_by_head(loopback: Ask) -> None:
     for path in ("calibration", "calibrations", "ladder"):
         answer = loopback("head", f"/api/units/NOBODY/{path}")
         assert answer.status_code in {400, 404}, path
-
-
-def test_the_service_tells_its_manager(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, in_a_loop: Callable[..., Any]
-) -> None:
-    import socket
-
-    from labctl.api import systemd
-
-    monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
-    systemd.ready()  # nobody listens: nothing happens
-    address = str(tmp_path / "notify")
-    monkeypatch.setenv("NOTIFY_SOCKET", address)
-    systemd.ready()  # nobody listens there either
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
-        manager.bind(address)
-        manager.settimeout(5)
-        store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
-        with TestClient(create_app(LabService(store, CLOCK))):
-            assert manager.recv(100) == b"READY=1"
-            in_a_loop(systemd.alive())
-            assert manager.recv(100) == b"WATCHDOG=1"
-        assert manager.recv(100).startswith(b"STOPPING=1\nWATCHDOG_USEC=")
-    monkeypatch.setenv("WATCHDOG_USEC", "60000000")
-    assert systemd.period_s() == 20

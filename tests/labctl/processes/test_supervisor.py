@@ -9,14 +9,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from instruments.clock import WallClock
+from labctl.cli.app import app
 from labctl.errors import BadInput
 from labctl.processes import supervisor
 from labctl.processes.bench_process import open_bench_service
 from labctl.processes.listening import listening
 from labctl.processes.settings import BenchSettings, ServeRequest
 from labctl.processes.waker import Waker
+from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.lab_service import LabService
 from labctl.store import holder_of, open_store
 from procedures.execution.signals import ENDING
@@ -71,6 +74,16 @@ def test_simulate_never_takes_a_real_bench(tmp_path: Path) -> None:
 def test_numbers_out_of_range_are_refused_before_anything_starts(asked: ServeRequest, said: str) -> None:
     with pytest.raises(BadInput, match=said):
         supervisor.serve_forever(asked, lambda _: None)
+
+
+@pytest.mark.parametrize(("in_doubt", "status"), [(True, 1), (False, 0)])
+def test_a_bench_left_in_doubt_ends_the_command_with_a_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_doubt: bool, status: int
+) -> None:
+    left = BenchLeft("bench b was left", in_doubt=in_doubt)
+    monkeypatch.setattr(supervisor.Supervisor, "run", lambda *_: left)
+    ended = CliRunner().invoke(app, ["serve", "--port", "0", "--database", str(tmp_path / "lab.sqlite")])
+    assert (ended.exit_code, "labctl: stopped; bench b was left" in ended.stderr) == (status, True)
 
 
 def test_a_port_that_is_taken_is_refused() -> None:

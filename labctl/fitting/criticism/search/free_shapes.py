@@ -33,6 +33,9 @@ from labctl.progress import report_stage
 
 #: Degrees of a polynomial of the rate, and total degrees of one over rate and temperature.
 OF_RATE, OF_BOTH = (5, 7), (5, 8)
+#: A name may leave this share of its evidence to shapes without meaning: none is exact, and what remains is said
+#: beside it. Of laws that are not in the catalogue the shapes had more than twice the evidence of any name.
+SHARE_LEFT = 0.1
 RATE, TEMPERATURE = "table_rate_dps", "temperature_c"
 
 
@@ -61,7 +64,7 @@ def channels_of_free_shape(
         wrong_by = beside.axes[axis].log_p - _weighed(first, beside, axis, replace(exact, options=[])).log_p
         named += float(found.max(initial=0.0)) + max(wrong_by, 0.0)
     best = max(free, key=lambda channels: free[channels], default=())
-    return best if best and free[best] > max(named, least) + LEAD else ()
+    return best if best and free[best] > max((1 + SHARE_LEFT) * named, least) + LEAD else ()
 
 
 def channels_beside_smooth(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.registry import CANCEL_START, START_CAMPAIGN
 from labctl.services.commands.requests import CampaignStart, ToStart
 from labctl.services.lab_service import LabService
+from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import start_status
 from labctl.services.schemas.admin import KeyRequest, Role
@@ -48,8 +49,9 @@ class Lab:
         self.hold.take()
         self.runner = BenchRunner(self.store, BENCH, VirtualClock, self.hold)
         self.lab_service = LabService(self.store, self.clock, self.runner)
-        assert self.lab_service.scheduler is not None
-        self.scheduler = self.lab_service.scheduler
+        assert isinstance(self.lab_service.bench_access, LocalBench)
+        assert self.lab_service.bench_access.scheduler is not None
+        self.scheduler = self.lab_service.bench_access.scheduler
 
     def enter(self, **when: Any) -> int:
         request = CampaignRequest.model_validate({"recipe": "short", **when})

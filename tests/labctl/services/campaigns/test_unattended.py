@@ -262,7 +262,7 @@ def test_an_interrupt_waits_for_the_end_of_a_write_and_is_not_lost_when_that_fai
 def test_a_bench_that_was_not_used_is_not_called_safe(store: Store) -> None:
     lab_service = LabService(store, SystemClock(), BenchRunner(store, load_bench("single-axis-sim"), VirtualClock))
     lab_service.close()
-    assert lab_service.left == "bench single-axis-sim was not used"
+    assert lab_service.left.text == "bench single-axis-sim was not used"
 
 
 def labctl(location: str, *arguments: str) -> Any:

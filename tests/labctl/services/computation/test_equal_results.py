@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from labctl.api.server import WORKER_MODULES
 
 from instruments.clock import VirtualClock
+from labctl.processes.web_process import WORKER_MODULES
 from labctl.recording import write_recording
 from labctl.services.calibrations.certification import list_certifications
 from labctl.services.calibrations.fitting import calibration_file

@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from labctl.api.server import WORKER_MODULES
 
 from instruments.errors import NoReply
 from labctl.acting_user import Actor, acting
 from labctl.errors import ComputationEnded, DataRefused, TooBusy
+from labctl.processes.web_process import WORKER_MODULES
 from labctl.progress import Cancelled, reporting_to
 from labctl.services.computation import InThreads, InWorkers, Limits
 from labctl.store import Store, open_store

@@ -350,7 +350,8 @@ def test_the_schedule_over_http(tmp_path: Path) -> None:
         for wrong in ({"at": "never"}, {"cron": "* *"}, {"at": "now", "cron": "0 2 * * *"}, {"priority": 1}):
             answer = client.post("/api/campaigns", json={"recipe": "short", **wrong})
             assert (answer.status_code, answer.json()["type"]) == (400, "urn:labctl:problem:bad-input"), wrong
-        assert lab_service.scheduler is not None
+        assert isinstance(lab_service.bench_access, LocalBench)
+        assert lab_service.bench_access.scheduler is not None
         now = client.post("/api/campaigns", json={"recipe": "short", "at": "now"}).json()["id"]
-        lab_service.scheduler.tick()
+        lab_service.bench_access.scheduler.tick()
         assert client.get(f"/api/schedule/{now}").json()["history"][0]["outcome"] == "started"
