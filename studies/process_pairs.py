@@ -22,6 +22,7 @@ from typing import Any
 import httpx
 import numpy as np
 
+from labctl.services.schemas.campaigns import BENCH_CHECKS
 from labctl.store.connection.database import Database
 from studies.crashable_process import all_readings, complete_data_sets
 from studies.process_kill import DATA_SETS, RECIPE, WHOLE_S, simulators
@@ -34,6 +35,8 @@ WATCHDOG_S = 5.0
 #: Everything must be over within this, s.
 WITHIN_S = 180.0
 LOOK_S = 0.2
+#: What is far is not known to be simulated.
+START = {"recipe": RECIPE, "confirmed_by": "the study", "checks": list(BENCH_CHECKS)}
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,7 @@ def suffer(folder: Path, bench: Path, faults: tuple[Fault, ...]) -> Outcome:
     (folder / "killed.toml").write_text(RECIPE)
     service = Service(folder, bench)
     try:
-        campaign = service.http.post("/api/campaigns", json={"recipe": RECIPE}).json()["id"]
+        campaign = service.http.post("/api/campaigns", json=START).json()["id"]
         for fault in faults:
             service.suffer(fault)
         before = _readings(service.database)

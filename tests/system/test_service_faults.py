@@ -79,7 +79,7 @@ def test_a_stopped_bench_process_is_told_of_and_replaced(service: ServiceProcess
     assert "the bench may move" in told["bench"]["unconfirmed"]
     assert "the bench may move" in service.http.get(f"/api/campaigns/{campaign}").json()["last_error"]
     refused = service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "tea"})
-    assert (refused.status_code, refused.json()["type"].rpartition("/")[2]) == (503, "bench-silent")
+    assert (refused.status_code, refused.json()["type"]) == (503, "urn:labctl:problem:bench-silent")
     asked_until(service, "/health", lambda told: told["status"] == "ok" and told["bench"]["campaign"] == campaign)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from instruments.bench_config import read_bench
 from labctl.services.campaigns.execution import run_here
-from labctl.services.schemas.campaigns import StartRequest
+from labctl.services.schemas.campaigns import BENCH_CHECKS, StartRequest
 from labctl.store import open_store
 
 #: A unit counts as silent after 2 s of the bench, a quarter of a second of the wall: a machine that is busy otherwise
@@ -39,6 +39,9 @@ settle_s = 2
 [guards]
 stale_s = 600
 """
+
+#: What is far is not known to be simulated.
+LOOKED_AT: dict[str, Any] = {"confirmed_by": "a test", "checks": list(BENCH_CHECKS)}
 
 
 def bench_file(folder: Path) -> Path:
@@ -79,7 +82,7 @@ def test_the_same_data_sets_within_noise(far_bench: Path, tmp_path: Path) -> Non
     recipe.write_text(RECIPE)
     here, there = tmp_path / "here.sqlite", tmp_path / "there.sqlite"
     one = run_here(str(here), StartRequest(recipe=str(recipe), bench=str(bench_file(tmp_path))))
-    two = run_here(str(there), StartRequest(recipe=str(recipe), bench=str(far_bench)))
+    two = run_here(str(there), StartRequest(recipe=str(recipe), bench=str(far_bench), **LOOKED_AT))
     assert (one.state, two.state) == ("done", "done")
     near, far = data_sets(here, one.id), data_sets(there, two.id)
     assert len(near["n"]) == len(far["n"]) == 6

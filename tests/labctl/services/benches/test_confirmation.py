@@ -26,7 +26,7 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import CampaignRequest
+from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest
 from labctl.store import BenchRow, Store, open_store
 from labctl.store.connection.database import Database
 from labctl.store.repositories.benches import Benches
@@ -206,7 +206,7 @@ def test_nothing_is_tried_while_a_campaign_runs_or_without_the_lease(store: Stor
             opened.append(real.opened)
 
     stop = runner.listen(heard)
-    runner.start(CampaignRequest(recipe="short"))
+    runner.start(CampaignRequest(recipe="short", confirmed_by="Ada", checks=list(BENCH_CHECKS)))
     job = runner._job
     if job is not None and job.thread is not None:
         job.thread.join()
@@ -248,8 +248,8 @@ def test_a_service_tries_when_it_starts_in_the_background_and_before_it_ends(loc
     runner.safe_state.end_soon()
     real.heal(TABLE)
     service.close()
-    assert "was confirmed safe by labctl" in service.left
-    assert not service.left_in_doubt
+    assert "was confirmed safe by labctl" in service.left.text
+    assert not service.left.in_doubt
 
 
 def labctl(location: str, *arguments: str) -> Result:
@@ -272,7 +272,7 @@ def test_a_service_says_whether_it_leaves_its_bench_in_doubt(
     said = "was confirmed safe by labctl at" if healed else "is NOT confirmed safe: table: no answer"
     assert (service.left.in_doubt, f"bench {BENCH.name} {said}" in service.left.text) == (not healed, True)
     looked = labctl(location, "bench", "status")
-    assert (looked.exit_code, "the safe state was tried again 1 times" in looked.stdout) == (1, True)
+    assert (looked.exit_code, "the safe state was tried again" in looked.stdout) == (1, True)
     assert ("labctl confirmed it at" in looked.stdout) == healed
 
 
