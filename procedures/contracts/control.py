@@ -32,6 +32,7 @@ class Control:
         self._lock = threading.RLock()  # a signal handler may run in the thread that holds it
         self._request = ControlRequest()
         self._end: ControlRequest | None = None  # beside the lock: an abort waits for nothing
+        self._heard = threading.Event()
         self._loss = loss
 
     @property
@@ -46,7 +47,14 @@ class Control:
         """
         if reason := self._loss():
             self.interrupt(reason)
-        return self.request
+        request = self.request
+        if request.abort:
+            self._heard.set()
+        return request
+
+    def is_heard(self, within_s: float) -> bool:
+        """Wait until the thread that drives the bench has seen the abort, s of wall time; returns whether it has."""
+        return self._heard.wait(within_s)
 
     def pause(self, reason: str = "asked by a person") -> None:
         """Ask to hold after the data set that is being taken; the environment is still recorded."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from instruments.bench_config import BenchFile
@@ -13,6 +12,8 @@ from labctl.errors import BenchBusy, Conflict, StoreError
 from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import BenchHold
 from labctl.services.benches.start_confirmation import confirmation_text
+from labctl.services.campaigns.bench_lending import BenchLending
+from labctl.services.campaigns.campaign_job import CampaignJob
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.campaigns.preparation import Prepared, prepare, refuse_unconfirmed
@@ -27,28 +28,17 @@ from labctl.services.schemas.campaigns import (
     ResumeRequest,
 )
 from labctl.services.simulation.hidden_effects import with_hidden_effects
-from labctl.store import CampaignRow, Store
+from labctl.store import Store
 from procedures.contracts.control import Control
 from procedures.contracts.errors import StalePrompt
 from procedures.contracts.journal import CampaignState
-from procedures.contracts.operator import HumanOperator, Operator
+from procedures.contracts.operator import HumanOperator
 from procedures.execution.signals import ignore_signals
 from procedures.monitoring.progress import Progress
 
 #: How long an abort waits for the safe state before it returns how far the campaign is.
 SAFE_WITHIN_S = 120.0
 STOPS = "the service stops"
-
-
-@dataclass
-class _Job:
-    """A campaign that runs now."""
-
-    row: CampaignRow
-    operator: Operator
-    control: Control
-    progress: Progress | None = None
-    thread: threading.Thread | None = None
 
 
 class BenchRunner:
@@ -64,12 +54,12 @@ class BenchRunner:
         safe_within_s: float = SAFE_WITHIN_S,
     ) -> None:
         self._store = store
-        self._safe_within_s = safe_within_s
+        self.safe_within_s = safe_within_s  #: how long an abort waits before it says how far it is
         self._hold = hold
         self._bench = bench
         self._make_clock = make_clock
         self._guard = threading.Lock()
-        self._job: _Job | None = None
+        self._job: CampaignJob | None = None
         self._recovery = CampaignRecovery(store, bench, make_clock)
         self._stops = False
         self.used = False  #: whether anything was asked of the bench here
@@ -139,7 +129,7 @@ class BenchRunner:
 
     def _begin(self, prepared: Prepared) -> None:
         control = Control() if self._hold is None else self._hold.control()
-        job = _Job(self._store.campaigns.get(prepared.id), prepared.operator, control)
+        job = CampaignJob(self._store.campaigns.get(prepared.id), prepared, control, BenchLending())
         job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
         self._job = job
         self.used = True
@@ -196,7 +186,7 @@ class BenchRunner:
 
     def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:
         """Answer the open question. Raises StalePrompt for any other one, Conflict when nothing is asked here."""
-        operator = self._running(campaign).operator
+        operator = self._running(campaign).prepared.operator
         if not isinstance(operator, HumanOperator):
             raise StalePrompt(
                 f"question {request.prompt!r} is not asked: this bench turns and switches units by itself"
@@ -207,7 +197,7 @@ class BenchRunner:
             operator.decline(request.prompt, request.by, request.reason or "no reason given")
         return self.status(campaign) or campaign_status(self._store, campaign)
 
-    def _running(self, campaign: int) -> _Job:
+    def _running(self, campaign: int) -> CampaignJob:
         job = self._job
         over = job is not None and job.progress is not None and job.progress.state.value in ENDED
         if job is None or job.row.id != campaign or over:
@@ -215,13 +205,13 @@ class BenchRunner:
             raise Conflict(f"campaign {campaign} does not run on bench {self._bench.name} now; it is {state}")
         return job
 
-    def _run(self, job: _Job, prepared: Prepared) -> None:
+    def _run(self, job: CampaignJob, prepared: Prepared) -> None:
         def seen(progress: Progress) -> None:
             job.progress = progress
             self._listeners.notify()
 
         try:
-            answer = run(self._store, prepared, job.control, seen)
+            answer = run(self._store, prepared, job.control, seen, job.lending)
             if answer.state == CampaignState.INTERRUPTED:
                 self._recovery.expect_resume()
         except StoreError as error:
@@ -251,13 +241,14 @@ class BenchRunner:
         if job is None or campaign not in {None, job.row.id}:
             return False
         job.control.abort(reason)
+        threading.Thread(target=job.stop_if_stuck, name="stop", daemon=True).start()
         return True
 
     def abort(self, campaign: int, reason: str) -> CampaignResponse:
         """End the running campaign in the safe state; returns once it is there, or how far it is after a while."""
         job = self._job
         if job is not None and self.stop_now(campaign, reason) and job.thread is not None:
-            job.thread.join(self._safe_within_s)
+            job.thread.join(self.safe_within_s)
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     def describe(self) -> dict[str, Any]:

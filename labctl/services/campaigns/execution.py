@@ -11,6 +11,7 @@ from labctl.errors import Conflict, DiskFull, Stopped, StoreError
 from labctl.services.benches.confirmation import SafeStateRetry, describe_safe_state
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
+from labctl.services.campaigns.bench_lending import BenchLending, lending_journal
 from labctl.services.campaigns.preparation import Prepared, clock_for, prepare, refuse_unconfirmed, seeded
 from labctl.services.campaigns.status import ENDED, answer_of, describe_interrupted, from_rows
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
@@ -30,22 +31,34 @@ AskClear = Callable[[Mapping[str, str]], str]
 
 
 def run(
-    store: Store, prepared: Prepared, control: Control | None = None, observe: Callable[[Progress], None] | None = None
+    store: Store,
+    prepared: Prepared,
+    control: Control | None = None,
+    observe: Callable[[Progress], None] | None = None,
+    lending: BenchLending | None = None,
 ) -> CampaignResponse:
     """Run a prepared campaign to its end; the bench is closed, in its safe state, when this returns.
 
-    Raises Stopped after a Ctrl-C.
+    With `lending` the bench is lent to other threads while the engine writes. Raises Stopped after a Ctrl-C.
     """
-    return _drive(store, prepared, _engine(store, prepared, control, observe))
+    if lending is None:
+        return _drive(store, prepared, _engine(store, prepared, control, observe))
+    with lending.driving():
+        return _drive(store, prepared, _engine(store, prepared, control, observe, lending))
 
 
 def _engine(
-    store: Store, prepared: Prepared, control: Control | None, observe: Callable[[Progress], None] | None
+    store: Store,
+    prepared: Prepared,
+    control: Control | None,
+    observe: Callable[[Progress], None] | None,
+    lending: BenchLending | None = None,
 ) -> Engine:
+    journal = store.campaigns.journal(prepared.id)
     return Engine(
         prepared.plan,
         prepared.bench,
-        store.campaigns.journal(prepared.id),
+        journal if lending is None else lending_journal(journal, lending),
         prepared.clock,
         prepared.operator,
         control=control or Control(),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+from contextvars import copy_context
+
 from labctl.errors import Conflict, StoreError
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.unattended import abort_abandoned, not_running, record_action
@@ -62,12 +65,25 @@ class ServiceControl:
         if self._runner is None or not self._runner.runs(asked.campaign):
             return abort_abandoned(context.store, asked.campaign, reason, context.now())
         answer = self._runner.abort(asked.campaign, reason)
-        try:
-            self._record(context, "abort", asked.campaign, reason)
-        except StoreError as error:
-            text = f"it was aborted, but who did it and why is not in the audit trail: {error.cause}"
+        if missing := self._recorded(context, asked.campaign, reason, self._runner.safe_within_s):
+            text = f"it was aborted, but who did it and why is not in the audit trail{missing}"
             return answer.model_copy(update={"unrecorded": text})
         return answer
+
+    def _recorded(self, context: CommandContext, campaign: int, reason: str, within_s: float) -> str:
+        """Write an abort down in a thread of its own; returns what keeps it from being written in time, or nothing."""
+        failed: list[str] = []
+
+        def record() -> None:
+            try:
+                self._record(context, "abort", campaign, reason)
+            except StoreError as error:
+                failed.append(f": {error.cause}")
+
+        thread = threading.Thread(target=copy_context().run, args=(record,), name="record-abort", daemon=True)
+        thread.start()
+        thread.join(within_s)
+        return " yet: the database is busy" if thread.is_alive() else "".join(failed)
 
     def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
         """Answer the question that a campaign waits for."""

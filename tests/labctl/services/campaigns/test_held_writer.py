@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.errors import StoreError
+from labctl.services.campaigns import bench_lending, campaign_job
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
@@ -68,6 +70,48 @@ def test_an_engine_that_cannot_write_stops_its_table(store: Store, monkeypatch: 
     row = store.campaigns.get(campaign)
     assert (row.state, "no turn to write within" in row.reason) == ("failed", True)
     assert runner.free
+
+
+def test_an_abort_stops_the_table_while_the_engine_waits_for_the_writer(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(campaign_job, "HEARD_WITHIN_S", 0.1)
+    stopped = threading.Event()
+    moved: list[bool] = []
+    real = bench_lending.stop_table
+
+    def stop_table(table: Any, clock: Any) -> str | None:
+        moved.append(table.is_moving())
+        complaint = real(table, clock)
+        moved.append(table.is_moving())
+        stopped.set()
+        return complaint
+
+    monkeypatch.setattr(bench_lending, "stop_table", stop_table)
+    runner = BenchRunner(store, BENCH, VirtualClock, safe_within_s=0.0)
+    turns = threading.Event()
+    with held_writer(store) as hold:
+
+        def at_a_data_set_that_turns() -> None:
+            job = runner._job
+            progress = None if job is None else job.progress
+            if progress is not None and progress.step_text.startswith("data set") and progress.rate_dps:
+                hold()
+                turns.set()
+
+        stop = runner.listen(at_a_data_set_that_turns)
+        campaign = runner.start(CampaignRequest(recipe="short")).id
+        assert turns.wait(60.0)
+        job = runner._job
+        assert job is not None
+        runner.abort(campaign, "a hand in the bench")
+        assert stopped.wait(15.0)  # before the writer's deadline
+        assert moved == [True, False]
+        assert job.thread is not None
+        assert job.thread.is_alive()
+        stop()
+    job.thread.join()
+    assert store.campaigns.get(campaign).state == "aborted"
 
 
 def test_an_abort_is_written_down_after_it_is_done(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:

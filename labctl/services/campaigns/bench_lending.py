@@ -1,0 +1,79 @@
+"""The bench of a campaign whose engine waits for its database: another thread may stop the table meanwhile.
+
+Drivers are for one thread. The engine has the bench while it runs, and lends it while it writes its journal: a writer
+that is held, or a disk that stands still, must not keep a table turning that somebody wants stopped.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, cast
+
+from instruments.clock import Clock
+from instruments.interfaces.table import RateTable
+from procedures.contracts.journal import Journal
+from procedures.execution.safe_state import stop_table
+
+
+class BenchLending:
+    """Whose turn it is at a bench."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._driver: int | None = None
+
+    @contextmanager
+    def driving(self) -> Iterator[None]:
+        """Have the bench in this thread, the engine's."""
+        with self._lock:
+            self._driver = threading.get_ident()
+            try:
+                yield
+            finally:
+                self._driver = None
+
+    @contextmanager
+    def lent(self) -> Iterator[None]:
+        """Let another thread have the bench meanwhile; nothing where this thread does not have it."""
+        if threading.get_ident() != self._driver:
+            yield
+            return
+        self._driver = None
+        self._lock.release()
+        try:
+            yield
+        finally:
+            self._lock.acquire()
+            self._driver = threading.get_ident()
+
+    def stop(self, table: RateTable, clock: Clock, within_s: float) -> str | None:
+        """Stop the table once the bench is lent; returns what could not be confirmed, None when it stands."""
+        if not self._lock.acquire(timeout=within_s):
+            return "the engine did not let go of the bench"
+        try:
+            return stop_table(table, clock)
+        finally:
+            self._lock.release()
+
+
+class _LendingJournal:
+    """A journal during whose calls the bench is lent."""
+
+    def __init__(self, journal: Journal, lending: BenchLending) -> None:
+        self._journal, self._lending = journal, lending
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        method = getattr(self._journal, name)
+
+        def call(*args: Any, **kwargs: Any) -> Any:
+            with self._lending.lent():
+                return method(*args, **kwargs)
+
+        return call
+
+
+def lending_journal(journal: Journal, lending: BenchLending) -> Journal:
+    """Return the journal; during each of its calls the bench is lent."""
+    return cast(Journal, _LendingJournal(journal, lending))
