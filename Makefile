@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: install demo test lint bench study lock clean
+.PHONY: install demo test lint bench study attack lock clean
 
 install: $(VENV)/.installed
 demo: install
@@ -25,6 +25,11 @@ bench: $(VENV)/.tested
 
 study: $(VENV)/.studied
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m studies
+
+# Every attack that labctl is to withstand, against services on loopback, and what an abort takes meanwhile.
+attack: $(VENV)/.tested
+	@$(BIN)/python -m pytest -q tests/system/test_connection_attacks.py tests/system/test_service_faults.py tests/labctl/api/test_hostile_requests.py
+	@LABCTL_STUDY_ABORTS=$${LABCTL_STUDY_ABORTS:-5} $(BIN)/python -m studies attacks
 
 $(VENV)/bin/python:
 	@scripts/make-venv "$(PYTHON)" "$(VENV)"

@@ -5,7 +5,16 @@ from __future__ import annotations
 import importlib
 import sys
 
-STUDIES = ("coverage", "use_coverage", "criticism", "crash_recovery", "process_kill", "process_pairs", "faults")
+STUDIES = (
+    "coverage",
+    "use_coverage",
+    "criticism",
+    "crash_recovery",
+    "process_kill",
+    "process_pairs",
+    "faults",
+    "attacks",
+)
 
 
 def main(names: list[str]) -> int:
