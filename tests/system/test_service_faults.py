@@ -30,7 +30,7 @@ def service(tmp_path: Path) -> Iterator[ServiceProcess]:
 
 def started(service: ServiceProcess) -> int:
     campaign: int = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
-    service.wait_for_data_set(campaign)
+    asked_until(service, f"/api/campaigns/{campaign}", lambda told: told["state"] == "running")
     return campaign
 
 
