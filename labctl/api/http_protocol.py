@@ -110,6 +110,8 @@ class BoundedHttpProtocol(HttpToolsProtocol):
             self.since = self.loop.time()
         self._understood = False
         super().data_received(data)
+        if self._refused:  # by the parser
+            return
         self._received = 0 if self._understood else self._received + len(data)
         if self._received > self._limits.header_bytes:
             self._refuse_headers()

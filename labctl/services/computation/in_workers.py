@@ -29,6 +29,8 @@ from labctl.store import Store, StoreAddress
 _processes = threading.Lock()
 #: How long a worker that has sent its result may take to end, s.
 END_S = 5.0
+#: A service that has just started has other work than to load libraries that nobody may ask for, s.
+PRELOAD_AFTER_S = 15.0
 
 
 class InWorkers(Pool):
@@ -46,14 +48,21 @@ class InWorkers(Pool):
         preload: Sequence[str] = (),
         clock: Clock | None = None,
     ) -> None:
-        """Start the fork server, which loads the modules of `preload` in the background."""
+        """The fork server loads the modules of `preload` with the first job, or `PRELOAD_AFTER_S` from now."""
         super().__init__(limits or Limits(), clock)
         self._store = store
         self._address = address or store.address
         self._workers: dict[Job, ForkServerProcess] = {}
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload([*preload])
-        forkserver.ensure_running()
+        self._preloading = threading.Timer(PRELOAD_AFTER_S, self._preload)
+        self._preloading.daemon = True
+        self._preloading.start()
+
+    @staticmethod
+    def _preload() -> None:
+        with _processes:
+            forkserver.ensure_running()
 
     def _result_of(self, job: Job) -> Any:
         if job.writes and not self._address.can_write:
@@ -117,6 +126,7 @@ class InWorkers(Pool):
 
     def _end_all(self) -> None:
         """Kill every worker; what waits is refused by its thread."""
+        self._preloading.cancel()
         for worker in list(self._workers.values()):
             worker.kill()
 

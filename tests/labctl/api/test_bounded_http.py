@@ -73,6 +73,16 @@ def test_a_large_header_of_a_further_request_is_refused_too(server: BoundedServe
         assert b"HTTP/1.1 431" in rest_of(client)
 
 
+@pytest.mark.parametrize("begun", [b"GET / HTTP/1.1\r\n", b"no request at all\r\n"])
+def test_what_the_parser_has_refused_is_refused_once(
+    server: BoundedServer, caplog: pytest.LogCaptureFixture, begun: bytes
+) -> None:
+    with server.connect(begun + b"X-A: a\r\n" * 30_000) as client:
+        rest_of(client)
+    assert server.get() == "fine"
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
 @pytest.mark.parametrize("sent", [b"", b"GET / HT", b"\r\n", request("/", "Connection: keep-alive") + b"GET"])
 def test_headers_have_to_be_complete_in_time(server: BoundedServer, sent: bytes) -> None:
     with server.connect(sent) as client:
