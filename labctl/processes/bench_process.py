@@ -31,7 +31,7 @@ from labctl.store.connection.database import Database
 from procedures.execution.signals import ENDING
 
 #: An abort is answered within this, with how far the campaign then is, s.
-ANSWER_WITHIN_S = 0.3
+ANSWER_WITHIN_S = 0.2
 #: A bench process without a supervisor ends by itself when no campaign has run for so long, s.
 ALONE_S = 60.0
 LOOK_S = 1.0

@@ -120,10 +120,13 @@ def _packed(answer: Answer) -> bytes:
 
 
 class Caller:
-    """Calls the process behind a Unix socket. Any thread may call; each call has a connection to itself."""
+    """Calls the process behind a Unix socket. Any thread may call; each call has a connection to itself.
 
-    def __init__(self, path: Path, timeout_s: float) -> None:
-        self._path, self._timeout_s = path, timeout_s
+    Connections are kept for further calls, unless the other end answers one call on each.
+    """
+
+    def __init__(self, path: Path, timeout_s: float, *, keeps: bool = True) -> None:
+        self._path, self._timeout_s, self._keeps = path, timeout_s, keeps
         self._idle: list[Connection] = []
         self._guard = threading.Lock()
 
@@ -142,8 +145,11 @@ class Caller:
         except BaseException:
             connection.close()  # an answer that comes later must not be taken for that of the next call
             raise
-        with self._guard:
-            self._idle.append(connection)
+        if self._keeps:
+            with self._guard:
+                self._idle.append(connection)
+        else:
+            connection.close()
         if answer.raised is not None:
             raise answer.raised
         return answer.value

@@ -58,7 +58,7 @@ class RemoteControl:
     """Control over the campaigns of the bench process."""
 
     def __init__(self, folder: Path) -> None:
-        self._calls, self._stop = Caller(folder / CALLS, ANSWER_S), Caller(folder / STOP, STOP_S)
+        self._calls, self._stop = Caller(folder / CALLS, ANSWER_S), Caller(folder / STOP, STOP_S, keeps=False)
 
     def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
         """Start a campaign on the bench."""

@@ -1,0 +1,108 @@
+"""The bench process as the web process sees it: transactions run there, campaigns are controlled, silence is told."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from instruments.clock import VirtualClock, WallClock
+from labctl.acting_user import Actor, acting
+from labctl.errors import BenchSilent, Conflict, NotFound
+from labctl.processes.bench_calls import BenchCalls
+from labctl.processes.calls import CallServer
+from labctl.processes.remote_bench import RemoteBench, RemoteWriter
+from labctl.processes.settings import CALLS, STOP, BenchSettings
+from labctl.processes.supervision import Supervision
+from labctl.processes.waker import Waker
+from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.lab_service import LabService
+from labctl.services.local_bench import LocalBench
+from labctl.services.planning.loading import load_bench
+from labctl.store import Store, StoreAddress, open_store
+from labctl.store.connection.transactions import TRANSACTIONS
+
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+BENCH = load_bench("single-axis-sim")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """Sockets of what answers as the bench process does, in this process; the database lies beside them."""
+    waker = Waker()
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        settings = BenchSettings(store.location, BENCH.name, simulate=True, speed=0.0, folder=tmp_path, url="")
+        local = LocalBench(store, WallClock(), BenchRunner(store, BENCH, VirtualClock))
+        calls = BenchCalls(store, local, Supervision(settings, store, waker))
+        servers = CallServer(tmp_path / STOP, calls.stop, in_turn=True), CallServer(tmp_path / CALLS, calls.answer)
+        for server in servers:
+            server.start()
+        yield tmp_path
+        local.close()
+        for server in servers:
+            server.close()
+    waker.close()
+
+
+@pytest.fixture
+def store(folder: Path) -> Iterator[Store]:
+    """The database as the web process has it."""
+    writer = pickle.loads(pickle.dumps(RemoteWriter(folder)))
+    with StoreAddress(str(folder / "lab.sqlite"), writer).open() as opened:
+        yield opened
+    writer.close()
+
+
+def test_a_transaction_runs_in_the_bench_process_in_the_name_of_who_asked(store: Store) -> None:
+    with acting(Actor("Ada", "key")):
+        store.audit.record(AT, "backup", "copy.sqlite", {"bytes": 1})
+    (row,) = store.audit.rows()
+    assert (row.who, row.action, row.detail["bytes"]) == ("Ada", "backup", 1)
+    with pytest.raises(NotFound, match="was never used with this database"):
+        store.benches.clear("nowhere", "Ada", "looked", AT)
+
+
+def test_every_transaction_is_a_method_of_a_repository(store: Store) -> None:
+    repositories = {type(each).__name__: type(each) for each in vars(store).values()}
+    assert TRANSACTIONS
+    for name in TRANSACTIONS:
+        repository, _, method = name.partition(".")
+        assert callable(getattr(repositories[repository], method)), name
+    with pytest.raises(KeyError):
+        store.run("Audit.rows", (), {})
+
+
+def test_a_campaign_is_started_followed_and_aborted_from_the_web_process(store: Store, folder: Path) -> None:
+    access = RemoteBench(folder, BENCH)
+    rings = threading.Semaphore(0)
+    access.listen(rings.release)
+    service = LabService(store, WallClock(), access=access)
+    service.start()
+    try:
+        assert rings.acquire(timeout=20.0)
+        from labctl.services.commands.registry import ABORT_CAMPAIGN, START_CAMPAIGN
+        from labctl.services.commands.requests import CampaignStart, ToCampaign
+        from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest
+
+        campaign = service.execute(START_CAMPAIGN, CampaignStart(CampaignRequest(recipe="short"))).id
+        while service.status(campaign).state not in {"done", "failed", "aborted"}:
+            assert rings.acquire(timeout=20.0)
+        assert service.status(campaign).state == "done"
+        with pytest.raises(Conflict, match="is over already: done"):
+            service.execute(ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason="tea")))
+    finally:
+        access.close()
+
+
+def test_a_bench_process_that_was_never_heard_is_silent_and_unconfirmed(tmp_path: Path) -> None:
+    access = RemoteBench(tmp_path, BENCH)
+    assert (access.running, access.status(1), access.runs(1)) == (None, None, False)
+    described = access.describe()
+    assert described is not None
+    assert described["name"] == BENCH.name
+    with pytest.raises(BenchSilent):
+        RemoteWriter(tmp_path).run("Audit.record", (), {})
