@@ -91,15 +91,16 @@ class Service:
         with suppress(ProcessLookupError):
             os.kill(self.pids[fault.process], fault.number)
 
-    def manage(self, supervisor_stopped: bool) -> None:
+    def manage(self, supervisor: signal.Signals | None) -> None:
         """Do what a service manager does: end a supervisor that stands still, start one that has ended."""
-        if supervisor_stopped:
+        if supervisor is None:
+            return
+        if supervisor == signal.SIGSTOP:
             time.sleep(WATCHDOG_S)
             self._process.kill()
-            self._process.wait()
-        if self._process.poll() is not None:
-            self.http.close()
-            self._start()
+        self._process.wait()
+        self.http.close()
+        self._start()
 
     def asked(self, path: str, holds: Callable[[Any], bool], within_s: float) -> Any:
         """Ask until the answer is as expected; returns the last answer, None where there was none."""
@@ -129,7 +130,7 @@ def suffer(folder: Path, bench: Path, faults: tuple[Fault, ...]) -> Outcome:
             service.suffer(fault)
         before = _readings(service.database)
         begun_s = time.monotonic()
-        service.manage(any(f.process == "supervisor" and f.number == signal.SIGSTOP for f in faults))
+        service.manage(next((fault.number for fault in faults if fault.process == "supervisor"), None))
         service.asked("/health", lambda told: told["bench"]["heard_s"] < 3.0, WITHIN_S)
         answers_after_s = time.monotonic() - begun_s
         over = {"done", "failed", "aborted"}
