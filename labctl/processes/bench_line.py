@@ -25,6 +25,7 @@ class BenchLine:
         """Take charge. Raises Conflict while another supervisor is, or for another bench; BenchSilent."""
         self.pid, self._child = pid, child
         self._handle = os.pidfd_open(pid)
+        self._closed = False
         self.left: BenchLeft | None = None  #: how the bench was left, once the process has said so
         self._line = self._take_charge(settings)
         self._heard = Elapsed()
@@ -60,6 +61,8 @@ class BenchLine:
 
     def wait(self, seconds: float) -> bool:
         """Wait for its end; returns whether it came."""
+        if self._closed:
+            return True
         ended = bool(select.select([self._handle], [], [], seconds)[0])
         if ended and self._child is not None:
             self._child.wait(seconds)
@@ -71,7 +74,10 @@ class BenchLine:
             signal.pidfd_send_signal(self._handle, number)
 
     def close(self) -> None:
-        """Let go of a process that has ended."""
+        """Let go of a process that has ended. Safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
         self._thread.join()
         self._line.close()
         os.close(self._handle)

@@ -103,16 +103,13 @@ class Supervisor:
         except BaseException:
             self._web.kill()
             raise
-        try:
-            self._web.open(self._web_settings())
-        except BaseException:
-            self._end_bench(bench)
-            raise
-        ready(Ready(self._at.url, bench.pid, self._web.pid))
-        bench.tell("begin")
-        systemd.ready()
         self._bench, self._web_heard = bench, Elapsed()
         try:
+            self._web.open(self._web_settings())
+            self._web_heard.restart()
+            ready(Ready(self._at.url, bench.pid, self._web.pid))
+            bench.tell("begin")
+            systemd.ready()
             self._watch()
         finally:
             systemd.stopping()

@@ -36,7 +36,7 @@ PRELOAD_AFTER_S = 15.0
 class InWorkers(Pool):
     """Each job in a process of its own, which opens the store by its address.
 
-    Jobs that write run in this process, with its own store, until the address says how another process writes.
+    Jobs that write run in this process, with its own store, where the address names no process that writes for others.
     """
 
     def __init__(

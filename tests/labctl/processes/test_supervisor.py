@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 from collections.abc import Iterator
@@ -110,3 +111,20 @@ def test_a_service_hears_of_signals_until_it_is_closed(tmp_path: Path, monkeypat
     signal.raise_signal(signal.SIGTERM)
     assert ends == [1]
     assert handlers() == before
+
+
+def test_a_service_that_cannot_say_where_it_is_ends_its_processes(tmp_path: Path) -> None:
+    location = str(tmp_path / "lab.sqlite")
+    told: list[supervisor.Ready] = []
+
+    def fails(service: supervisor.Ready) -> None:
+        told.append(service)
+        raise BrokenPipeError("nobody reads")
+
+    with pytest.raises(BrokenPipeError):
+        supervisor.serve_forever(ServeRequest(port=0, database=location), fails)
+    (service,) = told
+    assert holder_of(location) is None
+    for pid in (service.bench_pid, service.web_pid):
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
