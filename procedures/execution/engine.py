@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
 from procedures.contracts.bench import Bench
@@ -70,11 +72,17 @@ class Engine:
         """What the last safe state could not confirm."""
         return self._shutdown.complaints
 
-    def run(self, start_at: int = 0, restart: Restart | None = None) -> Outcome:
+    def run(
+        self,
+        start_at: int = 0,
+        restart: Restart | None = None,
+        on_ending: Callable[[], None] = lambda: None,
+    ) -> Outcome:
         """Run the plan from step `start_at` (from 0) to its end; `restart` says what is known of an interruption.
 
-        What the bench, a guard or a person ends is an Outcome. Anything else (a failing journal, Ctrl-C, a mistake in
-        the program) is raised again once the bench is safe.
+        `on_ending` is called before the bench is made safe, again where a signal cut that short. What the bench, a
+        guard or a person ends is an Outcome. Anything else (a failing journal, Ctrl-C, a mistake in the program) is
+        raised again once the bench is safe.
         """
         self._recorder.time.begin()
         state, reason = CampaignState.FAILED, "ended by an error of the program"
@@ -96,7 +104,7 @@ class Engine:
             reason = f"{type(error).__name__}: {error}"
             raise
         finally:
-            outcome = self._shutdown.end(state, reason, bench_is_safe=self._executor.bench_is_safe)
+            outcome = self._shutdown.end(state, reason, on_ending, bench_is_safe=self._executor.bench_is_safe)
         return outcome
 
     def _begin(self, start_at: int, restart: Restart | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from procedures.contracts.journal import NOT_SAFE, CampaignState, Event
@@ -26,13 +27,16 @@ class Shutdown:
         self._context = context
         self.complaints: tuple[str, ...] = ()  #: set before the journal is written, so known when writing fails
 
-    def end(self, state: CampaignState, reason: str, *, bench_is_safe: bool) -> Outcome:
+    def end(
+        self, state: CampaignState, reason: str, on_ending: Callable[[], None] = lambda: None, *, bench_is_safe: bool
+    ) -> Outcome:
         """Make the bench safe, unless its last step did, and record how the campaign ended.
 
-        Signals are ignored meanwhile; an interrupt from before that begins the shutdown again.
+        Signals are ignored meanwhile; an interrupt from before that begins the shutdown again, `on_ending` first.
         """
         while True:
             try:
+                on_ending()
                 with ignore_signals():
                     return self._end(state, reason, bench_is_safe=bench_is_safe)
             except KeyboardInterrupt:

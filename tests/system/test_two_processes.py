@@ -83,7 +83,7 @@ def test_the_same_data_sets_within_noise(far_bench: Path, tmp_path: Path) -> Non
     here, there = tmp_path / "here.sqlite", tmp_path / "there.sqlite"
     one = run_here(str(here), StartRequest(recipe=str(recipe), bench=str(bench_file(tmp_path))))
     two = run_here(str(there), StartRequest(recipe=str(recipe), bench=str(far_bench), **LOOKED_AT))
-    assert (one.state, two.state) == ("done", "done")
+    assert (one.state, two.state) == ("done", "done"), (one.reason, two.reason)
     near, far = data_sets(here, one.id), data_sets(there, two.id)
     assert len(near["n"]) == len(far["n"]) == 6
     for name in ("position", "run", "mounting"):

@@ -111,6 +111,21 @@ def test_says_that_it_is_stale_and_goes_on_where_it_was(
     faults.clear()
 
 
+def test_a_page_that_got_no_answer_is_shown_once_the_service_is_heard(
+    service: Service, visit: Callable[..., Page], faults: Faults
+) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/bench")
+    expect(page.get_by_role("region", name="Nothing runs")).to_be_visible()
+    page.route("**/api/**", lambda route: route.abort())
+    page.get_by_role("link", name="Campaigns", exact=True).click()
+    expect(page.get_by_role("heading", name="No answer")).to_be_visible()
+    page.unroute("**/api/**")
+    expect(page.get_by_role("heading", name="Campaigns", exact=True)).to_be_visible()
+    faults.clear()
+
+
 def test_a_service_without_a_bench_says_how_to_start_one(tmp_path: Path, chromium: object) -> None:
     from playwright.sync_api import expect
 

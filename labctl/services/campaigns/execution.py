@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 
 from instruments.bench_config import BenchFile
 from labctl.config import default_database
@@ -68,17 +68,18 @@ def _engine(
 
 
 def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse:
-    try:
-        engine.run(prepared.start_at, prepared.restart)
-    except KeyboardInterrupt as interrupt:
-        with ignore_signals():  # a second one must not take away what is to be said
+    """Run the engine and close the bench; once it ends, further signals take nothing from what is to be said."""
+    with ExitStack() as until_told:
+        try:
+            engine.run(prepared.start_at, prepared.restart, lambda: until_told.enter_context(ignore_signals()))
+        except KeyboardInterrupt as interrupt:
             raise Stopped(_stopped(store, prepared, engine)) from interrupt
-    finally:
-        with ignore_signals(), closing(prepared.bench):
-            if engine.complaints:  # said in its event already, unless that could not be written
-                bench = store.campaigns.get(prepared.id).bench_name
-                if not store.benches.unconfirmed(bench):
-                    store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
+        finally:
+            with closing(prepared.bench):
+                if engine.complaints:  # said in its event already, unless that could not be written
+                    bench = store.campaigns.get(prepared.id).bench_name
+                    if not store.benches.unconfirmed(bench):
+                        store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
     return answer_of(store.campaigns.get(prepared.id), engine.progress)
 
 

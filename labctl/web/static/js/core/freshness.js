@@ -25,6 +25,7 @@ async function ask() {
     const answer = await response.json();
     [heard, heardAt] = [now(), new Date()];
     bench = Number.isFinite(answer.heard_s) ? { heard_s: answer.heard_s, at: now() } : null;
+    window.dispatchEvent(new CustomEvent("labctl:heard"));
   } catch {
     // not heard: the time since the last answer grows
   } finally {

@@ -58,11 +58,17 @@ export async function show() {
     navigated = true;
   } catch (error) {
     if (signal.aborted || error.name === "AbortError") return;
-    const { errorPage } = await import("./components.js");
-    main.replaceChildren(errorPage(error, show));
+    await showError(main, error, signal);
   } finally {
     if (!signal.aborted) main.removeAttribute("aria-busy");
   }
+}
+
+/** Show an error in place of the page. A page whose service did not answer is shown as soon as it is heard. */
+async function showError(main, error, signal) {
+  const [{ errorPage }, { Unreachable }] = await Promise.all([import("./components.js"), import("./api.js")]);
+  main.replaceChildren(errorPage(error, show));
+  if (error instanceof Unreachable) window.addEventListener("labctl:heard", show, { signal, once: true });
 }
 
 /** Scroll to an anchor, and move the keyboard focus there where the element can have it. */
