@@ -176,18 +176,22 @@ class PluginGroup(Generic[PluginT]):
                 owner[part_name], whole[part_name] = str(self.plugin(name).release), part
         return whole
 
+    def status(self) -> list[tuple[Plugin, str]]:
+        """Return every entry point with why it cannot be used, empty where it can; everything is imported."""
+        found: list[tuple[Plugin, str]] = []
+        for name, plugins in self._by_name.items():
+            try:
+                self.get(name)
+                why = ""
+            except PluginError as error:
+                why = str(error)
+            doubled = self._doubled(plugins) if len(plugins) > 1 else ""
+            found += [(plugin, doubled or why) if plugin is not plugins[0] else (plugin, why) for plugin in plugins]
+        return found
+
     def problems(self) -> list[str]:
         """Return one line for each plug-in that cannot be used; everything is imported."""
-        lines: list[str] = []
-        for name, found in self._by_name.items():
-            if len(found) > 1:
-                lines.append(self._doubled(found))
-            if len(found) == 1 or found[0].is_own:
-                try:
-                    self.get(name)
-                except PluginError as error:
-                    lines.append(str(error))
-        return lines
+        return list(dict.fromkeys(why for _, why in self.status() if why))
 
     def report(self, line: str) -> None:
         """Log a line about a plug-in that is left out, once."""
