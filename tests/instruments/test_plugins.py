@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -149,21 +148,18 @@ def test_parts_of_one_name_are_those_of_the_first(site: Path, caplog: pytest.Log
     assert "part 'both' is left out: acme-a 0.3 has one of that name" in record.getMessage()
 
 
-def run(*code: str, **environment: str) -> Any:
-    return subprocess.run(
-        [sys.executable, "-c", *code], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60
-    )
-
-
 HELP = """
 import sys
 import typer.testing
 from labctl.cli.app import app
 assert typer.testing.CliRunner().invoke(app, ["--help"]).exit_code == 0
 from instruments import plugins
-print(plugins.installed.cache_info().currsize, *(name for name in sys.modules if name.startswith("instruments.drivers.")))
+loaded = [name for name in sys.modules if name.startswith("instruments.drivers.")]
+print(plugins.installed.cache_info().currsize, *loaded)
 """
 
 
 def test_help_reads_no_metadata_of_plug_ins_and_imports_no_driver() -> None:
-    assert run(HELP).stdout.split() == ["0"]
+    command = [sys.executable, "-c", HELP]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.split() == ["0"]
