@@ -20,6 +20,13 @@ PACKAGES = {GYRO: "acme-gyro", EFFECT: "acme-humidity", EXPORT: "acme-table", IM
 PIP = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-index"]
 
 
+#: An export that fails at what it does, not at its import.
+BROKEN_EXPORT = """
+from labctl.exports.format import Format
+FORMAT = Format("Broken", "text/csv", "csv", lambda calibration: {}["x"])
+"""
+
+
 class Outside:
     """A folder of a user's: the files of one section, its package installed, a database of its own."""
 
@@ -104,23 +111,36 @@ def test_an_effect_on_both_sides(outside: Callable[[str], Outside]) -> None:
     assert improved["error"]["rms_dps"] < 0.5 * improved["before"]["rms_dps"]
 
 
-def test_an_export_and_an_importer(outside: Callable[[str], Outside], tmp_path: Path) -> None:
+def test_an_export(outside: Callable[[str], Outside]) -> None:
+    user = outside(EXPORT)
+    user.follow()
+    table = (user.folder / "fog.csv").read_text("utf-8").splitlines()
+    assert table[0] == "axis,output_dps,temperature_c,error_dps"
+    assert len(table) == 1 + 21 * 11
+    formula = user.labctl("labctl fit FOG-0001 --effects bias,supply_sensitivity --accept-warnings")
+    assert formula.returncode == 0
+    refused = user.labctl("labctl calibration FOG-0001 --version 2 --format lookup-csv", status=2).stderr
+    assert "format lookup-csv: the model needs supply_v too; use json" in refused
+    unknown = user.labctl("labctl calibration FOG-0001 --version 1 --format lookup", status=2).stderr
+    assert "no export format 'lookup' is installed (there are c (labctl " in unknown
+    assert "did you mean 'lookup-csv'?" in unknown
+    (user.site / "acme_table" / "export.py").write_text(BROKEN_EXPORT, encoding="utf-8")
+    failed = user.labctl("labctl calibration FOG-0001 --version 1 --format lookup-csv", status=2).stderr
+    assert "of acme-table 0.1.0 in group labctl.exports: cannot write this calibration: KeyError: 'x'" in failed
+
+
+def test_an_importer(outside: Callable[[str], Outside], tmp_path: Path) -> None:
     user = outside(IMPORTER)
     user.follow()
     recordings = [user.json(f"labctl export recording {number} --out out{number} --csv") for number in (1, 2)]
-    heads = [(Path(user.folder) / each["folder"] / "recording.toml").read_text("utf-8") for each in recordings]
-    assert ['serial = "ACME-7"' in heads[0], 'serial = "ACME-8"' in heads[1]] == [True, True]
+    heads = [(user.folder / each["folder"] / "recording.toml").read_text("utf-8") for each in recordings]
+    assert 'serial = "ACME-7"' in heads[0]
+    assert 'serial = "ACME-8"' in heads[1]
     assert "read from flight.log by importer acme-log of acme-log 0.1.0" in heads[0]
     rows = (tmp_path / "out1" / "samples.csv").read_text("utf-8").splitlines()
     assert len(rows) == 7
     assert user.json("labctl fit ACME-7 --effects bias,scale_factor --accept-warnings")["version"] == 1
-    export = sections()[EXPORT]
-    write_files(export, tmp_path)
-    user.install("acme-table")
-    user.labctl("labctl calibration ACME-7 --version 1 --format lookup-csv --out table.csv")
-    table = (tmp_path / "table.csv").read_text("utf-8").splitlines()
-    assert table[0] == "axis,output_dps,temperature_c,error_dps"
-    assert len(table) == 1 + 21 * 11
+    assert user.json("labctl audit verify")["ok"]
 
 
 def test_a_wrong_line_and_a_wrong_option_of_an_importer_are_named(outside: Callable[[str], Outside]) -> None:

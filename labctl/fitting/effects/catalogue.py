@@ -1,6 +1,6 @@
 """The catalogue of effects, by id: the entry points of the group `labctl.effects`, labctl's own first.
 
-An entry point is one class of effect, or several in a row; labctl's own stand in `families.py`.
+An entry point is one class of effect, or several in a row; labctl's own stand in `EFFECTS`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,36 @@ from typing import Any
 
 from instruments.plugins import PluginGroup
 from labctl.errors import BadInput
+from labctl.fitting.effects import (
+    acceleration,
+    alignment,
+    bias,
+    environment,
+    history,
+    nonlinearity,
+    rate_table,
+    scale_factor,
+    surface,
+    thermal,
+)
 from labctl.fitting.effects.base import Effect, Term
 from labctl.fitting.effects.formula import NAME, Formula
 from labctl.fitting.effects.trial import refuse_useless
 
+_OWN = (
+    bias,
+    scale_factor,
+    surface,
+    alignment,
+    nonlinearity,
+    acceleration,
+    rate_table,
+    thermal,
+    history,
+    environment,
+)
+#: labctl's own entry point: a family lists its effects in its EFFECTS.
+EFFECTS: tuple[type[Effect], ...] = tuple(kind for family in _OWN for kind in family.EFFECTS)
 Kinds = tuple[Effect, ...]
 
 
@@ -70,7 +96,11 @@ def effect(effect_id: str) -> Effect:
     if effect_id in CATALOGUE:
         return CATALOGUE[effect_id]
     near = difflib.get_close_matches(effect_id, CATALOGUE, n=3, cutoff=0.4)
-    hint = f"did you mean {' or '.join(near)}?" if near else "`labctl effects` lists them"
+    hint = (
+        f"did you mean {' or '.join(near)}?"
+        if near
+        else ("`labctl effects` lists them, and a package may bring it (group labctl.effects)")
+    )
     raise BadInput(f"effect {effect_id!r} is not in the catalogue; {hint}")
 
 

@@ -76,8 +76,7 @@ def prepare_resume(
     row = store.campaigns.get(campaign)
     if row.state == "done":
         raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
-    bench_file = with_drivers(bench_file)
-    _refuse_other_units(row, bench_file)
+    bench_file = _same_units(row, bench_file)
     refuse_unconfirmed(store, bench_file.name)
     standing, plan = store.resume_points.of_campaign(campaign), plan_of(store, row)
     clock = make_clock(standing)
@@ -124,13 +123,15 @@ def _other_drivers(row: CampaignRow, bench_file: BenchFile) -> str:
     return "".join(changed)
 
 
-def _refuse_other_units(row: CampaignRow, bench_file: BenchFile) -> None:
+def _same_units(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
+    """Return the bench with its drivers; raises Conflict where it carries other units, BadBench for a driver."""
     here = {gyro.serial for gyro in bench_file.gyros}
     if set(row.recordings) != here:
         raise Conflict(
             f"campaign {row.id} measures {', '.join(sorted(row.recordings))}, bench {bench_file.name} carries "
             f"{', '.join(sorted(here))}; name the campaign's own bench with --bench"
         )
+    return with_drivers(bench_file)
 
 
 def resume_here(
