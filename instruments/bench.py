@@ -13,7 +13,7 @@ from instruments.bench_config import BenchFile
 from instruments.clock import Clock, SystemClock
 from instruments.drivers.resolution import driver_of, resolve
 from instruments.drivers.unit_handlers import ManualUnitHandler, RemoteUnitHandler
-from instruments.errors import InstrumentError
+from instruments.errors import InstrumentError, WrongSimulation
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.table import RateTable
@@ -50,11 +50,14 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
 
     `simulation` is the world of the simulated instruments where it exists already. Raises pydantic.ValidationError for
     a driver that cannot be used and for settings that it does not take, LimitError for a setting that the driver cannot
-    use, and ValueError for an unknown profile, setting or hidden effect of the simulation.
+    use, and WrongSimulation for an unknown profile, setting or hidden effect of the simulation.
     """
     bench = resolve(bench)
     if simulation is None and bench.has_simulated:
-        simulation = open_simulation(bench, clock)
+        try:
+            simulation = open_simulation(bench, clock)
+        except ValueError as error:
+            raise WrongSimulation("simulation", str(error)) from error
     ports = Ports(clock, None if simulation is None else simulated_links(simulation, clock))
     return Bench(
         driver_of(bench.table).make(bench.table, ports, clock),

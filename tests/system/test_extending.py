@@ -84,9 +84,19 @@ def test_the_examples_are_what_the_page_says() -> None:
 def test_a_driver_with_its_simulator(outside: Callable[[str], Outside]) -> None:
     user = outside(GYRO)
     refused = user.labctl("labctl bench check acme-gyro/bench.toml", status=2)
+    assert refused.stderr.count("\n") == 1
     assert "gyros.0.driver: no driver 'acme-g1' is installed (there are gyrostar (labctl " in refused.stderr
     printed = user.follow()
     assert "[acme-g1 of acme-gyro 0.1.0]" in printed["labctl bench check acme-gyro/bench.toml"]
+    bench = user.folder / "acme-gyro" / "bench.toml"
+    whole = bench.read_text("utf-8")
+    bench.write_text(whole.replace('profile = "rd2100"', ""), encoding="utf-8")
+    nameless = user.labctl("labctl bench check acme-gyro/bench.toml", status=2).stderr
+    assert nameless.count("\n") == 1
+    assert "no profile of a simulated unit is known; set one in [simulation.units] of the bench file" in nameless
+    bench.write_text(whole.replace('name = "g1"', 'name = "g1"\nmirored = true'), encoding="utf-8")
+    misspelt = user.labctl("labctl bench check acme-gyro/bench.toml", status=2).stderr
+    assert "gyros.0.mirored: driver acme-g1 has no such setting (there are driver, port, " in misspelt
     campaign = user.json("labctl campaign status")
     assert campaign["state"] == "done"
     assert campaign["drivers"]["g1"] == {"driver": "acme-g1", "distribution": "acme-gyro", "version": "0.1.0"}
