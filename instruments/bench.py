@@ -1,19 +1,19 @@
-"""Composition root: opens the instruments of a bench file by driver name."""
+"""Composition root: opens the instruments of a bench file by driver name.
+
+Drivers and simulators are imported here; once a bench is open, none is imported any more.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import ValidationError
-from pydantic_core import InitErrorDetails
-
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock, SystemClock
-from instruments.drivers.registry import CHAMBERS, GYROS, TABLES
+from instruments.drivers.resolution import driver_of, resolve
 from instruments.drivers.unit_handlers import ManualUnitHandler, RemoteUnitHandler
-from instruments.errors import InstrumentError
+from instruments.errors import InstrumentError, WrongSimulation
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.table import RateTable
@@ -49,44 +49,35 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
     """Return the drivers of a bench; no byte is sent before one of them is used.
 
     `simulation` is the world of the simulated instruments where it exists already. Raises pydantic.ValidationError for
-    an unknown driver and for options that are not of a gyro's driver, LimitError for an option that the driver cannot
-    use, and ValueError for an unknown profile, setting or hidden effect of the simulation.
+    a driver that cannot be used and for settings that it does not take, LimitError for a setting that the driver cannot
+    use, and WrongSimulation for an unknown profile, setting or hidden effect of the simulation.
     """
-    check_drivers(bench)
+    bench = resolve(bench)
     if simulation is None and bench.has_simulated:
-        simulation = open_simulation(bench, clock)
+        try:
+            simulation = open_simulation(bench, clock)
+        except ValueError as error:
+            raise WrongSimulation("simulation", str(error)) from error
     ports = Ports(clock, None if simulation is None else simulated_links(simulation, clock))
     return Bench(
-        TABLES[bench.table.driver](bench.table, ports, clock),
-        CHAMBERS[bench.chamber.driver](bench.chamber, ports, clock),
-        {gyro.name: GYROS[gyro.driver](gyro, ports, clock) for gyro in bench.gyros},
+        driver_of(bench.table).make(bench.table, ports, clock),
+        driver_of(bench.chamber).make(bench.chamber, ports, clock),
+        {gyro.name: driver_of(gyro).make(gyro, ports, clock) for gyro in bench.gyros},
         _unit_handler(bench, simulation, clock),
         simulation,
     )
 
 
-def check_drivers(bench: BenchFile) -> None:
-    """Raise pydantic.ValidationError with each unknown driver, its place in the bench file and the known names."""
-    given: list[tuple[tuple[str | int, ...], str, Iterable[str]]] = [
-        (("table", "driver"), bench.table.driver, TABLES),
-        (("chamber", "driver"), bench.chamber.driver, CHAMBERS),
-        *((("gyros", number, "driver"), gyro.driver, GYROS) for number, gyro in enumerate(bench.gyros)),
-    ]
-    unknown: list[InitErrorDetails] = [
-        {"type": "literal_error", "loc": place, "input": name, "ctx": {"expected": _alternatives(known)}}
-        for place, name, known in given
-        if name not in known
-    ]
-    if unknown:
-        raise ValidationError.from_exception_data(type(bench).__name__, unknown)
+def checked_settings(bench: BenchFile) -> BenchFile:
+    """Return a bench with its sections by their drivers' models; no byte is sent.
 
-
-def check_settings(bench: BenchFile) -> None:
-    """Raise pydantic.ValidationError for an unknown driver, or options that are not of a gyro's; no byte is sent."""
-    check_drivers(bench)
+    Raises pydantic.ValidationError as `resolve` does, LimitError for an option that a gyro's driver cannot use.
+    """
+    resolved = resolve(bench)
     clock = SystemClock()
-    for gyro in bench.gyros:
-        GYROS[gyro.driver](gyro, Ports(clock), clock)
+    for gyro in resolved.gyros:
+        driver_of(gyro).make(gyro, Ports(clock), clock)
+    return resolved
 
 
 def check(bench: BenchFile, clock: Clock) -> list[tuple[str, bool, str]]:
@@ -113,9 +104,3 @@ def _unit_handler(bench: BenchFile, simulation: Simulation | None, clock: Clock)
     if bench.simulation is not None and bench.simulation.control is not None:
         return RemoteUnitHandler(bench.simulation.control)
     return ManualUnitHandler()
-
-
-def _alternatives(names: Iterable[str]) -> str:
-    """Return names as pydantic lists the values of a literal: 'a', 'b' or 'c'."""
-    *most, last = map(repr, names)
-    return f"{', '.join(most)} or {last}" if most else last

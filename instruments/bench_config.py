@@ -1,16 +1,18 @@
 """A bench file: the table, chamber and gyros of one bench, their addresses and their limits.
 
 Real and simulated instruments differ in `port` and `host` only; `sim://...` leads to the simulators of `[simulation]`.
-A `driver` is a name in the registry of drivers. `instruments.bench` checks it: this module is below the drivers.
+A `driver` is the name of an installed driver. This module is below the drivers: it knows the keys that every table,
+chamber or gyro has, and keeps the others as they are; `instruments.drivers.resolution` checks them by the driver's own
+model.
 """
 
 from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
 
 from instruments.toml_documents import read_toml
 
@@ -31,41 +33,33 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class TableSettings(Strict):
-    """Address, mechanics and limits of the rate table."""
+class DeviceSettings(BaseModel):
+    """One instrument of a bench file: its driver and address. A driver's own model adds the keys of the driver."""
 
-    driver: str = "arrick-c4"
-    port: str
-    baudrate: int = 9600
-    steps_per_turn: int = 1600  #: half steps of the table, after the reduction
-    direction: Literal[1, -1] = 1  #: 1: `f` turns the table counter-clockwise seen from above
-    max_rate_dps: float = Field(gt=0)
-    acceleration_dps2: float = Field(gt=0)
-    step_clock_hz: float = Field(default=2_000_000.0, gt=0)  #: the step rate is this frequency over a whole divisor
-    clock_u_ppm: float = Field(default=50.0, ge=0)  #: standard uncertainty of the step clock
-    #: The C4's speed command is not public. Without the manual's template the driver refuses a constant rate.
-    speed_template: str | None = None
-    ramp_template: str | None = None
-    terminator: str = "\r"
-
-
-class ChamberSettings(Strict):
-    """Address, options and limits of the chamber controller."""
+    model_config = ConfigDict(extra="allow", frozen=True)
 
     driver: str
-    port: str | None = None  #: serial (watlow-f4)
-    host: str | None = None  #: Modbus TCP (watlow-f4t)
+    port: str | None = None  #: serial devices
+    host: str | None = None  #: devices on the network
     tcp_port: int = 502
-    baudrate: int = 19200
-    address: int = Field(default=1, ge=1, le=247)
+
+
+class TableSettings(DeviceSettings):
+    """Address, mechanics and limits of a rate table."""
+
+    driver: str = "arrick-c4"
+    steps_per_turn: int = Field(default=1600, gt=0)  #: half steps of the table, after the reduction
+    max_rate_dps: float = Field(gt=0)
+    acceleration_dps2: float = Field(gt=0)
+
+
+class ChamberSettings(DeviceSettings):
+    """Address and limits of a chamber controller."""
+
     min_c: float = -70.0
     max_c: float = 150.0
     safe_c: float = 25.0
     ramp_c_per_min: float = Field(default=1.67, gt=0)
-    word_order: Literal["little", "big"] = "little"  #: of 32-bit floats (watlow-f4t): low word first by default
-    write_function: Literal[6, 16] = 6  #: tried first (watlow-f4); the other one follows an "illegal function"
-    alarm_inputs: tuple[Literal[1, 2, 3, 4], ...] = ()  #: digital inputs that carry alarms, if wired (watlow-f4)
-    enable_event: int | None = Field(default=None, ge=1, le=8)  #: event output that switches the chamber, if wired
 
     @model_validator(mode="after")
     def _in_order(self) -> ChamberSettings:
@@ -76,14 +70,10 @@ class ChamberSettings(Strict):
         return self
 
 
-class GyroSettings(Strict):
+class GyroSettings(DeviceSettings):
     """One unit on the bench: address, identity and limits of exposure."""
 
     name: str
-    driver: str
-    port: str | None = None  #: serial devices
-    host: str | None = None  #: Modbus TCP devices
-    tcp_port: int = 502
     serial: str = Field(pattern=SERIAL)
     model: str = ""
     technology: Literal["fog", "mems", "piezo", ""] = ""
@@ -92,8 +82,19 @@ class GyroSettings(Strict):
     min_c: float = -40.0
     max_c: float = 85.0
     sample_rate_hz: float | None = None
-    options: dict[str, Any] = Field(default_factory=dict)  #: the driver's own settings, checked by the driver
     datasheet: dict[str, float] = Field(default_factory=dict)
+
+
+SettingsT = TypeVar("SettingsT", bound=BaseModel)
+
+
+def part_of(section: DeviceSettings, model: type[SettingsT]) -> SettingsT:
+    """Return the keys of a section that a model has, as that model; raises pydantic.ValidationError.
+
+    A simulated instrument reads its own settings so: the section may be of another driver for the same wire.
+    """
+    given = section.model_dump(exclude_unset=True)
+    return model.model_validate({name: given[name] for name in model.model_fields if name in given})
 
 
 class SimulationSettings(Strict):
@@ -112,15 +113,26 @@ class SimulationSettings(Strict):
     )  #: clock seconds per wall second of that process; `labctl simulator` writes both
 
 
+class DriverRelease(Strict):
+    """Where a driver came from."""
+
+    driver: str
+    distribution: str
+    version: str
+
+
 class BenchFile(Strict):
     """A whole bench."""
 
     name: str
     latitude_deg: float | None = Field(default=None, ge=-90, le=90)
-    table: TableSettings
-    chamber: ChamberSettings
-    gyros: tuple[GyroSettings, ...] = Field(min_length=1)
+    table: SerializeAsAny[TableSettings]
+    chamber: SerializeAsAny[ChamberSettings]
+    gyros: tuple[SerializeAsAny[GyroSettings], ...] = Field(min_length=1)
     simulation: SimulationSettings | None = None
+    #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
+    #: here is not used.
+    drivers: dict[str, DriverRelease] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _every_unit_is_one(self) -> BenchFile:
@@ -134,12 +146,12 @@ class BenchFile(Strict):
     @property
     def is_simulated(self) -> bool:
         """Whether every instrument is reached by sim://."""
-        return all(is_simulated_address(link) for link in self._links())
+        return all(is_simulated_address(link) for link in self.links)
 
     @property
     def has_simulated(self) -> bool:
         """Whether any instrument is reached by sim://."""
-        return any(is_simulated_address(link) for link in self._links())
+        return any(is_simulated_address(link) for link in self.links)
 
     @property
     def needs_person(self) -> bool:
@@ -147,9 +159,11 @@ class BenchFile(Strict):
         remote = self.simulation is not None and self.simulation.control is not None
         return not self.has_simulated and not remote
 
-    def _links(self) -> list[str]:
-        links = [self.table.port, self.chamber.port, self.chamber.host, *(g.port or g.host for g in self.gyros)]
-        return [link for link in links if link is not None]
+    @property
+    def links(self) -> list[str]:
+        """Every port and host."""
+        devices = (self.table, self.chamber, *self.gyros)
+        return [link for device in devices for link in (device.port, device.host) if link is not None]
 
 
 def shipped_benches() -> dict[str, Path]:

@@ -6,7 +6,8 @@ InstrumentError
 │   └── MalformedReply   a reply that does not fit the protocol
 ├── RequestRejected      the instrument rejected the request
 ├── LimitError           the request lies outside a limit; nothing was sent
-└── WrongInstrument      the instrument is not the one in the bench file
+├── WrongInstrument      the instrument is not the one in the bench file
+└── WrongSimulation      the simulation that the bench file asks for is not known
 """
 
 from __future__ import annotations
@@ -55,3 +56,7 @@ class LimitError(InstrumentError):
 
 class WrongInstrument(InstrumentError):
     """The instrument that replies is not the one in the bench file."""
+
+
+class WrongSimulation(InstrumentError, ValueError):
+    """The simulation of a bench file has an unknown profile, setting or hidden effect; nothing was opened."""

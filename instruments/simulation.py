@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from instruments.interfaces.unit_handler import UnitHandler
+from instruments.plugins import PluginGroup
 from instruments.transport.factory import LinkFactory
 
 if TYPE_CHECKING:
@@ -73,6 +74,14 @@ def serve_simulation(
     from instruments.simulators.server import serve
 
     serve(bench, clock, out, ready, log)
+
+
+def simulation_plugins() -> tuple[PluginGroup[Any], ...]:
+    """Return the groups of simulated instruments and of hidden effects."""
+    from instruments.simulators.hidden.catalogue import FAMILIES
+    from instruments.simulators.registry import SIMULATORS
+
+    return SIMULATORS, FAMILIES
 
 
 def hidden_defaults() -> dict[str, float]:

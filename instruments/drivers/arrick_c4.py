@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from instruments.bench_config import TableSettings
 from instruments.clock import Clock, sleep_until
 from instruments.drivers.arrick_c4_link import LATE_LETTERS, C4Link
+from instruments.drivers.driver import TableDriver
 from instruments.errors import LimitError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.table import Spin, TableLimits
 from instruments.protocols import arrick_c4_lines as lines
 from instruments.protocols.arrick_c4_moves import SPARE_S, Move, plan_move
+from instruments.protocols.arrick_c4_settings import ArrickC4Settings
 from instruments.transport.factory import Ports
 
 HOME_S = 120.0
@@ -42,7 +43,7 @@ class ActiveMove:
 class ArrickC4:
     """Driver of an Arrick table. The angle is counted in steps since home."""
 
-    def __init__(self, settings: TableSettings, ports: Ports, clock: Clock) -> None:
+    def __init__(self, settings: ArrickC4Settings, ports: Ports, clock: Clock) -> None:
         self.name = "table"
         self.settings = settings
         self._step_deg = 360.0 / settings.steps_per_turn
@@ -201,3 +202,6 @@ class ArrickC4:
         """Drop replies to a command that was given up, or of an earlier process; not while the `o` of a move is due."""
         if self._active is None:
             self._link.discard_input()
+
+
+DRIVER = TableDriver(ArrickC4Settings, ArrickC4)

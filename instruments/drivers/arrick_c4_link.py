@@ -7,10 +7,10 @@ from typing import NoReturn
 
 import serial
 
-from instruments.bench_config import TableSettings
 from instruments.clock import Clock
 from instruments.errors import LinkError, NoReply, RequestRejected
 from instruments.protocols import arrick_c4_lines as lines
+from instruments.protocols.arrick_c4_settings import ArrickC4Settings
 from instruments.transport.factory import Ports
 from instruments.transport.serial import BROKEN
 
@@ -24,7 +24,7 @@ class C4Link:
     """The port of one controller, opened at first use; `opened` is called each time, for what has to be sent again."""
 
     def __init__(
-        self, device: str, settings: TableSettings, ports: Ports, clock: Clock, opened: Callable[[], None]
+        self, device: str, settings: ArrickC4Settings, ports: Ports, clock: Clock, opened: Callable[[], None]
     ) -> None:
         self._device, self._settings = device, settings
         self._ports, self._clock = ports, clock

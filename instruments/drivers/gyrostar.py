@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from instruments.bench_config import GyroSettings
 from instruments.clock import Clock, sleep_until
+from instruments.drivers.driver import GyroDriver
 from instruments.errors import LinkError, WrongInstrument
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.protocols.adam6017 import (
@@ -19,6 +19,7 @@ from instruments.protocols.adam6017 import (
     RAIL_LOW,
     RANGE_CODE,
     RANGES_V,
+    GyrostarSettings,
     WiringOptions,
 )
 from instruments.protocols.modbus_registers import Register
@@ -48,10 +49,10 @@ def make_channels(axis: str, options: WiringOptions) -> tuple[Channel, ...]:
 class Gyrostar:
     """Driver of a Gyrostar, polled on the clock. The time of a reading is the instant of its request."""
 
-    def __init__(self, settings: GyroSettings, ports: Ports, clock: Clock) -> None:
+    def __init__(self, settings: GyrostarSettings, ports: Ports, clock: Clock) -> None:
         self.name = settings.name
         self.settings = settings
-        self.options = WiringOptions.model_validate(settings.options)
+        self.options = settings.options
         self.axes: tuple[str, ...] = settings.axes
         self.channels = make_channels(self.axes[0], self.options)
         self.sample_rate_hz = settings.sample_rate_hz or SAMPLE_RATE_HZ
@@ -154,3 +155,6 @@ class Gyrostar:
         raw = {channel.name: codes[:, i] for i, channel in enumerate(self.channels)}
         valid = np.all((codes > RAIL_LOW) & (codes <= RAIL_HIGH), axis=1)
         return Readings(np.asarray(times, dtype=np.float64), raw, valid, lost)
+
+
+DRIVER = GyroDriver(GyrostarSettings, Gyrostar)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from instruments.bench_config import GyroSettings
 from instruments.clock import Clock
+from instruments.drivers.driver import GyroDriver
 from instruments.errors import LimitError, NoReply
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.protocols.kvh_lines import (
@@ -17,9 +18,9 @@ from instruments.protocols.kvh_lines import (
     DSP3000,
     MAX_LINE_BYTES,
     RD2100,
+    KvhSettings,
     Line,
     LineFormat,
-    LineOptions,
     parse_line,
 )
 from instruments.transport.factory import Ports
@@ -48,11 +49,11 @@ KVH_RD2100 = Model("KVH E-Core RD2100", RD2100, has_temperature=True)
 class KvhGyro:
     """Driver of a gyro that sends lines. Raw rates are whole microdegrees per second: the digits of the line."""
 
-    def __init__(self, settings: GyroSettings, ports: Ports, clock: Clock, *, model: Model) -> None:
+    def __init__(self, settings: KvhSettings, ports: Ports, clock: Clock, *, model: Model) -> None:
         self.name = settings.name
         self.settings = settings
         self._model = model
-        options = LineOptions.model_validate(settings.options)
+        options = settings.options
         line = model.format
         self._baudrate = options.baudrate or line.baudrate
         self._sign = options.sign or line.sign
@@ -173,3 +174,7 @@ class KvhGyro:
 
     def _counts(self, line: Line) -> list[int]:
         return [line.rate, line.temperature or 0] if self._model.has_temperature else [line.rate]
+
+
+DSP3000_DRIVER = GyroDriver(KvhSettings, partial(KvhGyro, model=KVH_DSP3000))
+RD2100_DRIVER = GyroDriver(KvhSettings, partial(KvhGyro, model=KVH_RD2100))

@@ -1,25 +1,34 @@
-"""Every driver by the name that a bench file gives it: register a new one here."""
+"""Every installed driver by the name that a bench file gives it: the entry points of the group `labctl.drivers`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from typing import Any
 
-from instruments.drivers.arrick_c4 import ArrickC4
-from instruments.drivers.gyrostar import Gyrostar
-from instruments.drivers.kvh import KVH_DSP3000, KVH_RD2100, KvhGyro
-from instruments.drivers.stim300 import Stim300
-from instruments.drivers.watlow_f4 import WatlowF4
-from instruments.drivers.watlow_f4t import WatlowF4T
-from instruments.interfaces.chamber import Chamber
-from instruments.interfaces.gyro import Gyro
-from instruments.interfaces.table import RateTable
+from instruments.bench_config import ChamberSettings, DeviceSettings, GyroSettings, TableSettings
+from instruments.drivers.driver import ChamberDriver, GyroDriver, TableDriver
+from instruments.plugins import PluginGroup
 
-TABLES: dict[str, Callable[..., RateTable]] = {"arrick-c4": ArrickC4}
-CHAMBERS: dict[str, Callable[..., Chamber]] = {"watlow-f4": WatlowF4, "watlow-f4t": WatlowF4T}
-GYROS: dict[str, Callable[..., Gyro]] = {
-    "kvh-dsp3000": partial(KvhGyro, model=KVH_DSP3000),
-    "kvh-rd2100": partial(KvhGyro, model=KVH_RD2100),
-    "stim300": Stim300,
-    "gyrostar": Gyrostar,
+Driver = TableDriver[Any] | ChamberDriver[Any] | GyroDriver[Any]
+#: Kind of driver -> what it drives, and the model that its settings extend.
+KINDS: dict[type[Driver], tuple[str, type[DeviceSettings]]] = {
+    TableDriver: ("table", TableSettings),
+    ChamberDriver: ("chamber", ChamberSettings),
+    GyroDriver: ("gyro", GyroSettings),
 }
+
+
+def _checked(found: Any) -> Driver:
+    if not isinstance(found, TableDriver | ChamberDriver | GyroDriver):
+        raise TypeError(f"{found!r} is no TableDriver, ChamberDriver or GyroDriver of instruments.drivers.driver")
+    _, base = KINDS[type(found)]
+    if not (isinstance(found.settings, type) and issubclass(found.settings, base)):
+        raise TypeError(f"its settings {found.settings!r} do not extend instruments.bench_config.{base.__name__}")
+    return found
+
+
+DRIVERS: PluginGroup[Driver] = PluginGroup("labctl.drivers", "driver", _checked)
+
+
+def names_of(kind: type[Driver]) -> list[str]:
+    """Return the names of the drivers of one kind; all are imported."""
+    return [name for name, driver in DRIVERS.all().items() if isinstance(driver, kind)]

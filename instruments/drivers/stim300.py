@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.bench_config import GyroSettings
 from instruments.clock import Clock
+from instruments.drivers.driver import GyroDriver
 from instruments.errors import NoReply
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.protocols.stim300_frames import (
@@ -16,7 +16,7 @@ from instruments.protocols.stim300_frames import (
     RATE_PER_LSB,
     SATURATION_DPS,
     TEMPERATURE_PER_LSB,
-    DatagramOptions,
+    Stim300Settings,
     int16,
     int24,
     layout_of,
@@ -37,10 +37,10 @@ DEFAULT_RATE_HZ = 125.0
 class Stim300:
     """Driver of a STIM300 in normal mode."""
 
-    def __init__(self, settings: GyroSettings, ports: Ports, clock: Clock) -> None:
+    def __init__(self, settings: Stim300Settings, ports: Ports, clock: Clock) -> None:
         self.name = settings.name
         self.settings = settings
-        self.options = DatagramOptions.model_validate(settings.options)
+        self.options = settings.options
         self.layout = layout_of(self.options)
         self.axes: tuple[str, ...] = tuple(settings.axes)
         self.sample_rate_hz = settings.sample_rate_hz or DEFAULT_RATE_HZ
@@ -157,3 +157,6 @@ class Stim300:
             self._time = StreamTime(1.0 / self.sample_rate_hz, self._clock.now_s())
         times, uncounted = self._time.times(advance, self._clock.now_s(), wrap)
         return times, int(advance.sum() - len(advance)) + uncounted
+
+
+DRIVER = GyroDriver(Stim300Settings, Stim300)

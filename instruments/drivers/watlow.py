@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from instruments.bench_config import ChamberSettings
 from instruments.clock import Clock
 from instruments.errors import LimitError, RequestRejected, WrongInstrument
 from instruments.interfaces.chamber import ChamberLimits, ChamberState
+from instruments.protocols.watlow_settings import WatlowSettings
 from instruments.transport.modbus import Registers
 
 REPLY_S = 1.0
@@ -25,7 +25,7 @@ class Watlow(ABC):
 
     name = "chamber"
 
-    def __init__(self, settings: ChamberSettings, registers: Registers, clock: Clock) -> None:
+    def __init__(self, settings: WatlowSettings, registers: Registers, clock: Clock) -> None:
         self.settings = settings
         self.safe_c = settings.safe_c
         self._registers, self._clock = registers, clock

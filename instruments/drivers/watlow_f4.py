@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from instruments.bench_config import ChamberSettings
 from instruments.clock import Clock
+from instruments.drivers.driver import ChamberDriver
 from instruments.drivers.watlow import REPLY_S, Watlow
 from instruments.errors import RequestRejected
 from instruments.protocols import watlow_f4_registers as f4
 from instruments.protocols.modbus_registers import Register
+from instruments.protocols.watlow_settings import WatlowSettings
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Registers
 from instruments.transport.modbus_link import Client
@@ -16,7 +17,7 @@ from instruments.transport.modbus_link import Client
 class WatlowF4(Watlow):
     """Driver of a chamber on a Watlow F4."""
 
-    def __init__(self, settings: ChamberSettings, ports: Ports, clock: Clock) -> None:
+    def __init__(self, settings: WatlowSettings, ports: Ports, clock: Clock) -> None:
         def link() -> Client:
             return ports.modbus_rtu(
                 settings.port or "", device=self.name, baudrate=settings.baudrate, timeout_s=REPLY_S
@@ -94,3 +95,6 @@ class WatlowF4(Watlow):
     def _is_active(self, number: int) -> bool:
         state = self._registers.get_int(f4.INPUT_STATE.nth(number, f4.INPUT_STRIDE))
         return state == self._registers.get_int(f4.INPUT_ACTIVE.nth(number, f4.INPUT_SETUP_STRIDE))
+
+
+DRIVER = ChamberDriver(WatlowSettings, WatlowF4)

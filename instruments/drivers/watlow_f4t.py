@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 
-from instruments.bench_config import ChamberSettings
 from instruments.clock import Clock
+from instruments.drivers.driver import ChamberDriver
 from instruments.drivers.watlow import REPLY_S, Watlow
 from instruments.errors import RequestRejected
 from instruments.protocols import watlow_f4t_registers as f4t
 from instruments.protocols.modbus_codes import ILLEGAL_ADDRESS
+from instruments.protocols.watlow_settings import WatlowSettings
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Registers
 from instruments.transport.modbus_link import Client, RefusedRegister
@@ -21,7 +22,7 @@ ALARMS_EVERY_S = 30.0
 class WatlowF4T(Watlow):
     """Driver of a chamber on a Watlow F4T."""
 
-    def __init__(self, settings: ChamberSettings, ports: Ports, clock: Clock) -> None:
+    def __init__(self, settings: WatlowSettings, ports: Ports, clock: Clock) -> None:
         def link() -> Client:
             return ports.modbus_tcp(settings.host or "", settings.tcp_port, device=self.name, timeout_s=REPLY_S)
 
@@ -94,3 +95,6 @@ class WatlowF4T(Watlow):
 
     def _is_quiet(self, number: int) -> bool:
         return self._registers.get_int(f4t.ALARM.nth(number, f4t.ALARM_STRIDE)) in f4t.ALARM_QUIET
+
+
+DRIVER = ChamberDriver(WatlowSettings, WatlowF4T)

@@ -10,7 +10,7 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from instruments.bench_config import Strict
+from instruments.bench_config import GyroSettings, Strict
 from instruments.protocols.modbus_registers import Register
 
 SOURCE = "public ADAM-6017 drivers"
@@ -75,3 +75,9 @@ class WiringOptions(Strict):
         if self.thermometer_channel is not None:
             found[self.thermometer_channel] = self.thermometer_range_code
         return found
+
+
+class GyrostarSettings(GyroSettings):
+    """Settings of a Gyrostar on an ADAM-6017, as a bench file gives them."""
+
+    options: WiringOptions = Field(default_factory=WiringOptions)

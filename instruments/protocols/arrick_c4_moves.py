@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from instruments.bench_config import TableSettings
+from instruments.protocols.arrick_c4_settings import StepperSettings
 
 #: Steady time beyond the requested time, s: a gate that starts and ends on step edges always fits.
 SPARE_S = 0.5
@@ -28,7 +28,7 @@ class Move:
         return self.steady_s + 2 * self.ramp_s
 
 
-def plan_move(settings: TableSettings, rate_dps: float, steady_s: float) -> Move:
+def plan_move(settings: StepperSettings, rate_dps: float, steady_s: float) -> Move:
     """Return the move at the nearest achievable rate that stays steady for at least `steady_s` seconds.
 
     `rate_dps` is in deg/s and not 0; its sign is the sign of the steps.

@@ -6,7 +6,9 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from instruments.bench_config import Strict
+from pydantic import Field
+
+from instruments.bench_config import GyroSettings, Strict
 
 #: Raw rates are whole microdegrees per second, raw temperatures whole millidegrees Celsius: the digits of the line.
 DPS_PER_COUNT = 1e-6
@@ -49,6 +51,12 @@ class LineOptions(Strict):
     baudrate: int | None = None
     sign: Literal[1, -1] | None = None
     limit_dps: float | None = None
+
+
+class KvhSettings(GyroSettings):
+    """Settings of a KVH gyro, as a bench file gives them."""
+
+    options: LineOptions = Field(default_factory=LineOptions)
 
 
 def parse_line(text: str, pattern: re.Pattern[str], length: int | None = None) -> Line | None:

@@ -13,8 +13,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from instruments.bench_config import Strict
+from instruments.bench_config import GyroSettings, Strict
 
 Bytes = NDArray[np.uint8]
 POLYNOMIAL = 0x04C11DB7
@@ -36,6 +37,12 @@ class DatagramOptions(Strict):
     datagram: Literal[0x90, 0x94, 0xA7] = 0x94
     crlf: bool = False
     baudrate: int = 460_800
+
+
+class Stim300Settings(GyroSettings):
+    """Settings of a STIM300, as a bench file gives them."""
+
+    options: DatagramOptions = Field(default_factory=DatagramOptions)
 
 
 def crc32_mpeg2(data: bytes, start: int = 0xFFFFFFFF) -> int:

@@ -1,7 +1,8 @@
-"""Exports of a calibration, one module per format; `registry.py` lists them by name."""
+"""Exports of a calibration, one module per format; found by name as entry points."""
 
 from __future__ import annotations
 
-from labctl.exports.registry import FORMATS, Format, export_calibration
+from labctl.exports.format import Format
+from labctl.exports.registry import FORMATS, export_calibration, export_formats
 
-__all__ = ["FORMATS", "Format", "export_calibration"]
+__all__ = ["FORMATS", "Format", "export_calibration", "export_formats"]

@@ -12,6 +12,7 @@ from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
 from labctl.exports.c_sine import sine_body
 from labctl.exports.c_tables import c_table
+from labctl.exports.format import Format
 from labctl.fitting.models.matrix_form import LINEAR as LINEAR_EFFECTS
 from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
@@ -240,3 +241,6 @@ def _linear(name: str, linear: Linear, span_c: tuple[float, float]) -> str:
         k_table=c_table(k),
         b_table=c_table(b),
     )
+
+
+FORMAT = Format("C header", "text/x-c", "h", c_header)

@@ -1,34 +1,32 @@
-"""Every export format by name: register a new one here."""
+"""Every installed export format by name: the entry points of the group `labctl.exports`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from instruments.plugins import PluginError, PluginGroup, failure, instance_of
+from labctl.calibration import read_calibration
+from labctl.errors import BadInput, LabctlError
+from labctl.exports.format import Format
 
-from labctl.calibration import Calibration, read_calibration
-from labctl.errors import BadInput
-from labctl.exports.c_header import c_header
-
-
-@dataclass(frozen=True)
-class Format:
-    """A consumer's format: its title on a page, and the suffix of its files."""
-
-    title: str
-    media_type: str
-    suffix: str
-    write: Callable[[Calibration], bytes]
+FORMATS: PluginGroup[Format] = PluginGroup("labctl.exports", "export format", instance_of(Format))
+#: The calibration file itself.
+FIRST = "json"
 
 
-FORMATS: dict[str, Format] = {
-    "json": Format("JSON", "application/json", "json", Calibration.to_bytes),
-    "c": Format("C header", "text/x-c", "h", c_header),
-}
+def export_formats() -> dict[str, Format]:
+    """Return the formats that can be used by name, the calibration file itself first."""
+    return dict(sorted(FORMATS.all().items(), key=lambda each: each[0] != FIRST))
 
 
 def export_calibration(document: bytes, format_name: str) -> tuple[bytes, str]:
-    """Return a calibration in a format, and its media type; raises BadInput for an unknown format."""
-    if format_name not in FORMATS:
-        raise BadInput(f"format {format_name!r} is not known (there are {', '.join(FORMATS)})")
-    chosen = FORMATS[format_name]
-    return chosen.write(read_calibration(document)), chosen.media_type
+    """Return a calibration in a format, and its media type; raises BadInput for one that cannot be used."""
+    try:
+        chosen = FORMATS.get(format_name)
+    except PluginError as error:
+        raise BadInput(f"format {format_name!r} is not known: {error}") from error
+    calibration = read_calibration(document)
+    try:
+        return chosen.write(calibration), chosen.media_type
+    except LabctlError:
+        raise
+    except Exception as error:
+        raise BadInput(failure(FORMATS.plugin(format_name), "write this calibration", error)) from error

@@ -2,12 +2,15 @@
 
 from labctl.recording.data_set_limits import refuse_too_many_data_sets
 from labctl.recording.files import read_recording, write_recording
+from labctl.recording.importer import Importer, NoOptions
 from labctl.recording.info import OutputUnit, RecordingInfo
 from labctl.recording.points import dataset_starts, to_points
 from labctl.recording.recording import Columns, Recording
 
 __all__ = [
     "Columns",
+    "Importer",
+    "NoOptions",
     "OutputUnit",
     "Recording",
     "RecordingInfo",

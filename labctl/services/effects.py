@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from labctl.errors import BadInput
 from labctl.fitting import describe_effects, describe_presets
-from labctl.fitting.data.channels import Channels, body_rates
-from labctl.fitting.data.temperature_history import TemperatureHistory
-from labctl.fitting.effects import CATALOGUE, Effect, Formula, Reference, Term, checked_formulas, formulas
+from labctl.fitting.effects import CATALOGUE, Effect, Formula, Term, checked_formulas, formulas
+from labctl.fitting.effects.trial import first_column
 from labctl.fitting.models.error_model import is_exported
 
 #: Sizes that are not told as a coefficient: how far the thermometer is off.
@@ -34,21 +31,7 @@ def catalogue() -> dict[str, Any]:
 @cache
 def _units() -> dict[str, str]:
     """Return the unit of each effect's first coefficient, as its columns name it on a few made-up data sets."""
-    position = np.array(["x", "-x", "y", "-y", "z", "-z"])
-    n = len(position)
-    rate = np.array([10.0, -20.0, 40.0, -60.0, 80.0, 100.0])
-    needed = {name for kind in CATALOGUE.values() for name in kind.needs} | {"mounting", "previous_rate_dps"}
-    columns: dict[str, Any] = {name: np.arange(1.0, n + 1) for name in needed}
-    columns |= {"table_rate_dps": rate, "temperature_c": np.linspace(20.0, 45.0, n), "position": position}
-    numbers = tuple(range(1, n + 1))
-    channels = Channels(
-        columns, body_rates(rate, position), TemperatureHistory(counted={"run": numbers, "mounting": numbers})
-    )
-    found = {}
-    for name, kind in CATALOGUE.items():
-        term = Term(name, None, {each.name: each.low for each in kind.parameters})
-        found[name] = kind.columns(channels, "z", term, Reference())[0].unit
-    return found | OTHER_UNITS
+    return {name: first_column(kind).unit for name, kind in CATALOGUE.items()} | OTHER_UNITS
 
 
 def catalogue_with(written: Sequence[Formula]) -> dict[str, Effect]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from labctl.errors import NotCertified
-from labctl.exports import FORMATS
+from labctl.exports import export_formats
 from labctl.services.schemas.units import ExportFormatResponse, UnitResponse
 from labctl.store import Store, Unit
 
@@ -30,5 +30,8 @@ def _answer(store: Store, found: Unit) -> UnitResponse:
         recordings=[row.id for row in store.recordings.of_unit(found.serial)],
         calibrations=store.calibrations.versions(found.serial),
         certified_version=certified,
-        formats=[ExportFormatResponse(id=name, title=each.title, suffix=each.suffix) for name, each in FORMATS.items()],
+        formats=[
+            ExportFormatResponse(id=name, title=each.title, suffix=each.suffix)
+            for name, each in export_formats().items()
+        ],
     )

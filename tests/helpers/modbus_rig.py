@@ -11,6 +11,7 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
 from instruments.drivers.gyrostar import Gyrostar
+from instruments.drivers.resolution import resolve
 from instruments.drivers.watlow_f4 import WatlowF4
 from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.simulators.links.device import SimulatedDevice
@@ -79,8 +80,8 @@ class Rig:
     def __init__(self, bench: str, url: str, chamber: dict[str, Any], options: dict[str, Any]) -> None:
         record = read_bench(bench).model_dump()
         record["chamber"] |= chamber
-        record["gyros"][0]["options"] |= options
-        self.bench = BenchFile.model_validate(record)
+        record["gyros"][0]["options"] = {**record["gyros"][0].get("options", {}), **options}
+        self.bench = resolve(BenchFile.model_validate(record))
         self.clock = VirtualClock()
         simulation = SimulatedBench(self.bench, self.clock)
         self.ports = WatchedPorts(self.clock, SimulatedLinks(simulation.device, self.clock))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
-from instruments.bench import check_settings, open_bench
-from instruments.bench_config import BenchFile, read_bench
+from instruments.bench import checked_settings, open_bench
+from instruments.bench_config import BenchFile, ChamberSettings, DriverRelease, read_bench
 from instruments.clock import VirtualClock
-from instruments.drivers import registry
+from instruments.drivers.driver import ChamberDriver
+from instruments.drivers.registry import DRIVERS
 from instruments.drivers.watlow_f4 import WatlowF4
+from tests.helpers.plugins import register
 
 
 def two_units(**second: Any) -> dict[str, Any]:
@@ -35,37 +38,115 @@ def test_two_units_are_never_taken_for_one(what: str) -> None:
 @pytest.mark.parametrize(
     ("device", "place", "known"),
     [
-        ("table", ("table", "driver"), "'arrick-c4'"),
-        ("chamber", ("chamber", "driver"), "'watlow-f4' or 'watlow-f4t'"),
-        ("gyros", ("gyros", 0, "driver"), "'kvh-dsp3000', 'kvh-rd2100', 'stim300' or 'gyrostar'"),
+        ("table", ("table", "driver"), "arrick-c4"),
+        ("chamber", ("chamber", "driver"), "watlow-f4 (labctl {version}), watlow-f4t"),
+        ("gyros", ("gyros", 0, "driver"), "gyrostar (labctl {version}), kvh-dsp3000"),
     ],
 )
-def test_an_unknown_driver_is_refused_with_its_place_and_the_known_names(
+def test_an_unknown_driver_is_refused_with_its_place_what_is_installed_and_what_to_do(
     device: str, place: tuple[str | int, ...], known: str
 ) -> None:
-    record = read_bench("single-axis-sim").model_dump()
-    (record[device][0] if device == "gyros" else record[device])["driver"] = "watlow-f5"
-    bench = BenchFile.model_validate(record)
-    for refused in (lambda: check_settings(bench), lambda: open_bench(bench, VirtualClock())):
+    bench = with_driver(device, "watlow-f5")
+    for refused in (lambda: checked_settings(bench), lambda: open_bench(bench, VirtualClock())):
         with pytest.raises(ValidationError) as caught:
             refused()
         (error,) = caught.value.errors()
-        assert (error["loc"], error["input"], error["msg"]) == (place, "watlow-f5", f"Input should be {known}")
+        assert (error["loc"], error["input"]) == (place, "watlow-f5")
+        here = known.format(version=DRIVERS.plugin("stim300").version)
+        assert error["msg"].startswith(f"no driver 'watlow-f5' is installed (there are {here} (labctl ")
+        assert "install the package that has it in its group labctl.drivers, or correct the name" in error["msg"]
+        assert ("did you mean 'watlow-f4t'" in error["msg"] or "did you mean 'watlow-f4'" in error["msg"]) is (
+            device == "chamber"
+        )
 
 
-def test_a_driver_of_the_registry_needs_no_other_list(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry.CHAMBERS, "watlow-f5", registry.CHAMBERS["watlow-f4"])
+def with_driver(device: str, name: str, **settings: Any) -> BenchFile:
+    """Return a shipped bench with another driver, and other settings of it."""
     record = read_bench("single-axis-sim").model_dump()
-    record["chamber"]["driver"] = "watlow-f5"
-    bench = BenchFile.model_validate(record)
-    check_settings(bench)
+    (record[device][0] if device == "gyros" else record[device]).update(driver=name, **settings)
+    return BenchFile.model_validate(record)
+
+
+def test_a_driver_of_another_kind_of_instrument_is_refused() -> None:
+    with pytest.raises(
+        ValidationError, match=r"driver 'stim300' is of a gyro, not of a chamber \(there are watlow-f4, "
+    ):
+        checked_settings(with_driver("chamber", "stim300"))
+
+
+def test_a_driver_that_is_registered_needs_no_other_list(monkeypatch: pytest.MonkeyPatch) -> None:
+    register(monkeypatch, DRIVERS, "watlow-f5", DRIVERS.get("watlow-f4"))
+    bench = with_driver("chamber", "watlow-f5")
+    resolved = checked_settings(bench)
+    assert resolved.drivers["chamber"] == DriverRelease(driver="watlow-f5", distribution="acme-plugins", version="0.3")
+    assert resolved.drivers["fog"].distribution == "labctl"
+    assert checked_settings(resolved) == resolved, "a resolved bench resolves to itself"
     opened = open_bench(bench, VirtualClock())
     assert isinstance(opened.chamber, WatlowF4)
     opened.close()
 
 
+#: What every chamber has.
+KNOWN = "driver, port, host, tcp_port, min_c, max_c, safe_c, ramp_c_per_min"
+
+
+class HeaterSettings(ChamberSettings):
+    """A chamber with a setting of its own, and another default than usual."""
+
+    ramp_c_per_min: float = 3.0
+    channel: int = Field(ge=1, le=4)
+
+
+def heater(settings: HeaterSettings, ports: object, clock: object) -> Any:
+    """Return no driver: only the settings are looked at."""
+    return settings
+
+
+def heated(monkeypatch: pytest.MonkeyPatch, **settings: Any) -> BenchFile:
+    """Return a bench with such a chamber."""
+    register(monkeypatch, DRIVERS, "acme-heater", ChamberDriver(HeaterSettings, heater))
+    record = read_bench("single-axis-sim").model_dump()
+    record["chamber"] = {"driver": "acme-heater", "port": "sim://watlow-f4", **settings}
+    return BenchFile.model_validate(record)
+
+
+def test_settings_are_those_of_the_drivers_own_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    chamber = checked_settings(heated(monkeypatch, channel=2)).chamber
+    assert isinstance(chamber, HeaterSettings)
+    assert (chamber.channel, chamber.ramp_c_per_min, chamber.safe_c) == (2, 3.0, 25.0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "place", "text"),
+    [
+        ({}, ("chamber", "channel"), "Field required"),
+        ({"channel": 9}, ("chamber", "channel"), "Input should be less than or equal to 4"),
+        (
+            {"channel": 1, "chanel": 2},
+            ("chamber", "chanel"),
+            f"driver acme-heater has no such setting (there are {KNOWN}, channel)",
+        ),
+    ],
+)
+def test_a_wrong_setting_is_refused_with_its_place(
+    monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any], place: tuple[str, ...], text: str
+) -> None:
+    with pytest.raises(ValidationError) as caught:
+        checked_settings(heated(monkeypatch, **settings))
+    (error,) = caught.value.errors()
+    assert (error["loc"], error["msg"]) == (place, text)
+
+
+def test_a_stored_bench_keeps_every_setting_and_release() -> None:
+    resolved = checked_settings(read_bench("single-axis-sim"))
+    record = json.loads(json.dumps(resolved.model_dump(mode="json")))
+    assert record["table"]["step_clock_hz"] == 2e6, "a default of the driver's own"
+    assert record["drivers"]["table"]["driver"] == "arrick-c4"
+    assert checked_settings(BenchFile.model_validate(record)) == resolved
+
+
 def test_a_simulated_gyro_whose_driver_has_no_profile_is_told_to_name_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry.GYROS, "kvh-new", registry.GYROS["kvh-rd2100"])
+    register(monkeypatch, DRIVERS, "kvh-new", DRIVERS.get("kvh-rd2100"))
     record = read_bench("single-axis-sim").model_dump()
     (gyro,) = record["gyros"]
     gyro |= {"driver": "kvh-new", "sample_rate_hz": None}

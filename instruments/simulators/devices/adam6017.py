@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from instruments.bench_config import part_of
 from instruments.protocols.adam6017 import (
     CHANNELS,
     FULL_CODE,
@@ -14,7 +15,7 @@ from instruments.protocols.adam6017 import (
     MODULE_NAME,
     RANGE_CODE,
     RANGES_V,
-    WiringOptions,
+    GyrostarSettings,
 )
 from instruments.simulators.links.modbus_device import ModbusDevice, int16, items
 from instruments.simulators.setup import InstrumentSetup
@@ -33,7 +34,7 @@ class SimulatedAdam6017(ModbusDevice):
     """The world's Gyrostar as codes of the module's inputs; unused inputs read mid-scale."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
-        self._wiring = WiringOptions.model_validate(setup.gyro.options)
+        self._wiring = part_of(setup.gyro, GyrostarSettings).options
         self._unit = setup.unit
         self._sampled_s = float("-inf")
         self.module_name = MODULE_6017

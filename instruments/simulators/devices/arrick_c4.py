@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from instruments.bench_config import part_of
 from instruments.protocols import arrick_c4_lines as lines
+from instruments.protocols.arrick_c4_settings import ArrickC4Settings
 from instruments.simulators.setup import InstrumentSetup
 
 BITS_PER_BYTE = 10
@@ -29,7 +31,7 @@ class SimulatedC4:
     """A C4 controller with one motor, on the world's table."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
-        table = setup.bench.table
+        table = part_of(setup.bench.table, ArrickC4Settings)
         self._world, self._faults = setup.world, setup.faults
         self._byte_s = BITS_PER_BYTE / table.baudrate
         self._clock_hz = table.step_clock_hz

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from instruments.bench_config import part_of
 from instruments.protocols.stim300_frames import (
     AXES,
     COUNTS_PER_S,
@@ -12,7 +13,7 @@ from instruments.protocols.stim300_frames import (
     SATURATION_DPS,
     TEMPERATURE_PER_LSB,
     Bytes,
-    DatagramOptions,
+    Stim300Settings,
     layout_of,
 )
 from instruments.simulators.setup import InstrumentSetup
@@ -24,7 +25,7 @@ class SimulatedStim300:
     """Encodes the world's unit; frames that do not fit into the port's buffer are lost."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
-        self._layout = layout_of(DatagramOptions.model_validate(setup.gyro.options))
+        self._layout = layout_of(part_of(setup.gyro, Stim300Settings).options)
         self._unit, self._faults = setup.unit, setup.faults
         self._columns = [AXES.index(axis) for axis in setup.gyro.axes]
         self._rate_hz = self._unit.sample_rate_hz

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from instruments.bench_config import part_of
 from instruments.protocols import watlow_f4_registers as f4
+from instruments.protocols.watlow_settings import WatlowSettings
 from instruments.simulators.links.modbus_device import Cell, ModbusDevice, constant, int16, items
 from instruments.simulators.setup import InstrumentSetup
 
@@ -15,7 +17,7 @@ class SimulatedF4(ModbusDevice):
     """Signed counts with implied decimals; the settings of its front panel are attributes."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
-        chamber = setup.bench.chamber
+        chamber = part_of(setup.bench.chamber, WatlowSettings)
         self._world = setup.world
         self.model = f4.MODEL_F4
         self.decimals = 1

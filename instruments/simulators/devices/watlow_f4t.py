@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from instruments.bench_config import part_of
 from instruments.protocols import watlow_f4t_registers as f4t
+from instruments.protocols.watlow_settings import WatlowSettings
 from instruments.simulators.links.modbus_device import Cell, ModbusDevice, constant, float32, int16, items
 from instruments.simulators.setup import InstrumentSetup
 
@@ -16,7 +18,7 @@ class SimulatedF4T(ModbusDevice):
     """Low word first unless the bench file says otherwise; the settings of its front panel are attributes."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
-        chamber = setup.bench.chamber
+        chamber = part_of(setup.bench.chamber, WatlowSettings)
         self._world = setup.world
         self._order = chamber.word_order
         self.part_number = [ord(letter) for letter in PART_NUMBER]

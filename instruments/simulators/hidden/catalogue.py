@@ -1,7 +1,16 @@
-"""Effects that can be hidden in a simulated unit, each under its catalogue id: list a new one in `KINDS`."""
+"""Effects that can be hidden in a simulated unit, each under its catalogue id.
+
+They are the entry points of the group `labctl.hidden_effects`: a class, or several in a row. labctl's own stand in
+`KINDS`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any
+
+from instruments.plugins import PluginGroup
 from instruments.simulators.hidden import (
     acceleration,
     alignment,
@@ -58,7 +67,41 @@ KINDS: tuple[type[HiddenEffect], ...] = (
     environment.OutsideHumidity,
 )
 
-EFFECTS: dict[str, type[HiddenEffect]] = {kind.id: kind for kind in KINDS}
+
+def _checked(found: Any) -> tuple[type[HiddenEffect], ...]:
+    kinds = (found,) if isinstance(found, type) else tuple(found)
+    for kind in kinds:
+        if not (isinstance(kind, type) and issubclass(kind, HiddenEffect)):
+            raise TypeError(f"{kind!r} is no subclass of instruments.simulators.hidden.HiddenEffect")
+        if missing := [name for name in ("id", "unit", "default") if not hasattr(kind, name)]:
+            raise TypeError(f"{kind.__name__} has no {', '.join(missing)}")
+    return kinds
+
+
+FAMILIES: PluginGroup[tuple[type[HiddenEffect], ...]] = PluginGroup(
+    "labctl.hidden_effects", "family of hidden effects", _checked
+)
+
+
+class HiddenCatalogue(Mapping[str, type[HiddenEffect]]):
+    """Installed hidden effects by id, labctl's own first; they are imported at first use."""
+
+    def __getitem__(self, effect_id: str) -> type[HiddenEffect]:
+        return _by_id()[effect_id]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_by_id())
+
+    def __len__(self) -> int:
+        return len(_by_id())
+
+
+@cache
+def _by_id() -> dict[str, type[HiddenEffect]]:
+    return FAMILIES.merged(lambda kinds: ((kind.id, kind) for kind in kinds), "hidden effect")
+
+
+EFFECTS: Mapping[str, type[HiddenEffect]] = HiddenCatalogue()
 
 
 def hidden_effects(sizes: dict[str, float | str], seed: list[int]) -> list[HiddenEffect]:

@@ -30,7 +30,7 @@ def check(
         for device in checks:
             mark = "[green]answers[/]" if device.ok else "[red]failed[/] "
             console.print(f"{mark}  {device.device:14} ", end="")
-            console.print(device.text, markup=False)
+            console.print(f"{device.text}  [{device.driver} of {device.distribution} {device.version}]", markup=False)
     if not all(c.ok for c in checks):
         raise typer.Exit(1)
 

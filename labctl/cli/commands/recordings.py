@@ -15,16 +15,30 @@ export_app = typer.Typer(no_args_is_help=True, help="Write what the database hol
 
 
 def import_(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with recording.toml and its data file.")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PATH", help="Folder with recording.toml and its data file, or a file that an importer knows."
+        ),
+    ],
+    importer: Annotated[
+        str | None,
+        typer.Option("--format", metavar="NAME", help="Importer; default: the one that is surest of the file."),
+    ] = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; as often as there are some."),
+    ] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Take in a recording made on any bench, in the interchange format."""
+    """Take in a recording made on any bench: in the interchange format, or in one that an installed importer knows."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import IMPORT_RECORDING
     from labctl.services.commands.requests import RecordingFolder
+    from labctl.services.recordings.importers import as_interchange
 
-    with one_clear_line():
+    with one_clear_line(), as_interchange(path, importer, option or []) as folder:
         answer = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
     if as_json:
         print_json(answer)

@@ -1,12 +1,16 @@
-"""The catalogue of effects, by id; a family registers its effects in its own EFFECTS."""
+"""The catalogue of effects, by id: the entry points of the group `labctl.effects`, labctl's own first.
+
+An entry point is one class of effect, or several in a row; labctl's own stand in `EFFECTS`.
+"""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
-from types import MappingProxyType
+from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Any
 
+from instruments.plugins import PluginGroup
 from labctl.errors import BadInput
 from labctl.fitting.effects import (
     acceleration,
@@ -21,9 +25,10 @@ from labctl.fitting.effects import (
     thermal,
 )
 from labctl.fitting.effects.base import Effect, Term
-from labctl.fitting.effects.formula import Formula
+from labctl.fitting.effects.formula import NAME, Formula
+from labctl.fitting.effects.trial import refuse_useless
 
-FAMILIES = (
+_OWN = (
     bias,
     scale_factor,
     surface,
@@ -35,8 +40,55 @@ FAMILIES = (
     history,
     environment,
 )
+#: labctl's own entry point: a family lists its effects in its EFFECTS.
+EFFECTS: tuple[type[Effect], ...] = tuple(kind for family in _OWN for kind in family.EFFECTS)
+Kinds = tuple[Effect, ...]
 
-CATALOGUE: Mapping[str, Effect] = MappingProxyType({kind.id: kind() for family in FAMILIES for kind in family.EFFECTS})
+
+def _checked(found: Any) -> Kinds:
+    kinds = (found,) if isinstance(found, type) else tuple(found)
+    made = []
+    for kind in kinds:
+        if not (isinstance(kind, type) and issubclass(kind, Effect)):
+            raise TypeError(f"{kind!r} is no subclass of labctl.fitting.effects.Effect")
+        effect = kind()
+        if not NAME.fullmatch(effect.id):
+            raise ValueError(f"effect id {effect.id!r}: small letters, digits and _ only, beginning with a letter")
+        refuse_useless(effect)
+        made.append(effect)
+    return tuple(made)
+
+
+FAMILIES: PluginGroup[Kinds] = PluginGroup("labctl.effects", "family of effects", _checked)
+
+
+class Catalogue(Mapping[str, Effect]):
+    """Installed effects by id. labctl's own are imported at first use, those of others when one is asked for."""
+
+    def __getitem__(self, effect_id: str) -> Effect:
+        found = _own().get(effect_id)
+        return _all()[effect_id] if found is None else found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_all())
+
+    def __len__(self) -> int:
+        return len(_all())
+
+
+@cache
+def _own() -> dict[str, Effect]:
+    """Return labctl's own effects."""
+    families = [FAMILIES.get(name) for name in FAMILIES.names if FAMILIES.plugin(name).is_own]
+    return {each.id: each for kinds in families for each in kinds}
+
+
+@cache
+def _all() -> dict[str, Effect]:
+    return FAMILIES.merged(lambda kinds: ((each.id, each) for each in kinds), "effect")
+
+
+CATALOGUE: Mapping[str, Effect] = Catalogue()
 
 
 def effect(effect_id: str) -> Effect:
@@ -44,7 +96,11 @@ def effect(effect_id: str) -> Effect:
     if effect_id in CATALOGUE:
         return CATALOGUE[effect_id]
     near = difflib.get_close_matches(effect_id, CATALOGUE, n=3, cutoff=0.4)
-    hint = f"did you mean {' or '.join(near)}?" if near else "`labctl effects` lists them"
+    hint = (
+        f"did you mean {' or '.join(near)}?"
+        if near
+        else ("`labctl effects` lists them, and a package may bring it (group labctl.effects)")
+    )
     raise BadInput(f"effect {effect_id!r} is not in the catalogue; {hint}")
 
 

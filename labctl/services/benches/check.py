@@ -19,7 +19,10 @@ def check_bench(source: str) -> list[DeviceCheck]:
     """Talk to every instrument of a bench and say what answered; nothing moves."""
     bench = load_bench(source)
     clock = VirtualClock() if bench.is_simulated else SystemClock()
-    return [DeviceCheck(device=device, ok=ok, text=text) for device, ok, text in check(bench, clock)]
+    return [
+        DeviceCheck(device=device, ok=ok, text=text, **bench.drivers[device].model_dump())
+        for device, ok, text in check(bench, clock)
+    ]
 
 
 def shipped() -> list[dict[str, Any]]:

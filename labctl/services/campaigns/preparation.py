@@ -14,7 +14,7 @@ from labctl.errors import BadInput, Conflict
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.benches.confirmation import describe_bench
 from labctl.services.benches.power_failure import boot_id
-from labctl.services.planning.loading import load_recipe
+from labctl.services.planning.loading import load_recipe, with_drivers
 from labctl.store import NewCampaign, NewUnit, Store
 from labctl.store.sample_codec import load_compressor
 from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator
@@ -108,6 +108,7 @@ def prepare(
     Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe.
     """
     load_libraries()
+    bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
     recipe = load_recipe(recipe_source)
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)

@@ -22,7 +22,7 @@ from labctl.services.campaigns.preparation import (
     operator_of,
     refuse_unconfirmed,
 )
-from labctl.services.planning.loading import load_bench
+from labctl.services.planning.loading import load_bench, with_drivers
 from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
 from labctl.store import CampaignRow, ResumePoint, Store, TakeUp, open_store
 from procedures.execution.resume import Restart
@@ -76,7 +76,7 @@ def prepare_resume(
     row = store.campaigns.get(campaign)
     if row.state == "done":
         raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
-    _refuse_other_units(row, bench_file)
+    bench_file = _same_units(row, bench_file)
     refuse_unconfirmed(store, bench_file.name)
     standing, plan = store.resume_points.of_campaign(campaign), plan_of(store, row)
     clock = make_clock(standing)
@@ -90,7 +90,7 @@ def prepare_resume(
     gap_s = t_s - standing.last_t_s
     added = standing.added_runs + int(new_session)
     power = "the power failed meanwhile" if lost else "the units stayed on"
-    reason = f"taken up by {request.by} after {gap_s:.0f} s unwatched; {power}"
+    reason = f"taken up by {request.by} after {gap_s:.0f} s unwatched; {power}{_other_drivers(row, bench_file)}"
     bench = opened or open_bench(bench_file, clock)
     try:
         store.resume_points.take_up(campaign, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
@@ -111,13 +111,27 @@ def prepare_resume(
     )
 
 
-def _refuse_other_units(row: CampaignRow, bench_file: BenchFile) -> None:
+def _other_drivers(row: CampaignRow, bench_file: BenchFile) -> str:
+    """Say which instruments have another driver, or another release of it, than when the campaign began."""
+    was = BenchFile.model_validate({**row.bench, "simulation": None}).drivers
+    changed = [
+        f"; driver of {device}: {now.driver} of {now.distribution} {now.version} instead of "
+        f"{then.driver} of {then.distribution} {then.version}"
+        for device, now in bench_file.drivers.items()
+        if (then := was.get(device)) is not None and then != now
+    ]
+    return "".join(changed)
+
+
+def _same_units(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
+    """Return the bench with its drivers; raises Conflict where it carries other units, BadBench for a driver."""
     here = {gyro.serial for gyro in bench_file.gyros}
     if set(row.recordings) != here:
         raise Conflict(
             f"campaign {row.id} measures {', '.join(sorted(row.recordings))}, bench {bench_file.name} carries "
             f"{', '.join(sorted(here))}; name the campaign's own bench with --bench"
         )
+    return with_drivers(bench_file)
 
 
 def resume_here(

@@ -46,6 +46,7 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
+        drivers=row.bench.get("drivers", {}),
         simulated_time=has_simulated_time(row.bench),
         advice=advice_of(state, progress.reason),
     )
@@ -92,6 +93,7 @@ def _from_summary(row: CampaignRow, seen: CampaignSummary) -> CampaignResponse:
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
+        drivers=row.bench.get("drivers", {}),
         simulated_time=has_simulated_time(row.bench),
         advice=advice_of(row.state, row.reason),
     )

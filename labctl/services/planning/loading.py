@@ -11,8 +11,9 @@ from zoneinfo import ZoneInfo
 
 from pydantic import ValidationError
 
-from instruments.bench import check_settings
+from instruments.bench import checked_settings
 from instruments.bench_config import BenchFile, read_bench, shipped_benches
+from instruments.drivers.resolution import resolve
 from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
 from instruments.interfaces.table import TableLimits
@@ -63,18 +64,30 @@ def recipe_document(recipe: Recipe) -> dict[str, Any]:
 def load_bench(source: str) -> BenchFile:
     """Return a bench by shipped name or path; raises BadBench naming the file and the key."""
     try:
-        bench = read_bench(source)
-        check_settings(bench)
-        return bench
+        return checked_settings(read_bench(source))
     except FileNotFoundError:
         known = ", ".join(shipped_benches())
         raise BadBench(f"bench {source!r} is neither a file nor a bench that ships with labctl ({known})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
         raise BadBench(f"bench file {source}: not TOML: {error}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
-        raise BadBench(f"bench file {source}: {place}: {first['msg']} (is {shown(first['input'])})") from error
+        raise BadBench(f"bench file {source}: {_first(error)}") from error
+
+
+def with_drivers(bench: BenchFile) -> BenchFile:
+    """Return a bench with its sections by the models of their drivers; raises BadBench naming the key."""
+    try:
+        return resolve(bench)
+    except ValidationError as error:
+        raise BadBench(f"bench {bench.name}: {_first(error)}") from error
+
+
+def _first(error: ValidationError) -> str:
+    """Say the first thing that is wrong: its place, what is wrong, and what is given."""
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
+    given = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"
+    return f"{place}: {first['msg']}{given}"
 
 
 def limits_of(bench: BenchFile) -> BenchLimits:

@@ -115,3 +115,14 @@ class BackupResponse(ResponseModel):
     noted: bool
     remark: str = ""
     findings: list[FindingResponse]
+
+
+class PluginResponse(ResponseModel):
+    """One entry point of an installed distribution."""
+
+    group: str
+    name: str
+    distribution: str
+    version: str
+    target: str = Field(description="module:object")
+    problem: str = Field(default="", description="Why it cannot be used; empty where it can.")

@@ -40,3 +40,6 @@ class DeviceCheck(ResponseModel):
     device: str
     ok: bool
     text: str
+    driver: str = Field(default="", description="Name of its driver.")
+    distribution: str = Field(default="", description="Distribution that the driver came from.")
+    version: str = Field(default="", description="Version of that distribution.")

@@ -129,6 +129,14 @@ class AdviceResponse(ResponseModel):
     next: str = Field(description="What a person does next.")
 
 
+class DriverResponse(ResponseModel):
+    """The driver of an instrument, and the distribution that it came from."""
+
+    driver: str
+    distribution: str
+    version: str
+
+
 class CampaignResponse(ResponseModel):
     """Where a campaign is."""
 
@@ -157,6 +165,9 @@ class CampaignResponse(ResponseModel):
     started_at: datetime | None = None
     ended_at: datetime | None = None
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
+    drivers: dict[str, DriverResponse] = Field(
+        default_factory=dict, description="table, chamber or gyro name -> its driver when the campaign began."
+    )
     unrecorded: str = Field(default="", description="Of a request that was carried out: what could not be written.")
     simulated_time: bool = Field(
         default=False, description="Its times are those of a simulated bench, which may run faster than the wall's."

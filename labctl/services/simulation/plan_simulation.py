@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
+from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings, part_of
 from instruments.clock import VirtualClock
 from instruments.protocols.arrick_c4_moves import plan_move
+from instruments.protocols.arrick_c4_settings import StepperSettings
 from instruments.simulation import open_simulation
 from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo
@@ -86,7 +87,9 @@ class _Walk:
         table, step_deg = self._world.table, self._world.table.step_deg
         achieved, steady_from = 0.0, self._t
         if step.rate_dps:
-            run = plan_move(self._bench.table, step.rate_dps, step.settle_s + step.duration_s + 1.0)
+            run = plan_move(
+                part_of(self._bench.table, StepperSettings), step.rate_dps, step.settle_s + step.duration_s + 1.0
+            )
             achieved = float(np.copysign(run.step_hz * step_deg, step.rate_dps))
             end_s = table.start(self._t, run.steps, run.step_hz, self._bench.table.acceleration_dps2)
             steady_from += run.ramp_s

@@ -92,6 +92,8 @@ class Campaigns:
                 "units": [str(unit.info["serial"]) for unit in new.units],
                 "schedule_hash": new.schedule_hash,
             }
+            if drivers := new.bench.get("drivers"):
+                what["drivers"] = drivers
             if hidden := (new.bench.get("simulation") or {}).get("hidden"):
                 what["hidden"] = hidden
             if new.bench_clear:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from instruments.bench_config import read_bench, shipped_benches
-from instruments.drivers.registry import CHAMBERS, GYROS, TABLES
+from instruments.drivers.driver import ChamberDriver, GyroDriver, TableDriver
+from instruments.drivers.registry import names_of
 from instruments.errors import InstrumentError, LimitError, LinkError
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
@@ -18,7 +19,12 @@ from instruments.interfaces.table import RateTable
 
 Make = Callable[..., Any]
 PROTOCOLS: dict[str, type] = {"table": RateTable, "chamber": Chamber, "gyro": Gyro}
-DRIVERS = [("table", d) for d in TABLES] + [("chamber", d) for d in CHAMBERS] + [("gyro", d) for d in GYROS]
+GYROS = names_of(GyroDriver)
+DRIVERS = [
+    *(("table", name) for name in names_of(TableDriver)),
+    *(("chamber", name) for name in names_of(ChamberDriver)),
+    *(("gyro", name) for name in GYROS),
+]
 PLACES = {
     "arrick-c4": ("single-axis-sim", {}),
     "watlow-f4": ("single-axis-sim", {}),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from instruments.bench_config import TableSettings
 from instruments.protocols import arrick_c4_lines as lines
 from instruments.protocols.arrick_c4_moves import SPARE_S, plan_move
+from instruments.protocols.arrick_c4_settings import StepperSettings
 
 
 def test_commands_as_the_public_part_of_the_protocol_lists_them() -> None:
@@ -23,7 +23,7 @@ def test_a_move_command_is_parsed_back(steps: int) -> None:
 
 @pytest.mark.parametrize("rate_dps", [45.0, -45.0, 7.3])
 def test_a_move_is_steady_for_the_requested_time(rate_dps: float) -> None:
-    settings = TableSettings(port="sim://arrick", max_rate_dps=100.0, acceleration_dps2=90.0)
+    settings = StepperSettings(max_rate_dps=100.0, acceleration_dps2=90.0)
     move = plan_move(settings, rate_dps, 10.0)
     step_deg = 360.0 / settings.steps_per_turn
     assert move.divisor == round(2e6 * step_deg / abs(rate_dps))

@@ -19,6 +19,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES
+from tests.helpers.plugins import register
 
 
 def upload(client: TestClient, folder: Path, **changed: bytes) -> object:
@@ -100,7 +101,7 @@ def test_an_unknown_uncertainty_has_its_reason(client: TestClient) -> None:
 
 
 def test_a_unit_names_every_format_of_the_registry(fog: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(FORMATS, "text", Format("Plain text", "text/plain", "txt", Calibration.to_bytes))
+    register(monkeypatch, FORMATS, "text", Format("Plain text", "text/plain", "txt", Calibration.to_bytes))
     assert fog.get("/api/units/OSU-FOG-2024").json()["formats"] == [
         {"id": "json", "title": "JSON", "suffix": "json"},
         {"id": "c", "title": "C header", "suffix": "h"},

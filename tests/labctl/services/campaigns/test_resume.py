@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import tempfile
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -16,13 +17,14 @@ from instruments.errors import NoReply
 from labctl.cli.app import app
 from labctl.errors import Conflict
 from labctl.services.benches.power_failure import power_failed
+from labctl.services.campaigns import resume
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.resumability import MAX_RESUMES, retries_exhausted
 from labctl.services.campaigns.resume import prepare_resume, resume_here
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import ResumeRequest, StartRequest
-from labctl.store import Store, open_store
+from labctl.store import CampaignRow, Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control
 from studies import crash_recovery, faults
@@ -203,3 +205,16 @@ def test_the_same_seed_gives_the_same_campaign_after_an_interruption(tmp_path: P
 def test_run_here_leaves_an_uninterrupted_campaign_as_it_was(tmp_path: Path) -> None:
     answer = run_here(str(tmp_path / "lab.sqlite"), StartRequest(recipe="short"))
     assert (answer.state, answer.reason, answer.wish, answer.prompt) == ("done", "all steps done", None, None)
+
+
+def test_another_release_of_a_driver_is_said_when_a_campaign_is_taken_up() -> None:
+    bench = load_bench("single-axis-sim")
+    record = bench.model_dump(mode="json")
+    record["drivers"]["fog"] |= {"distribution": "acme-fog", "version": "0.1"}
+    row = cast(CampaignRow, SimpleNamespace(bench=record))
+    now = bench.drivers["fog"]
+    assert resume._other_drivers(row, bench) == (
+        f"; driver of fog: kvh-rd2100 of labctl {now.version} instead of kvh-rd2100 of acme-fog 0.1"
+    )
+    del record["drivers"]
+    assert resume._other_drivers(row, bench) == "", "a campaign of an earlier labctl"

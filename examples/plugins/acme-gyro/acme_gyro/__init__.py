@@ -1,0 +1,1 @@
+"""The Acme G1: protocol, driver and simulator."""

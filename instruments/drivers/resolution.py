@@ -1,0 +1,87 @@
+"""From the names in a bench file to installed drivers: each section checked by its driver's own model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from instruments.bench_config import BenchFile, DeviceSettings, DriverRelease
+from instruments.drivers.driver import ChamberDriver, GyroDriver, TableDriver
+from instruments.drivers.registry import DRIVERS, KINDS, Driver, names_of
+from instruments.plugins import PluginError, UnknownPlugin
+
+Place = tuple[str | int, ...]
+
+
+def resolve(bench: BenchFile) -> BenchFile:
+    """Return a bench whose sections are of their drivers' own models, with the release of each driver.
+
+    Raises pydantic.ValidationError with the place of each driver that is not installed, cannot be loaded or is of
+    another kind, and of each setting that its driver does not take. A plug-in is imported when a section names it.
+    """
+    wrong: list[InitErrorDetails] = []
+    table = _section(bench.table, ("table",), TableDriver, wrong)
+    chamber = _section(bench.chamber, ("chamber",), ChamberDriver, wrong)
+    gyros = [_section(gyro, ("gyros", number), GyroDriver, wrong) for number, gyro in enumerate(bench.gyros)]
+    if wrong:
+        raise ValidationError.from_exception_data(type(bench).__name__, wrong)
+    used = {"table": table, "chamber": chamber, **{gyro.name: gyro for gyro in bench.gyros}}
+    drivers = {device: _release(section.driver) for device, section in used.items()}
+    return bench.model_copy(update={"table": table, "chamber": chamber, "gyros": tuple(gyros), "drivers": drivers})
+
+
+def driver_of(section: DeviceSettings) -> Any:
+    """Return the driver of a resolved section: of the kind of its place."""
+    return DRIVERS.get(section.driver)
+
+
+def _release(name: str) -> DriverRelease:
+    plugin = DRIVERS.plugin(name)
+    return DriverRelease(driver=name, distribution=plugin.distribution, version=plugin.version)
+
+
+def _section(
+    section: DeviceSettings, place: Place, kind: type[Driver], wrong: list[InitErrorDetails]
+) -> DeviceSettings:
+    """Return a section by its driver's model; what is wrong with it is added to `wrong`."""
+    try:
+        driver = _driver(section.driver, kind)
+    except PluginError as error:
+        wrong.append(_detail("driver", str(error), (*place, "driver"), section.driver))
+        return section
+    if type(section) is driver.settings:
+        return section
+    try:
+        found: DeviceSettings = driver.settings.model_validate(section.model_dump(exclude_unset=True))
+    except ValidationError as error:
+        wrong += [_detail(each["type"], each["msg"], (*place, *each["loc"]), each["input"]) for each in error.errors()]
+        return section
+    for name, value in (found.model_extra or {}).items():
+        text = f"driver {section.driver} has no such setting (there are {_settings_of(driver)})"
+        wrong.append(_detail("extra_forbidden", text, (*place, name), value))
+    return found
+
+
+def _driver(name: str, kind: type[Driver]) -> Driver:
+    """Return an installed driver of one kind; raises PluginError saying what is installed and what to do."""
+    what, _ = KINDS[kind]
+    try:
+        found = DRIVERS.get(name)
+    except UnknownPlugin as error:
+        raise UnknownPlugin(DRIVERS.unknown(name, names_of(kind))) from error
+    if not isinstance(found, kind):
+        drives, _ = KINDS[type(found)]
+        known: Sequence[str] = names_of(kind)
+        raise PluginError(f"driver {name!r} is of a {drives}, not of a {what} (there are {', '.join(known) or 'none'})")
+    return found
+
+
+def _settings_of(driver: Driver) -> str:
+    return ", ".join(driver.settings.model_fields)
+
+
+def _detail(kind: str, text: str, place: Place, given: Any) -> InitErrorDetails:
+    return {"type": PydanticCustomError(kind, "{text}", {"text": text}), "loc": place, "input": given}

@@ -1,0 +1,36 @@
+"""An importer as an entry point of the group `labctl.importers` gives it: from somebody's file to a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+from labctl.recording.recording import Recording
+
+
+class NoOptions(BaseModel):
+    """Options of an importer that has none."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+OptionsT = TypeVar("OptionsT", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Importer(Generic[OptionsT]):
+    """Reads one format.
+
+    `probe` says how sure it is, 0 to 1 or a truth value, that a file or folder is of its format; it looks at the
+    beginning only, and at files that are not of its format too. `read` returns the recording, and raises BadRecording
+    naming file, row and what was expected; labctl then checks the recording by the rules of the interchange format.
+    """
+
+    title: str  #: what a message calls the format
+    probe: Callable[[Path], float]
+    read: Callable[[Path, OptionsT], Recording]
+    options: type[OptionsT]  #: a pydantic model; NoOptions for none

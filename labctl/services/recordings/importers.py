@@ -1,0 +1,130 @@
+"""Files of other formats: found by the installed importers, and taken in through the interchange format."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from instruments.plugins import PluginError, PluginGroup, failure, instance_of
+from labctl.errors import BadInput, BadRecording, LabctlError
+from labctl.recording import Recording, write_recording
+from labctl.recording.checks import checked, checked_environment
+from labctl.recording.importer import Importer
+from labctl.services.recordings.staging import staging_folder
+
+IMPORTERS: PluginGroup[Importer[Any]] = PluginGroup("labctl.importers", "importer", instance_of(Importer))
+#: The importer of labctl's own format: what it reads is taken in as it is.
+INTERCHANGE = "labctl-recording"
+
+
+@contextmanager
+def as_interchange(path: Path, name: str | None = None, options: Sequence[str] = ()) -> Iterator[Path]:
+    """Give the folder of a recording in the interchange format: the path itself, or one made of what `path` holds.
+
+    `name` is an importer's; without it the importer that is surest. `options` are KEY=VALUE.
+    Raises BadInput for an importer or option that there is not, BadRecording for what cannot be read.
+    """
+    given = parsed_options(options)
+    chosen = name or surest(path)
+    if chosen == INTERCHANGE and not given:
+        yield path
+        return
+    recording = read_with(chosen, path, given)
+    with staging_folder() as made:
+        folder = made / "recording"
+        write_recording(recording, folder)
+        yield folder
+
+
+def parsed_options(texts: Sequence[str]) -> dict[str, str]:
+    """Return options KEY=VALUE by key; raises BadInput."""
+    found: dict[str, str] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if not equals or not key:
+            raise BadInput(f"--option {text}: write KEY=VALUE")
+        if key in found:
+            raise BadInput(f"--option {text}: {key} is given twice; give it once")
+        found[key] = value
+    return found
+
+
+def surest(path: Path) -> str:
+    """Return the name of the importer that is surest of a path; raises BadInput for two that are equally sure.
+
+    What no importer knows is left to the one of the interchange format where it is a folder, or not there.
+    """
+    sure = {name: _confidence(name, importer, path) for name, importer in IMPORTERS.all().items()}
+    best = max(sure.values(), default=0.0)
+    names = [name for name, confidence in sure.items() if confidence == best]
+    if best <= 0.0:
+        if path.is_file():
+            known = ", ".join(f"{name}: {importer.title}" for name, importer in IMPORTERS.all().items())
+            raise BadRecording(
+                f"{path}: no installed importer knows this file (there are {known}); install the package of one that "
+                "does, or name one with --format"
+            )
+        return INTERCHANGE
+    if len(names) > 1:
+        raise BadInput(f"{path}: {' and '.join(names)} are equally sure that it is theirs; name one with --format")
+    return names[0]
+
+
+def read_with(name: str, path: Path, options: Mapping[str, str]) -> Recording:
+    """Return what an importer reads, checked by the rules of the interchange format; raises BadInput, BadRecording."""
+    try:
+        importer, plugin = IMPORTERS.get(name), IMPORTERS.plugin(name)
+    except PluginError as error:
+        raise BadInput(f"--format {name}: {error}") from error
+    try:
+        given = importer.options.model_validate(dict(options))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        known = ", ".join(importer.options.model_fields) or "none"
+        raise BadInput(f"importer {name}: option {key}: {first['msg']} (there are {known})") from error
+    if not path.exists():
+        raise BadRecording(f"{path}: not found; name the file to import")
+    try:
+        recording = importer.read(path, given)
+        found = instance_of(Recording)(recording)
+    except LabctlError:
+        raise
+    except Exception as error:
+        raise BadRecording(f"{path}: {failure(plugin, 'read it', error)}") from error
+    read_by = f"read from {path.name} by importer {name} of {plugin.release}"
+    return _checked(path, found, read_by)
+
+
+def _confidence(name: str, importer: Importer[Any], path: Path) -> float:
+    try:
+        return float(importer.probe(path))
+    except Exception as error:  # noqa: BLE001  one importer's failure is no reason to ask no other
+        IMPORTERS.report(failure(IMPORTERS.plugin(name), f"probe {path}", error))
+        return 0.0
+
+
+def _checked(path: Path, recording: Recording, read_by: str) -> Recording:
+    columns = _arrays(path, recording.columns, read_by)
+    environment = None if recording.environment is None else _arrays(path, recording.environment, read_by)
+    notes = "; ".join(filter(None, (recording.info.notes, read_by)))
+    return Recording(
+        recording.info.model_copy(update={"notes": notes}),
+        checked(path, recording.info, columns),
+        None if environment is None else checked_environment(path, environment),
+    )
+
+
+def _arrays(path: Path, columns: Mapping[str, Any], read_by: str) -> dict[str, Any]:
+    """Return columns as arrays of one length; raises BadRecording."""
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    shapes = {values.shape for values in arrays.values()}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
+        lengths = ", ".join(f"{name}: {'x'.join(map(str, values.shape))}" for name, values in arrays.items())
+        raise BadRecording(f"{path}: {read_by}: columns need one length, at least 1 (are {lengths or 'none'})")
+    return arrays
