@@ -7,6 +7,7 @@ from pathlib import Path
 
 DATABASE_VARIABLE = "LABCTL_DATABASE"
 KEY_VARIABLE = "LABCTL_KEY"
+LOG_LEVEL_VARIABLE = "LABCTL_LOG_LEVEL"
 
 
 def key() -> str | None:
