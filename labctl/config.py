@@ -10,6 +10,11 @@ KEY_VARIABLE = "LABCTL_KEY"
 LOG_LEVEL_VARIABLE = "LABCTL_LOG_LEVEL"
 
 
+def variable(name: str) -> str:
+    """Return a variable of the environment; empty where it is not set, or holds spaces only."""
+    return os.environ.get(name, "").strip()
+
+
 def key() -> str | None:
     """Return the API key to show to a service, where the environment has one."""
     return os.environ.get(KEY_VARIABLE) or None

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from labctl.acting_user import Actor, acting
+from labctl.cli.command_log import log_of_command
 from labctl.cli.commands import (
     audit,
     bench,
@@ -23,6 +24,7 @@ from labctl.cli.commands import (
     schedule,
     server,
 )
+from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import process_of_one_command
 from labctl.config import os_user
 
@@ -81,6 +83,9 @@ def everywhere(
     """Take the options that need no command; whatever is done is done in the name of who typed it."""
     del show
     context.with_resource(acting(Actor(os_user(), "command line")))
+    if context.invoked_subcommand != "serve":  # which has a log of its own
+        with one_clear_line():
+            context.with_resource(log_of_command("command"))
 
 
 def main() -> None:

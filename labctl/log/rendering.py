@@ -17,7 +17,8 @@ Fields = MutableMapping[str, Any]
 FIRST = ("timestamp", "level", "event", "process")
 #: What a terminal could obey: control characters, and those that turn the direction of a text.
 _CONTROLS = {
-    code: f"\\x{code:02x}" for code in (*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+    code: f"\\x{code:02x}"
+    for code in (*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
 }
 
 

@@ -44,6 +44,15 @@ class RepetitionLimit:
             self.held_back += 1
             return False
 
+    def take_count(self, key: Hashable) -> int:
+        """Return how many with this key were held back since the last call."""
+        with self._guard:
+            found = self._counted.get(key)
+            count = 0 if found is None else found.held_back
+            if found is not None:
+                found.held_back = 0
+        return count
+
     def take_counts(self) -> dict[str, int]:
         """Return how many were held back since the last call, by key as text."""
         with self._guard:
@@ -62,4 +71,5 @@ class ForeignRecordLimit(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Return whether a record is written."""
-        return self._limit.admits(f"{record.name}, {record.module} line {record.lineno}")
+        about = f" {device}" if (device := getattr(record, "device", "")) else ""
+        return self._limit.admits(f"{record.name}, {record.module} line {record.lineno}{about}")

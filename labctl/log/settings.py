@@ -6,7 +6,7 @@ import logging
 import os
 from collections.abc import Mapping
 
-from labctl.config import LOG_LEVEL_VARIABLE
+from labctl.config import LOG_LEVEL_VARIABLE, variable
 from labctl.errors import BadInput
 
 LEVELS: Mapping[str, int] = {
@@ -22,7 +22,7 @@ SERVICE_MANAGER = ("JOURNAL_STREAM", "INVOCATION_ID")
 
 def level_asked() -> int | None:
     """Return the level that the environment asks for; None where it names none. Raises BadInput."""
-    name = os.environ.get(LOG_LEVEL_VARIABLE, "").strip()
+    name = variable(LOG_LEVEL_VARIABLE)
     if not name:
         return None
     if name.lower() not in LEVELS:
@@ -32,7 +32,7 @@ def level_asked() -> int | None:
 
 def is_read_by_a_person(descriptor: int) -> bool:
     """Return whether what is written there is read at a terminal, and by no service manager."""
-    managed = any(os.environ.get(name) for name in SERVICE_MANAGER)
+    managed = any(variable(name) for name in SERVICE_MANAGER)
     try:
         return os.isatty(descriptor) and not managed
     except OSError:

@@ -49,7 +49,7 @@ class _Output:
 
 
 class _ForeignRecords(logging.Handler):
-    """Takes in what other libraries log. It has no lock: the thread of the engine must not wait for another's record."""
+    """Takes in what other libraries log. It has no lock: the engine's thread must not wait for another's record."""
 
     def __init__(self, writer: LogWriter, rendering: Rendering, limit: RepetitionLimit) -> None:
         super().__init__()
@@ -83,9 +83,7 @@ def held_back() -> tuple[int, int]:
 
 
 @contextmanager
-def running_log(
-    process: str, level: int, *, locations: Iterable[str] = (), descriptor: int = STDERR
-) -> Iterator[Log]:
+def running_log(process: str, level: int, *, locations: Iterable[str] = (), descriptor: int = STDERR) -> Iterator[Log]:
     """Log in the name of a process while the block runs; what is not written at its end is waited for a moment.
 
     The passwords of `locations`, addresses of databases, are removed from every record.

@@ -88,7 +88,8 @@ class LogWriter:
 
     def _write_notes(self) -> None:
         lost = self.lost
-        if all([self._write(line) for line in self._notes(lost - self._told)]):
+        written = [self._write(line) for line in self._notes(lost - self._told)]
+        if all(written):
             self._told = lost
 
     def _write(self, line: str) -> bool:

@@ -11,6 +11,7 @@ from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, VirtualClock
 from labctl.config import default_database
 from labctl.errors import Conflict
+from labctl.log import get_logger
 from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed
@@ -29,6 +30,8 @@ from procedures.execution.resume import Restart
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.planning.plan import Plan
 from procedures.recipe.recipe import Recipe
+
+log = get_logger()
 
 
 def plan_of(store: Store, row: CampaignRow) -> Plan:
@@ -99,6 +102,10 @@ def prepare_resume(
     except BaseException:
         bench.close()
         raise
+    log.info(
+        "campaign.taken_up", campaign=campaign, bench=row.bench_name, step=standing.start_at + 1, reason=reason,
+        was=row.state, units=sorted(row.recordings),
+    )  # fmt: skip
     restart = Restart(
         gap_s=float("inf") if standing.soak_owed else gap_s,
         power_lost=lost,
