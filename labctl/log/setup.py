@@ -19,7 +19,7 @@ from labctl.log.repetition import MOST_FOREIGN, ForeignRecordLimit, RepetitionLi
 from labctl.log.settings import is_read_by_a_person
 from labctl.log.silence import be_silent
 from labctl.log.uncaught import uncaught_errors_logged
-from labctl.log.writer import END_WITHIN_S, LogWriter
+from labctl.log.writer import LogWriter
 
 STDERR = 2
 
@@ -30,10 +30,6 @@ class Log:
 
     writer: LogWriter
     limit: RepetitionLimit  #: of what other libraries log
-
-    def flush(self, within_s: float = END_WITHIN_S) -> None:
-        """Write what has not been written, at most so long."""
-        self.writer.flush(within_s)
 
 
 class _Output:
@@ -95,7 +91,7 @@ def running_log(process: str, level: int, *, locations: Iterable[str] = (), desc
 def begin_log(process: str, level: int, *, locations: Iterable[str] = (), descriptor: int = STDERR) -> Log:
     """Log in the name of this process from now on to its very end."""
     log = _to_the_end.enter_context(running_log(process, level, locations=locations, descriptor=descriptor))
-    atexit.register(log.flush)
+    atexit.register(_to_the_end.close)
     return log
 
 

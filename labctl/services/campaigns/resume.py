@@ -96,16 +96,12 @@ def prepare_resume(
     reason = f"taken up by {request.by} after {gap_s:.0f} s unwatched; {power}"
     bench = opened or open_bench(bench_file, clock)
     try:
-        store.resume_points.take_up(campaign, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
+        _take_up(store, row, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
         if new_world and (position := plan.mounted_at(standing.start_at)):
             bench.unit_handler.mount(position)
     except BaseException:
         bench.close()
         raise
-    log.info(
-        "campaign.taken_up", campaign=campaign, bench=row.bench_name, step=standing.start_at + 1, reason=reason,
-        was=row.state, units=sorted(row.recordings),
-    )  # fmt: skip
     restart = Restart(
         gap_s=float("inf") if standing.soak_owed else gap_s,
         power_lost=lost,
@@ -116,6 +112,14 @@ def prepare_resume(
     return Prepared(
         campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, CampaignTime(clock, t_s)
     )
+
+
+def _take_up(store: Store, row: CampaignRow, standing: ResumePoint, how: TakeUp) -> None:
+    store.resume_points.take_up(row.id, standing, how)
+    log.info(
+        "campaign.taken_up", campaign=row.id, bench=row.bench_name, step=standing.start_at + 1, reason=how.reason,
+        was=row.state, units=sorted(row.recordings),
+    )  # fmt: skip
 
 
 def _refuse_other_units(row: CampaignRow, bench_file: BenchFile) -> None:
