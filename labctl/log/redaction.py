@@ -18,13 +18,13 @@ DEEPEST, MOST_ITEMS = 5, 100
 #: A shorter secret would also be part of other words.
 SHORTEST_SECRET = 4
 
-_SECRET_FIELD = re.compile(r"(?i)(^|[_-])(authorization|cookie|password|passwd|pwd|secret|token|credentials?|key)s?$")
+_SECRET_FIELD = re.compile(r"(?i)(password|passwd|pwd|(^|[_-])(authorization|cookie|secret|token|credential|key))s?$")
 _NAMED = r"(?:authorization|cookie|password|passwd|pwd|secret|token|api[_-]?key|labctl_key)"
 _IN_TEXT = (
-    (re.compile(r"(?i)\b(bearer|basic)(\s+|%20)[\w.~+/=%-]+"), rf"\1 {REMOVED}"),
+    (re.compile(r"(?i)\b(bearer)(?:\s+|%20)[\w.~+/=%-]+"), rf"\1 {REMOVED}"),
     (re.compile(r"\blabctl_[A-Za-z0-9_-]{30,}"), REMOVED),  # labctl's own keys, wherever they are
     (re.compile(r"(?i)\b([a-z][a-z0-9+.-]*://[^\s/:@?#\"']*):[^\s\"']*@"), rf"\1:{REMOVED}@"),
-    (re.compile(rf"(?i)({_NAMED}[\"']?\s*[=:]\s*)(?:\"[^\"]*\"|'[^']*'|[^\s&,;)}}\]]+)"), rf"\1{REMOVED}"),
+    (re.compile(rf"(?i)({_NAMED}[\"']?\s*[=:]\s*)(?:basic\s+)?(?:\"[^\"]*\"|'[^']*'|[^\s&,;)}}\]]+)"), rf"\1{REMOVED}"),
 )
 
 
