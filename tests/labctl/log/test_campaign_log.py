@@ -12,16 +12,20 @@ import pytest
 
 from instruments.clock import VirtualClock
 from labctl.errors import StoreError
+from labctl.log.campaign_journal import LoggedJournal
 from labctl.log.setup import running_log
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.resume import resume_here
-from labctl.services.planning.loading import load_bench
+from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest, StartRequest
 from labctl.store import StoreJournal, open_store
 from procedures.contracts.control import Control
+from procedures.contracts.steps import StepResult
 from procedures.monitoring.progress import Progress
+from procedures.planning.plan import make_plan
 from tests.helpers.log_records import Record, Records, logged
+from tests.helpers.recording_journal import RecordingJournal
 
 DAY_S, MOST_BYTES_A_DAY = 86_400.0, 10_000_000
 
@@ -76,7 +80,7 @@ def silent(records: Records) -> list[Record]:
 def test_a_campaign_that_fails(tmp_path: Path) -> None:
     """The gyro is silent from its twelfth minute on: every attempt is told, and why the campaign ended."""
     with logged(tmp_path) as records:
-        answer = run_with(tmp_path, fault=("sim://kvh-dsp3000/fog", 720.0))
+        answer = run_with(tmp_path, fault=("sim://kvh-rd2100/fog", 720.0))
     assert answer.state == "failed"
     last = states(records)[-1]
     assert last == ("failed", answer.reason)
@@ -84,14 +88,16 @@ def test_a_campaign_that_fails(tmp_path: Path) -> None:
     told = silent(records)
     assert {each["unit"] for each in told} == {"FOG-0001"}
     attempts = [each["message"] for each in told if each["kind"] == "link.retry"]
-    assert [text.split(" failed: ")[0] for text in attempts] == [f"attempt {n} of 5" for n in range(1, 6)]
-    assert [each["kind"] for each in told if each["kind"] in {"link.degraded", "link.lost"}] == [
-        "link.degraded", "link.lost",
+    assert [text.split(" failed: ")[0] for text in attempts] == [f"attempt {n} of 5" for n in (1, 2, 3)]
+    assert [each["kind"] for each in told if each["kind"] != "link.retry"] == [
+        "link.degraded", "link.lost", "guard.stale",
     ]  # fmt: skip
-    (ended,) = [each for each in records.named("step.ended") if each["outcome"] != "done" and each["kind"] == "acquire"]
-    assert ended["reason"]
-    (cut,) = [each for each in records.named("dataset.closed") if each["state"] == "partial"]
-    assert cut["level"] == "warning"
+    assert told[-1]["limit"] < told[-1]["value"]
+    ended = [each for each in records.named("step.ended") if each["outcome"] != "done"]
+    assert [(each["step"], each["outcome"]) for each in ended] == [(14, "interrupted"), (14, "failed")]
+    assert ended[-1]["reason"] == answer.reason
+    cut = [each for each in records.named("dataset.closed") if each["state"] == "partial"]
+    assert [(each["dataset"], each["level"]) for each in cut] == [(6, "warning"), (7, "warning")]
     assert records.all()[-1]["event"] == "campaign.state"  # nothing is said after why it ended
 
 
@@ -134,14 +140,16 @@ def test_a_journal_that_refuses_is_told_once(tmp_path: Path, monkeypatch: pytest
 
 
 def test_what_is_begun_again_says_so(tmp_path: Path) -> None:
-    with logged(tmp_path) as records, open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
-        prepared = prepare(store, "short", load_bench("single-axis-sim"), VirtualClock(), clip=False)
-        simulation: Any = prepared.bench.simulation
-        simulation.faults("sim://kvh-dsp3000/fog").arm("silence", from_s=720.0, until_s=727.0)
-        assert run(store, prepared).state == "done"
-    again = [record for record in records.named("step.started") if record.get("attempt") == 2]
-    assert len(again) == 1
-    assert [outcome for number, outcome in steps(records) if number == again[0]["step"]] == ["interrupted", "done"]
+    plan = make_plan(load_recipe("short"), limits_of(load_bench("single-axis-sim")), clip=False)
+    clock = VirtualClock()
+    with logged(tmp_path) as records:
+        journal = LoggedJournal(RecordingJournal([]), 1, "bench", plan, {"fog": "FOG-0001"})
+        for outcome in ("interrupted", "failed", "done"):
+            journal.step_started(6, clock.now_s(), clock.utc())
+            journal.step_ended(6, StepResult(outcome=outcome, reason="why"), clock.now_s(), clock.utc())
+        journal.step_started(7, clock.now_s(), clock.utc())
+    assert [each.get("attempt") for each in records.named("step.started")] == [None, 2, 3, None]
+    assert [each["level"] for each in records.named("step.ended")] == ["warning", "error", "info"]
 
 
 def test_a_day_of_a_bench_is_less_than_ten_megabytes(tmp_path: Path) -> None:
