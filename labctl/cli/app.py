@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from importlib.metadata import version
 from typing import Annotated
@@ -88,7 +89,20 @@ def everywhere(
             context.with_resource(log_of_command("command"))
 
 
+def open_missing_streams() -> None:
+    """Give a process that was started without standard streams empty ones, as its next files would get their numbers.
+
+    What is written to standard error would go into these files, and a child process would take them for its own.
+    """
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest number that is free
+
+
 def main() -> None:
     """Run the command line, as the process that it is."""
+    open_missing_streams()
     with process_of_one_command():
         app()

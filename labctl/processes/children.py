@@ -41,8 +41,6 @@ class Child:
                 pass_fds=[theirs.fileno(), *pass_fds],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # the supervisor's carries one document
-                # the log of all is one stream; without one, its number may be another file's by now
-                stderr=subprocess.DEVNULL if sys.__stderr__ is None else None,
                 process_group=0,
             )
         self.line: Line = Connection(ours.detach())

@@ -100,6 +100,7 @@ def serve(line: Connection, settings: WebSettings) -> None:
     log.info("process.started", version=VERSION, host=settings.at, asks_for_a_key=access.keys)
     threading.Thread(target=_end_with, args=(line,), name="supervisor", daemon=True).start()
     with socket.socket(fileno=settings.listener) as listener, contextlib.suppress(KeyboardInterrupt):
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # the server raises it again at its end
         server.run(sockets=[listener])
     service.close()
     log.info("process.ended")
