@@ -7,6 +7,12 @@ from pathlib import Path
 
 DATABASE_VARIABLE = "LABCTL_DATABASE"
 KEY_VARIABLE = "LABCTL_KEY"
+LOG_LEVEL_VARIABLE = "LABCTL_LOG_LEVEL"
+
+
+def variable(name: str) -> str:
+    """Return a variable of the environment; empty where it is not set, or holds spaces only."""
+    return os.environ.get(name, "").strip()
 
 
 def key() -> str | None:

@@ -21,6 +21,7 @@ from instruments.transport.serial import BROKEN
 
 #: Failures are raised, not logged; without a handler pymodbus would write them to standard error.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+log = logging.getLogger(__name__)
 
 Client = ModbusTcpClient | ModbusSerialClient
 Request = Callable[[Client], ModbusPDU]
@@ -71,7 +72,9 @@ class ModbusLink:
         """
         start_s = self._clock.now_s()
         failure: InstrumentError | None = None
-        for pause_s in (0.0, *RETRY_PAUSES_S):
+        for attempt, pause_s in enumerate((0.0, *RETRY_PAUSES_S), start=1):
+            if failure is not None:
+                log.warning("link.retry", extra={"device": self.device, "attempt": attempt, "reason": str(failure)})
             self._clock.sleep(pause_s)
             try:
                 return self._exchange_once(what, ask, fits)

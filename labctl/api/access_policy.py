@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from fastapi import Depends, Request
+from fastapi import Depends, Request, Security
+from fastapi.security import HTTPBearer
 
 from labctl.services.admin.api_keys import require_role
 from labctl.services.schemas.admin import Role
@@ -55,3 +56,13 @@ def _approver(request: Request) -> None:
 
 #: For `dependencies=[...]` of a route that needs more than its method says.
 NEEDS_APPROVER = Depends(_approver)
+
+#: For `dependencies=[...]`: declares in the description that a key may be sent, which its page asks for under
+#: "Authorize". Who is admitted is decided before a route is reached, so nothing is refused here.
+DECLARES_KEY = Security(
+    HTTPBearer(
+        scheme_name="key",
+        description="A key that `labctl key create` made. A service on loopback without --require-keys asks for none.",
+        auto_error=False,
+    )
+)

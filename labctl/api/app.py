@@ -10,9 +10,10 @@ from fastapi import FastAPI
 
 from labctl import web
 from labctl.api import problems
-from labctl.api.access_policy import AccessPolicy
+from labctl.api.access_policy import DECLARES_KEY, AccessPolicy
 from labctl.api.dependencies import ControlPool
 from labctl.api.middleware import AccessMiddleware
+from labctl.api.request_log import RequestFigures, RequestLogMiddleware
 from labctl.api.routers import (
     admin,
     benches,
@@ -47,6 +48,8 @@ certifying and keys for an approver's.
 ROUTERS = (
     health, units, benches, effects, calibrations, plans, campaigns, schedule, recordings, admin, swagger_ui,
 )  # fmt: skip
+#: Which of their routes take a key; every route of the others does.
+SAY_THEMSELVES = (health, swagger_ui)
 #: The parser's own bound on parts of a form: a recording has at most three files.
 MOST_FILES = 4
 
@@ -76,7 +79,9 @@ def create_app(service: LabService, access: AccessPolicy | None = None) -> FastA
     app.state.service = service
     problems.install(app)
     for each in ROUTERS:
-        app.include_router(each.router)
+        app.include_router(each.router, dependencies=[] if each in SAY_THEMSELVES else [DECLARES_KEY])
     web.install(app)
     app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy())
+    app.state.request_figures = RequestFigures()
+    app.add_middleware(RequestLogMiddleware, figures=app.state.request_figures)
     return app

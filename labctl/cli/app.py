@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from importlib.metadata import version
 from typing import Annotated
@@ -9,6 +10,7 @@ from typing import Annotated
 import typer
 
 from labctl.acting_user import Actor, acting
+from labctl.cli.command_log import log_of_command
 from labctl.cli.commands import (
     audit,
     bench,
@@ -24,6 +26,7 @@ from labctl.cli.commands import (
     schedule,
     server,
 )
+from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import process_of_one_command
 from labctl.config import os_user
 
@@ -83,9 +86,25 @@ def everywhere(
     """Take the options that need no command; whatever is done is done in the name of who typed it."""
     del show
     context.with_resource(acting(Actor(os_user(), "command line")))
+    if context.invoked_subcommand != "serve":  # which has a log of its own
+        with one_clear_line():
+            context.with_resource(log_of_command("command"))
+
+
+def open_missing_streams() -> None:
+    """Give a process that was started without standard streams empty ones, as its next files would get their numbers.
+
+    What is written to standard error would go into these files, and a child process would take them for its own.
+    """
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest number that is free
 
 
 def main() -> None:
     """Run the command line, as the process that it is."""
+    open_missing_streams()
     with process_of_one_command():
         app()

@@ -31,6 +31,11 @@ def process_of_one_command() -> Iterator[None]:
         _PROCESS_ENDS.reset(token)
 
 
+def process_ends() -> bool:
+    """Return whether the process ends with the command that runs."""
+    return _PROCESS_ENDS.get()
+
+
 @contextmanager
 def signals_restored() -> Iterator[None]:
     """Restore the handlers of the ending signals at the end, unless the process ends with this command."""

@@ -10,6 +10,7 @@ from typing import Any
 
 from instruments.clock import WallClock
 from labctl.acting_user import acting
+from labctl.log.context import for_request
 from labctl.processes.calls import Answer, Call, answer_with
 from labctl.processes.supervision import Supervision
 from labctl.services.commands.context import CommandContext
@@ -43,7 +44,8 @@ class BenchCalls:
     def stop(self, call: Call, _: Connection) -> Answer:
         """Ask for the end of a campaign, or of whatever runs: nothing is waited for, nothing is written."""
         campaign, reason = call.args
-        return Answer(self._local.stop_now(campaign, reason))
+        with for_request(getattr(call, "request_id", "")):
+            return Answer(self._local.stop_now(campaign, reason))
 
     def answer(self, call: Call, connection: Connection) -> Answer | None:
         """Answer a call; None where the connection is kept for a watcher or a supervisor."""
@@ -52,7 +54,7 @@ class BenchCalls:
             return None
         if call.name == "supervise":
             return self._supervise(call, connection)
-        with acting(call.actor):
+        with acting(call.actor), for_request(getattr(call, "request_id", "")):  # an older service sends none
             return answer_with(lambda: self._value(call))
 
     def _supervise(self, call: Call, connection: Connection) -> Answer | None:

@@ -10,13 +10,15 @@ from __future__ import annotations
 import contextlib
 import sys
 import threading
+from logging import ERROR, INFO
 from multiprocessing.connection import Connection
 
 from instruments.clock import Clock, WallClock
 from labctl.errors import BadInput, LabctlError
+from labctl.log import get_logger
 from labctl.processes.bench_calls import BenchCalls
 from labctl.processes.calls import CallServer
-from labctl.processes.children import line_to_parent, tell
+from labctl.processes.children import begin_child_log, line_to_parent, tell
 from labctl.processes.engine_watch import EngineWatch
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
@@ -25,11 +27,14 @@ from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import clock_for
+from labctl.services.lab_service import VERSION
 from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
 from labctl.store import ServiceAddress, Store
 from labctl.store.connection.database import Database
 from procedures.execution.signals import ENDING
+
+log = get_logger()
 
 #: An abort is answered within this, with how far the campaign then is, s.
 ANSWER_WITHIN_S = 0.2
@@ -102,11 +107,14 @@ class BenchProcess:
             self._waker.wait(LOOK_S)
             if self._supervision.begin and not begun:
                 begun = True
+                log.info("bench.begun")
                 self._local.start()
             if self._supervision.alone_s > ALONE_S and self._local.running is None:
+                log.warning("supervisor.gone", alone_s=round(self._supervision.alone_s))
                 return
 
     def _close(self) -> None:
+        log.info("process.ending", running=self._local.running)
         left = BenchLeft("how the bench was left is not known; look at it", in_doubt=True)
         try:
             left = self._local.close()
@@ -116,17 +124,21 @@ class BenchProcess:
                 self._store.close()
             self._supervision.say_left(left)
             self._servers[0].close()
+            log.log(ERROR if left.in_doubt else INFO, "process.ended", left=left.text, in_doubt=left.in_doubt)
 
 
 def main() -> int:
     """Run the process that the supervisor has started; returns its exit status."""
     line, settings = line_to_parent()
     threading.current_thread().name = "bench"
+    begin_child_log("bench", settings.location)
     try:
         store, local = open_bench_service(settings)
-    except Exception as error:  # noqa: BLE001  the supervisor says it
+    except Exception as error:
+        log.debug("process.refused", exc_info=error)
         tell(line, error)
         return 2
+    log.info("process.started", version=VERSION, bench=settings.bench, speed=settings.speed, database=store.location)
     BenchProcess(settings, store, local).run(line)
     return 0
 

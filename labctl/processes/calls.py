@@ -18,6 +18,7 @@ from typing import Any
 
 from labctl.acting_user import Actor, actor
 from labctl.errors import BenchSilent, LabctlError
+from labctl.log.context import request_id
 
 BACKLOG = 64
 #: A caller that was accepted has this long to say what it wants, where callers are answered one after the other, s.
@@ -32,6 +33,7 @@ class Call:
     args: tuple[Any, ...] = ()
     kwargs: dict[str, Any] = field(default_factory=dict)
     actor: Actor = field(default_factory=actor)
+    request_id: str = field(default_factory=request_id)  #: the HTTP request that asks, for the log
 
 
 @dataclass(frozen=True)

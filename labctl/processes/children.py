@@ -12,10 +12,13 @@ import socket
 import subprocess
 import sys
 from collections.abc import Sequence
+from logging import INFO
 from multiprocessing.connection import Connection
 from typing import Any
 
 from labctl.errors import LabctlError
+from labctl.log.settings import level_asked
+from labctl.log.setup import begin_log
 
 Line = Connection
 
@@ -87,6 +90,12 @@ class Child:
         self.signal(signal.SIGKILL)
         self._process.wait()
         self.line.close()
+
+
+def begin_child_log(name: str, location: str) -> None:
+    """Begin the log of a child process; its supervisor has looked at the level that the environment asks for."""
+    level = level_asked()
+    begin_log(name, INFO if level is None else level, locations=(location,))
 
 
 def line_to_parent() -> tuple[Line, Any]:

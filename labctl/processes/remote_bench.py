@@ -10,6 +10,7 @@ from typing import Any
 
 from instruments.bench_config import BenchFile
 from labctl.errors import BenchSilent
+from labctl.log import get_logger
 from labctl.processes.bench_calls import Beat
 from labctl.processes.calls import Call, Caller
 from labctl.processes.elapsed import Elapsed
@@ -20,6 +21,8 @@ from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
+
+log = get_logger()
 
 #: A question that the bench process answers from its memory.
 ANSWER_S = 3.0
@@ -111,6 +114,7 @@ class RemoteBench:
         self._listeners = ChangeListeners()
         self._beat = Beat(running=None, stops=False, schedule_trouble="")
         self._heard = Elapsed()
+        self._silent = False
         self._last_live: CampaignResponse | None = None
         self._described: dict[str, Any] | None = None
         self._over = threading.Event()
@@ -194,6 +198,8 @@ class RemoteBench:
         while not self._over.is_set():
             with contextlib.suppress(BenchSilent, EOFError, OSError):
                 self._hear()
+            if self.heard_s > SILENT_S and not self._over.is_set():
+                self._note(silent=True)
             self._listeners.notify()
             self._over.wait(RECONNECT_S)
 
@@ -202,11 +208,20 @@ class RemoteBench:
             connection.send(Call("watch"))
             while not self._over.is_set():
                 if not connection.poll(SILENT_S):
+                    self._note(silent=True)
                     self._listeners.notify()  # that nothing is heard is news too
                     continue
                 self._beat = connection.recv()
                 self._heard.restart()
+                self._note(silent=False)
                 self._listeners.notify()
+
+    def _note(self, *, silent: bool) -> None:
+        if silent and not self._silent:
+            log.error("bench_process.silent", silent_s=round(self.heard_s, 1))
+        elif self._silent and not silent:
+            log.warning("bench_process.heard")
+        self._silent = silent
 
     def end_soon(self) -> None:
         """Nothing: the supervisor ends the bench process, not the web process."""

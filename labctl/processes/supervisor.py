@@ -14,9 +14,11 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from logging import ERROR, INFO
 from pathlib import Path
 
 from labctl.errors import BenchInDoubt, BenchSilent, LabctlError
+from labctl.log import get_logger
 from labctl.processes import systemd
 from labctl.processes.bench_holder import bench_process_of
 from labctl.processes.bench_line import BenchLine
@@ -27,6 +29,8 @@ from labctl.processes.settings import BenchSettings, ServeRequest, WebSettings
 from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft
 from procedures.execution.signals import ENDING, restore
+
+log = get_logger()
 
 LOOK_S = 0.5
 #: A process that was not heard of for so long is ended and started again, s.
@@ -70,6 +74,7 @@ def serve_forever(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
     request.check()
     with listening(request.host, request.port) as at, ending_signals() as waker:
         left = Supervisor(request, at, waker).run(ready)
+    log.log(ERROR if left.in_doubt else INFO, "process.ended", left=left.text, in_doubt=left.in_doubt)
     if left.in_doubt:
         raise BenchInDoubt(f"stopped; {left.text}")
     return left.text
@@ -107,10 +112,11 @@ class Supervisor:
         try:
             self._web.open(self._web_settings())
             self._web_heard.restart()
+            log.info("process.started", url=self._at.url, bench_pid=bench.pid, web_pid=self._web.pid)
             ready(Ready(self._at.url, bench.pid, self._web.pid))
             bench.tell("begin")
             systemd.ready()
-            self._watch()
+            self._watch_on()
         finally:
             systemd.stopping()
             left = self._end_bench(self._bench)
@@ -131,7 +137,9 @@ class Supervisor:
         if holder is not None and holder.calls is not None:
             with contextlib.suppress(BenchSilent):
                 self._folder = Path(holder.calls)
-                return BenchLine(self._settings(self._folder), holder.pid)
+                line = BenchLine(self._settings(self._folder), holder.pid)
+                log.info("bench_process.found", child_pid=holder.pid)
+                return line
         self._folder = Path(tempfile.mkdtemp(prefix="labctl-"))
         return self._start_bench()
 
@@ -152,11 +160,12 @@ class Supervisor:
 
     def _end_bench(self, bench: BenchLine) -> BenchLeft:
         """Let the bench process leave its bench safe, however long that takes; returns how it was left."""
+        log.info("process.ending", stopped=self._waker.ending)
         bench.tell("end")
         while not bench.wait(LOOK_S):
             systemd.alive()
             if bench.heard_s > SILENT_S:
-                bench.signal(signal.SIGKILL)
+                self._kill("bench", bench, bench.heard_s)
         bench.close()
         shutil.rmtree(self._folder, ignore_errors=True)
         if bench.left is not None:
@@ -179,6 +188,18 @@ class Supervisor:
 
     # -- watching
 
+    @staticmethod
+    def _kill(name: str, process: BenchLine | Child, silent_s: float) -> None:
+        log.error("child.silent", child=name, child_pid=process.pid, silent_s=round(silent_s, 1))
+        process.signal(signal.SIGKILL)
+
+    def _watch_on(self) -> None:
+        try:
+            self._watch()
+        except LabctlError as error:
+            log.critical("process.gives_up", reason=str(error))
+            raise
+
     def _watch(self) -> None:
         told = Elapsed()
         while not self._waker.ending:
@@ -191,12 +212,14 @@ class Supervisor:
 
     def _look_after_bench(self) -> None:
         if self._bench.heard_s > SILENT_S:
-            self._bench.signal(signal.SIGKILL)
+            self._kill("bench", self._bench, self._bench.heard_s)
         if not self._bench.wait(0.0) or self._waker.ending:
             return
+        log.error("child.ended", child="bench", child_pid=self._bench.pid)
         self._bench.close()
         self._restarts.one_more("the bench process")
         self._bench = self._start_bench()
+        log.warning("child.restarted", child="bench", child_pid=self._bench.pid)
         self._bench.tell("begin")
 
     def _look_after_web(self) -> None:
@@ -207,11 +230,16 @@ class Supervisor:
                 break
             self._web_heard.restart()
         if self._web_heard.s > SILENT_S:
-            self._web.signal(signal.SIGKILL)
+            self._kill("web", self._web, self._web_heard.s)
         if not self._web.has_ended() or self._waker.ending:
             return
+        log.error("child.ended", child="web", child_pid=self._web.pid, status=self._web.status)
         self._web.kill()
         self._restarts.one_more("the web process")
         self._web, self._web_heard = self._new_web(), Elapsed()
-        with contextlib.suppress(LabctlError, OSError):  # it is looked after again
+        try:
             self._web.open(self._web_settings())
+        except (LabctlError, OSError) as error:  # it is looked after again
+            log.warning("child.refused", child="web", error=str(error))
+        else:
+            log.warning("child.restarted", child="web", child_pid=self._web.pid)

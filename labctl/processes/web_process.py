@@ -18,15 +18,18 @@ from labctl.api.access_policy import LOOPBACK_NAMES, MIB, AccessPolicy
 from labctl.api.app import create_app
 from labctl.api.connection_limits import limits_for, raise_open_files
 from labctl.api.http_protocol import bounded_http
-from labctl.processes.children import line_to_parent, tell
+from labctl.log import get_logger
+from labctl.processes.children import begin_child_log, line_to_parent, tell
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
 from labctl.processes.settings import ServeRequest, WebSettings
 from labctl.services.admin.api_keys import require_an_api_key
 from labctl.services.computation import InWorkers
-from labctl.services.lab_service import LabService
+from labctl.services.lab_service import VERSION, LabService
 from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
+
+log = get_logger()
 
 #: A request that has not ended so long after the end was asked for is cut, s.
 GRACE_S = 5
@@ -79,7 +82,8 @@ def _end_with(line: Connection) -> None:
 def serve(line: Connection, settings: WebSettings) -> None:
     """Serve until told to end. Raises BadInput without a key where one is needed."""
     service = create_service(settings)
-    app = create_app(service, access_for(settings.request, service.store, settings.at))
+    access = access_for(settings.request, service.store, settings.at)
+    app = create_app(service, access)
 
     async def beat() -> None:
         tell(line, "beat")
@@ -87,25 +91,31 @@ def serve(line: Connection, settings: WebSettings) -> None:
     limits = limits_for(raise_open_files())
     server = uvicorn.Server(
         uvicorn.Config(
-            app, log_level="warning", lifespan="on", callback_notify=beat, timeout_notify=BEAT_S, proxy_headers=False,
+            app, log_config=None, log_level="warning", access_log=False, lifespan="on",
+            callback_notify=beat, timeout_notify=BEAT_S, proxy_headers=False,
             http=bounded_http(limits), ws="none", backlog=limits.backlog, timeout_keep_alive=limits.idle_s,
             timeout_graceful_shutdown=GRACE_S,
         )
     )  # fmt: skip
     tell(line, "ready")
+    log.info("process.started", version=VERSION, host=settings.at, asks_for_a_key=access.keys)
     threading.Thread(target=_end_with, args=(line,), name="supervisor", daemon=True).start()
     with socket.socket(fileno=settings.listener) as listener, contextlib.suppress(KeyboardInterrupt):
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # the server raises it again at its end
         server.run(sockets=[listener])
     service.close()
+    log.info("process.ended")
 
 
 def main() -> int:
     """Run the process that the supervisor has started; returns its exit status."""
     line, settings = line_to_parent()
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the supervisor hears it
+    begin_child_log("web", settings.request.location)
     try:
         serve(line, settings)
-    except Exception as error:  # noqa: BLE001  the supervisor says it
+    except Exception as error:
+        log.debug("process.refused", exc_info=error)
         tell(line, error)
         return 2
     return 0

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,16 @@ from labctl.store import Store
 from procedures.execution.signals import shutdown_hook
 
 VERSION = version("labctl")
+
+
+@dataclass(frozen=True)
+class ServiceFigures:
+    """Figures for a monitor."""
+
+    units: int
+    campaigns: Mapping[str, int]  #: by state
+    running: bool  #: whether a campaign runs on the bench of this service
+    heard_s: float  #: how long ago the bench was heard of, s
 
 
 class LabService:
@@ -152,12 +163,9 @@ class LabService:
             "schedule_trouble": self.bench_access.schedule_trouble,
         }
 
-    def metrics(self) -> dict[str, float]:
+    def metrics(self) -> ServiceFigures:
         """Return figures for a monitor."""
-        states = self.store.campaigns.states()
-        return {
-            "labctl_units": float(len(self.store.units.all())),
-            "labctl_campaigns": float(len(states)),
-            "labctl_campaigns_failed": float(states.count("failed")),
-            "labctl_campaign_running": float(self.bench_access.running is not None),
-        }
+        access = self.bench_access
+        return ServiceFigures(
+            self.store.units.count(), self.store.campaigns.count_by_state(), access.running is not None, access.heard_s
+        )

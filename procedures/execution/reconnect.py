@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply
+from procedures.contracts.journal import Event
 from procedures.contracts.steps import Acquire, Home, MoveChamber, Rest, Soak, Step
 from procedures.execution.context import POLL_S, ExecutionContext, raise_violation
 from procedures.execution.waiting import pass_time
@@ -28,14 +29,16 @@ def reconnect(context: ExecutionContext, error: LinkError) -> None:
     """Wait until an instrument answers again. Raises the error when it stays silent, and GuardTripped."""
     device = error.device
     context.monitor.links.change(device, "degraded", f"{error}; it is tried again, {len(PAUSES_S)} times")
-    for pause_s in PAUSES_S:
+    for attempt, pause_s in enumerate(PAUSES_S, start=1):
         pass_time(context, pause_s, pausing=False)
         violations = context.without_dropouts(context.monitor.poll(POLL_S))
         # a violation that suspends is found again when the step begins
         raise_violation([each for each in violations if each.action == "fail"])
         try:
             _reach(context, device)
-        except InstrumentError:
+        except InstrumentError as silent:
+            text = f"attempt {attempt} of {len(PAUSES_S)} failed: {silent}"
+            context.recorder.event(Event("link.retry", text, level="warning", device=device))
             continue
         context.monitor.links.change(device, "well")
         return

@@ -97,8 +97,10 @@ def rest_of(client: socket.socket) -> bytes:
 
 
 @contextmanager
-def bounded_server(limits: ConnectionLimits, loop: str = "auto") -> Iterator[BoundedServer]:
-    """Serve the small application while the block runs."""
+def bounded_server(
+    limits: ConnectionLimits, loop: str = "auto", *, log_level: str = "critical"
+) -> Iterator[BoundedServer]:
+    """Serve the small application while the block runs; what uvicorn logs goes where the test has it go."""
     app, ready, protocol = SmallApp(), threading.Event(), bounded_http(limits)
 
     class Server(uvicorn.Server):
@@ -108,8 +110,9 @@ def bounded_server(limits: ConnectionLimits, loop: str = "auto") -> Iterator[Bou
 
     with socket.create_server(("127.0.0.1", 0), backlog=limits.backlog) as listener:
         config = uvicorn.Config(
-            app, http=protocol, ws="none", lifespan="off", log_level="critical", proxy_headers=False, loop=loop,
-            backlog=limits.backlog, timeout_keep_alive=limits.idle_s, timeout_graceful_shutdown=1,
+            app, http=protocol, ws="none", lifespan="off", log_config=None, log_level=log_level,
+            proxy_headers=False, loop=loop, backlog=limits.backlog, timeout_keep_alive=limits.idle_s,
+            timeout_graceful_shutdown=1,
         )  # fmt: skip
         server = Server(config)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})

@@ -28,10 +28,11 @@ def labctl(database: Path | str, *arguments: str) -> list[str]:
     return [sys.executable, "-m", "labctl", *arguments, "--database", str(database)]
 
 
-def begin(command: list[str]) -> subprocess.Popen[str]:
-    """Start a process that obeys signals."""
-    with default_signals():
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def begin(command: list[str], log: Path | None = None) -> subprocess.Popen[str]:
+    """Start a process that obeys signals; its standard error is a pipe, or goes to a file."""
+    with default_signals(), contextlib.ExitStack() as opened:
+        stderr = subprocess.PIPE if log is None else opened.enter_context(log.open("ab"))
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True)
 
 
 def first_line(process: subprocess.Popen[str]) -> str:
@@ -56,11 +57,19 @@ def end_of(database: Path | str, campaign: int = 1) -> tuple[str, str]:
 class ServiceProcess:
     """`labctl serve` in a process of its own, and other commands beside it on the same database."""
 
-    def __init__(self, database: Path | str, *options: str, open_files: int | None = None) -> None:
+    def __init__(
+        self,
+        database: Path | str,
+        *options: str,
+        open_files: int | None = None,
+        log: Path | None = None,
+        shell: str = "",
+    ) -> None:
         self.database = database
         command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json", *options]
         limit = [] if open_files is None else ["prlimit", f"--nofile={open_files}:{open_files}"]
-        self.process = begin([*limit, *labctl(database, *command)])
+        before = ["/bin/sh", "-c", f'{shell}; exec "$0" "$@"'] if shell else []
+        self.process = begin([*before, *limit, *labctl(database, *command)], log)
         told = json.loads(first_line(self.process))
         self.url = told["url"]
         self.bench_pid, self.web_pid = told["bench_pid"], told["web_pid"]
@@ -117,9 +126,14 @@ class ServiceProcess:
 
 
 @contextmanager
-def running(database: Path | str, *options: str, open_files: int | None = None) -> Iterator[ServiceProcess]:
-    """Serve a database while the block runs; `open_files` is all that the process may open."""
-    made = ServiceProcess(database, *options, open_files=open_files)
+def running(
+    database: Path | str, *options: str, open_files: int | None = None, log: Path | None = None, shell: str = ""
+) -> Iterator[ServiceProcess]:
+    """Serve a database while the block runs; `open_files` is all that the process may open.
+
+    `log` is the file that standard error goes to; `shell` is done by the shell that becomes the service.
+    """
+    made = ServiceProcess(database, *options, open_files=open_files, log=log, shell=shell)
     try:
         yield made
     finally:

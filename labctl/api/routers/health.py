@@ -6,13 +6,16 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import PlainTextResponse
+from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 
+from labctl.api.access_policy import DECLARES_KEY
 from labctl.api.dependencies import ServiceDep
+from labctl.api.metrics import text_of
 
 router = APIRouter(tags=["service"])
 
 
-@router.get("/health", summary="Is the service well?")
+@router.get("/health", summary="Is the service well?", dependencies=[DECLARES_KEY])
 def health(service: ServiceDep, request: Request) -> dict[str, Any]:
     """Whether the service answers and in which version; to those who may read, also the database and the bench."""
     return service.health() if request.state.caller is not None else service.pulse()
@@ -27,7 +30,8 @@ async def heartbeat(service: ServiceDep) -> dict[str, Any]:
     return service.heartbeat()
 
 
-@router.get("/metrics", summary="Figures for a monitor", response_class=PlainTextResponse)
-def metrics(service: ServiceDep) -> str:
+@router.get("/metrics", summary="Figures for a monitor", response_class=PlainTextResponse, dependencies=[DECLARES_KEY])
+def metrics(service: ServiceDep, request: Request) -> PlainTextResponse:
     """Counts in the text format that Prometheus reads."""
-    return "".join(f"# TYPE {name} gauge\n{name} {value}\n" for name, value in service.metrics().items())
+    text = text_of(service, request.app.state.request_figures)
+    return PlainTextResponse(text, media_type=CONTENT_TYPE_PLAIN_0_0_4)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from labctl.cli.command_log import log_of_command
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import console, print_json, stderr
@@ -54,7 +55,7 @@ def serve(
         for text in filter(None, (unconfirmed, cut_short)):
             console.print(text, style="yellow", markup=False, soft_wrap=True)
 
-    with one_clear_line():
+    with one_clear_line(), log_of_command("supervisor", default="info", location=request.location):
         left = serve_forever(request, ready)
     stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
 

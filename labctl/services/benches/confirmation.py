@@ -10,14 +10,18 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from contextlib import closing, suppress
+from logging import INFO, WARNING
 
 from instruments.bench import open_bench
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.acting_user import ITSELF, acting
 from labctl.errors import LabctlError
+from labctl.log import get_logger
 from labctl.store import BenchRow, Store
 from procedures.execution.safe_state import make_safe
+
+log = get_logger()
 
 #: From one attempt to the next.
 RETRY_S = 30.0
@@ -82,6 +86,8 @@ class SafeStateRetry:
             if not self._bench.is_simulated and self._is_idle() and self._is_in_doubt():
                 clock = self._make_clock()
                 unconfirmed = self._try(clock)
+                level = WARNING if unconfirmed else INFO
+                log.log(level, "safe_state.retried", bench=self._bench.name, unconfirmed=unconfirmed)
                 with acting(ITSELF), suppress(LabctlError):
                     self._store.benches.attempted(self._bench.name, unconfirmed, clock.utc())
 

@@ -22,10 +22,13 @@ from uuid import uuid4
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock, WallClock
 from labctl.errors import BenchBusy, Conflict, LabctlError
+from labctl.log import get_logger
 from labctl.services.benches.power_failure import boot_id
 from labctl.store import LeaseRow, Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control
+
+log = get_logger()
 
 TERM_S = 120.0
 RENEW_S = 10.0
@@ -77,6 +80,7 @@ class BenchHold:
             raise Conflict(f"bench {self._bench}: somebody else took it this moment; try again")
         _HELD_HERE.add(self._owner)
         self._renewed_s, self._why_lost = begun_s, ""
+        log.info("lease.taken", bench=self._bench, instead_of="" if found is None else described(found))
 
     def _gone(self, found: LeaseRow) -> bool:
         """Return whether a holder can no longer drive the bench."""
@@ -113,9 +117,14 @@ class BenchHold:
             else:
                 self._renewed_s = None
                 found = self._store.leases.holder(self._bench)
-                self._why_lost = described(found) if found else "its lease was taken away"
+                self._note_loss(described(found) if found else "its lease was taken away")
         except Exception as error:  # noqa: BLE001  the next try may do better; until then `held` counts the time
-            self._why_lost = str(error) or type(error).__name__
+            self._note_loss(str(error) or type(error).__name__)
+
+    def _note_loss(self, why: str) -> None:
+        if why != self._why_lost:  # it is tried every RENEW_S
+            log.error("lease.not_renewed", bench=self._bench, reason=why)
+        self._why_lost = why
 
     def control(self) -> Control:
         """Return the control of a campaign that is interrupted when the bench may no longer be driven."""

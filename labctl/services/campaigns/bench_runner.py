@@ -9,6 +9,7 @@ from typing import Any
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.errors import BenchBusy, Conflict, StoreError
+from labctl.log import get_logger
 from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import BenchHold
 from labctl.services.benches.start_confirmation import confirmation_text
@@ -35,6 +36,8 @@ from procedures.contracts.journal import CampaignState
 from procedures.contracts.operator import HumanOperator
 from procedures.execution.signals import ignore_signals
 from procedures.monitoring.progress import Progress
+
+log = get_logger()
 
 #: How long an abort waits for the safe state before it returns how far the campaign is.
 SAFE_WITHIN_S = 120.0
@@ -241,6 +244,7 @@ class BenchRunner:
         if job is None or campaign not in {None, job.row.id}:
             return False
         job.control.abort(reason)
+        log.warning("campaign.stop", campaign=job.row.id, bench=self._bench.name, reason=reason)
         threading.Thread(target=job.stop_if_stuck, name="stop", daemon=True).start()
         return True
 

@@ -8,6 +8,9 @@ from contextlib import ExitStack, closing, suppress
 from instruments.bench_config import BenchFile
 from labctl.config import default_database
 from labctl.errors import Conflict, DiskFull, Stopped, StoreError
+from labctl.log import get_logger
+from labctl.log.campaign_journal import LoggedJournal
+from labctl.log.context import for_campaign
 from labctl.services.benches.confirmation import SafeStateRetry, describe_safe_state
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
@@ -23,6 +26,8 @@ from procedures.contracts.operator import Operator
 from procedures.execution.engine import Engine
 from procedures.execution.signals import ignore_signals
 from procedures.monitoring.progress import Progress
+
+log = get_logger()
 
 Observe = Callable[[CampaignResponse], None]
 Attend = Callable[[Operator, Callable[[str], None]], None]
@@ -54,7 +59,9 @@ def _engine(
     observe: Callable[[Progress], None] | None,
     lending: BenchLending | None = None,
 ) -> Engine:
-    journal = store.campaigns.journal(prepared.id)
+    row = store.campaigns.get(prepared.id)
+    serials = {str(gyro["name"]): str(gyro["serial"]) for gyro in row.bench["gyros"]}
+    journal = LoggedJournal(store.campaigns.journal(prepared.id), prepared.id, row.bench_name, prepared.plan, serials)
     return Engine(
         prepared.plan,
         prepared.bench,
@@ -69,7 +76,9 @@ def _engine(
 
 def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse:
     """Run the engine and close the bench; once it ends, further signals take nothing from what is to be said."""
+    bench = store.campaigns.get(prepared.id).bench_name
     with ExitStack() as until_told:
+        until_told.enter_context(for_campaign(prepared.id, bench))
         try:
             engine.run(prepared.start_at, prepared.restart, lambda: until_told.enter_context(ignore_signals()))
         except KeyboardInterrupt as interrupt:
@@ -77,7 +86,7 @@ def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse
         finally:
             with closing(prepared.bench):
                 if engine.complaints:  # said in its event already, unless that could not be written
-                    bench = store.campaigns.get(prepared.id).bench_name
+                    log.error("bench.unconfirmed", unconfirmed=list(engine.complaints))
                     if not store.benches.unconfirmed(bench):
                         store.benches.mark(bench, "; ".join(engine.complaints), prepared.clock.utc())
     return answer_of(store.campaigns.get(prepared.id), engine.progress)

@@ -10,7 +10,9 @@ from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
+from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
+from labctl.log import get_logger
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.benches.confirmation import describe_bench
 from labctl.services.benches.power_failure import boot_id
@@ -23,6 +25,8 @@ from procedures.execution.safe_state import stop_table
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
+
+log = get_logger()
 
 
 @dataclass(frozen=True)
@@ -131,7 +135,13 @@ def prepare(
             boot_id=boot_id(),
             bench_clear=bench_clear,
         )
-        return Prepared(store.campaigns.create(new, clock.utc()), plan, bench, clock, operator_of(bench))
+        number = store.campaigns.create(new, clock.utc())
+        log.info(
+            "campaign.planned", campaign=number, bench=bench_file.name, recipe=recipe.name, steps=len(plan.steps),
+            datasets=plan.datasets, expected_s=round(plan.expected_s), simulated=bench_file.is_simulated,
+            units=[unit.info["serial"] for unit in units], by=actor().name,
+        )  # fmt: skip
+        return Prepared(number, plan, bench, clock, operator_of(bench))
     except BaseException:
         bench.close()
         raise

@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
+from logging import INFO, WARNING
 
 from instruments.bench import open_bench
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
 from labctl.errors import BenchBusy, LabctlError
+from labctl.log import get_logger
 from labctl.services.campaigns.resumability import retries_exhausted
 from labctl.services.campaigns.status import ENDED, from_rows, how_far
 from labctl.store import Store
 from procedures.execution.safe_state import make_safe
+
+log = get_logger()
 
 
 def describe_recovery(store: Store, bench: str) -> str:
@@ -40,6 +44,7 @@ def secure_bench(store: Store, bench_file: BenchFile, clock: Clock) -> None:
             complaints = make_safe(bench, clock)
     except (InstrumentError, OSError) as error:
         complaints = (*complaints, str(error))
+    log.log(WARNING if complaints else INFO, "bench.made_safe", bench=bench_file.name, unconfirmed=list(complaints))
     if complaints:
         store.benches.mark(bench_file.name, "; ".join(complaints), clock.utc())
 
@@ -89,7 +94,7 @@ class CampaignRecovery:
         )
         self._store.benches.mark(self._bench.name, text, at)
         if self._store.campaigns.get(unwritten.campaign).state not in ENDED:
-            self._store.campaigns.close_unfinished(unwritten.campaign, unwritten.why, at)
+            self._close(unwritten.campaign, unwritten.why)
         self._unwritten = None
 
     def resume_newest(self, resume: Callable[[int], object], secure: Callable[[], None]) -> None:
@@ -104,7 +109,7 @@ class CampaignRecovery:
                 continue
             if resumed is not None:
                 text = f"not taken up: campaign {resumed} goes on here; then `labctl campaign resume {row.id}`"
-                self._store.campaigns.close_unfinished(row.id, text, self._make_clock().utc())
+                self._close(row.id, text)
                 continue
             why_not = retries_exhausted(self._store.resume_points.of_campaign(row.id))
             try:
@@ -117,5 +122,9 @@ class CampaignRecovery:
             except (LabctlError, InstrumentError) as error:
                 why_not = f"not taken up: {error}"
             secure()
-            self._store.campaigns.close_unfinished(row.id, why_not, self._make_clock().utc())
+            self._close(row.id, why_not)
         self._unfinished = False
+
+    def _close(self, campaign: int, why: str) -> None:
+        self._store.campaigns.close_unfinished(campaign, why, self._make_clock().utc())
+        log.warning("campaign.closed", campaign=campaign, bench=self._bench.name, reason=why)

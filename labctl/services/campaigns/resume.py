@@ -11,6 +11,7 @@ from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, VirtualClock
 from labctl.config import default_database
 from labctl.errors import Conflict
+from labctl.log import get_logger
 from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed
@@ -29,6 +30,8 @@ from procedures.execution.resume import Restart
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.planning.plan import Plan
 from procedures.recipe.recipe import Recipe
+
+log = get_logger()
 
 
 def plan_of(store: Store, row: CampaignRow) -> Plan:
@@ -93,7 +96,7 @@ def prepare_resume(
     reason = f"taken up by {request.by} after {gap_s:.0f} s unwatched; {power}{_other_drivers(row, bench_file)}"
     bench = opened or open_bench(bench_file, clock)
     try:
-        store.resume_points.take_up(campaign, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
+        _take_up(store, row, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
         if new_world and (position := plan.mounted_at(standing.start_at)):
             bench.unit_handler.mount(position)
     except BaseException:
@@ -109,6 +112,14 @@ def prepare_resume(
     return Prepared(
         campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, CampaignTime(clock, t_s)
     )
+
+
+def _take_up(store: Store, row: CampaignRow, standing: ResumePoint, how: TakeUp) -> None:
+    store.resume_points.take_up(row.id, standing, how)
+    log.info(
+        "campaign.taken_up", campaign=row.id, bench=row.bench_name, step=standing.start_at + 1, reason=how.reason,
+        was=row.state, units=sorted(row.recordings),
+    )  # fmt: skip
 
 
 def _other_drivers(row: CampaignRow, bench_file: BenchFile) -> str:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from datetime import datetime
 
 from labctl.errors import Conflict
+from labctl.log import get_logger
 from labctl.services.benches.lease import described, driver_of
 from labctl.services.campaigns.status import ENDED, campaign_status, outlives_its_process
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
+
+log = get_logger()
 
 #: States in which the bench may move or be hot; an interrupted campaign had its safe state.
 UNDER_WAY = frozenset({"running", "paused", "waiting"})
@@ -34,6 +37,7 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
         store.benches.mark(row.bench_name, text, at)
         said += f". Nobody has made bench {row.bench_name} safe: look at it, then `labctl bench clear`"
     store.campaigns.close_unfinished(campaign, said, at, "aborted")
+    log.warning("campaign.closed", campaign=campaign, bench=row.bench_name, reason=said)
     return campaign_status(store, campaign)
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import threading
 from contextvars import copy_context
 
+from labctl.acting_user import actor
 from labctl.errors import Conflict, StoreError
+from labctl.log import get_logger
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.unattended import abort_abandoned, not_running, record_action
 from labctl.services.commands.context import CommandContext
@@ -13,6 +15,8 @@ from labctl.services.commands.requests import CampaignResume, CampaignStart, ToC
 from labctl.services.schedule import queue
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
+
+log = get_logger()
 
 NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`"
 
@@ -97,4 +101,5 @@ class ServiceControl:
 
     @staticmethod
     def _record(context: CommandContext, action: str, campaign: int, reason: str) -> None:
+        log.info("campaign.asked", campaign=campaign, act=action, reason=reason, by=actor().name)
         record_action(context.store, context.now(), action, campaign, reason)

@@ -9,14 +9,18 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
 from typing import Any
 
 from instruments.clock import Clock
-from labctl.errors import ComputationEnded
+from labctl.errors import ComputationEnded, LabctlError
+from labctl.log import get_logger
+from labctl.log.context import for_request
+from labctl.log.rendering import error_fields
 from labctl.progress import Cancelled
 from labctl.services.computation.in_threads import result_here
 from labctl.services.computation.job import Job
@@ -24,6 +28,8 @@ from labctl.services.computation.limits import Limits
 from labctl.services.computation.pool import ENDS, Pool
 from labctl.services.computation.worker import Outcome, Stage, Task, carry_out
 from labctl.store import Store, StoreAddress
+
+log = get_logger()
 
 #: `multiprocessing` looks after all processes whenever one is started: not from two threads at a time.
 _processes = threading.Lock()
@@ -75,13 +81,33 @@ class InWorkers(Pool):
                 worker.start()
             self._workers[job] = worker
             job.end_with(worker.kill)
-            try:
-                if self._closed:
-                    raise ComputationEnded(ENDS)
-                return self._heard(job, worker, receiving)
-            finally:
-                self._workers.pop(job, None)
-                self._leave_nothing(worker)
+            with for_request(job.request_id), self._logged(job, worker):
+                try:
+                    if self._closed:
+                        raise ComputationEnded(ENDS)
+                    return self._heard(job, worker, receiving)
+                finally:
+                    self._workers.pop(job, None)
+                    self._leave_nothing(worker)
+
+    @contextmanager
+    def _logged(self, job: Job, worker: ForkServerProcess) -> Iterator[None]:
+        """Log the start and the end of a worker, which is killed when it has said what came of its work."""
+        begun_s, about = self._clock.now_s(), {"worker": worker.pid, "work": job.call.work.__name__}
+        log.info("worker.started", **about, by=job.actor.name)
+        try:
+            yield
+        except Cancelled:
+            log.info("worker.ended", **about, took_s=round(self._clock.now_s() - begun_s, 2), outcome="cancelled")
+            raise
+        except LabctlError as error:
+            told = error_fields(error)
+            log.warning("worker.ended", **about, took_s=round(self._clock.now_s() - begun_s, 2), **told)
+            raise
+        except Exception as error:
+            log.error("worker.failed", **about, took_s=round(self._clock.now_s() - begun_s, 2), exc_info=error)
+            raise
+        log.info("worker.ended", **about, took_s=round(self._clock.now_s() - begun_s, 2), outcome="done")
 
     def _heard(self, job: Job, worker: ForkServerProcess, receiving: Connection) -> Any:
         """Return what a worker sends in the end; its stages are reported on the way."""

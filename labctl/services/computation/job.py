@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from labctl.acting_user import actor
+from labctl.log.context import request_id
 from labctl.progress import Cancelled, Progress
 from labctl.store import Store
 
@@ -33,7 +34,7 @@ class Job:
 
     def __init__(self, call: Call, key: str, *, writes: bool) -> None:
         self.call, self.key, self.writes = call, key, writes
-        self.actor = actor()
+        self.actor, self.request_id = actor(), request_id()
         self.future: Future[Any] = Future()
         self.future.set_running_or_notify_cancel()  # nobody who waits for it can cancel it for all
         self._guard = threading.Lock()

@@ -15,10 +15,13 @@ from typing import Protocol
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
 from labctl.errors import BenchBusy, LabctlError
+from labctl.log import get_logger
 from labctl.services.schedule import times
 from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest, CampaignResponse
 from labctl.store import StartEventRow, StartRow, Store
 from procedures.contracts.errors import ProcedureError
+
+log = get_logger()
 
 POLL_S = 1.0
 #: A start within this is on time: the schedule is looked at once a second, and a service takes a while to start.
@@ -74,9 +77,17 @@ class Scheduler:
         while not self._over.wait(self._clock.wall_s(POLL_S)):
             try:
                 self.tick()
-                self.trouble = ""
+                self._note_trouble("")
             except Exception as error:  # noqa: BLE001  a schedule that nobody looks at any more would be worse
-                self.trouble = f"{type(error).__name__}: {error}"
+                self._note_trouble(f"{type(error).__name__}: {error}", error)
+
+    def _note_trouble(self, trouble: str, error: Exception | None = None) -> None:
+        """Show why the schedule could not be looked at, and log that it changed."""
+        if trouble != self.trouble and error is not None:
+            log.error("schedule.trouble", bench=self._bench, error=trouble, exc_info=error)
+        elif trouble != self.trouble:
+            log.info("schedule.well", bench=self._bench)
+        self.trouble = trouble
 
     def settle(self) -> None:
         """Conclude what an earlier process claimed: begun if a campaign came of it, else due again."""
@@ -109,6 +120,7 @@ class Scheduler:
                 if row.late_limit_s is not None and late_s > max(row.late_limit_s, GRACE_S):
                     message = f"missed: {_span(late_s)} late, the limit is {_span(row.late_limit_s)}"
                     self._store.starts.take(row, due, self._next(row, now), now, "missed", message)
+                    log.warning("schedule.missed", bench=self._bench, start=row.id, recipe=row.recipe, reason=message)
                 elif self._runner.free and self.attended():
                     self._begin(row, due, now)
 
@@ -140,6 +152,7 @@ class Scheduler:
             starts.put_back(claim)
         except (LabctlError, InstrumentError, ProcedureError) as error:
             starts.conclude(claim, self._clock.utc(), "refused", str(error))
+            log.error("schedule.refused", bench=self._bench, start=row.id, recipe=row.recipe, reason=str(error))
         except Exception as error:
             starts.conclude(claim, self._clock.utc(), "refused", f"{type(error).__name__}: {error}")
             raise
@@ -147,6 +160,8 @@ class Scheduler:
             late = now - due
             text = f", {_span(late.total_seconds())} late" if late > timedelta(seconds=GRACE_S) else ""
             starts.conclude(claim, self._clock.utc(), "started", f"campaign {campaign} began{text}", campaign)
+            late_s = round(late.total_seconds())
+            log.info("schedule.started", bench=self._bench, start=row.id, campaign=campaign, late_s=late_s)
 
 
 def _request(row: StartRow) -> CampaignRequest:

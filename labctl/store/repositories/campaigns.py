@@ -155,10 +155,12 @@ class Campaigns:
             raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows them")
         return str(found)
 
-    def states(self) -> list[str]:
-        """Return the state of every campaign."""
+    def count_by_state(self) -> dict[str, int]:
+        """Return how many campaigns there are in each state that has any."""
+        state = tables.campaigns.c.state
         with self._database.reading() as connection:
-            return list(connection.scalars(sa.select(tables.campaigns.c.state)))
+            rows = connection.execute(sa.select(state, sa.func.count()).group_by(state))
+            return {str(name): int(count) for name, count in rows}
 
     def steps(self, campaign: int) -> list[StepRow]:
         """Return the whole plan with what became of each step."""

@@ -58,6 +58,11 @@ class Units:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign brings one in")
         return Unit(*row)
 
+    def count(self) -> int:
+        """Return how many units there are."""
+        with self._database.reading() as connection:
+            return int(connection.scalar(sa.select(sa.func.count()).select_from(tables.units).where(SEEN)) or 0)
+
     def all(self) -> list[Unit]:
         """Return every unit, by serial number."""
         with self._database.reading() as connection:

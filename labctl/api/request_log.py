@@ -1,0 +1,99 @@
+"""A number for every request, in its answer and in every record that it leads to; and one record of its end.
+
+What acts is logged at INFO, what only reads at DEBUG: every open page asks once a second. What anybody can send as
+often as he likes is bounded in number, and what is held back is counted.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from instruments.clock import Clock, SystemClock
+from labctl.api.access_policy import role_needed
+from labctl.log import get_logger
+from labctl.log.context import begin_request, new_request_id
+from labctl.log.repetition import RepetitionLimit
+from labctl.services.schemas.admin import Role
+
+log = get_logger()
+
+REQUEST_ID = "X-Request-ID"
+#: Records in ten minutes: of requests that were done, and of those that were refused, by status.
+MOST_DONE, MOST_REFUSED = 300, 30
+LONGEST_PATH = 200
+
+
+@dataclass
+class RequestFigures:
+    """How many requests ended, by method and status; one status for each hundred."""
+
+    ended: Counter[tuple[str, str]] = field(default_factory=Counter)
+    held_back: int = 0  #: records that were not written, as there were enough of their kind
+
+
+#: Methods that are counted by name; a client may invent others.
+METHODS = frozenset({"GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE"})
+
+
+class RequestLogMiddleware:
+    """The outermost part of the application."""
+
+    def __init__(self, app: ASGIApp, figures: RequestFigures, clock: Clock | None = None) -> None:
+        self._app, self._figures, self._clock = app, figures, clock or SystemClock()
+        self._done, self._refused = RepetitionLimit(MOST_DONE), RepetitionLimit(MOST_REFUSED)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, and say how it ended."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        number = new_request_id(Headers(scope=scope).get(REQUEST_ID, ""))
+        begin_request(number)
+        status, begun_s = 0, self._clock.now_s()
+
+        async def numbered(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                MutableHeaders(scope=message)[REQUEST_ID] = number
+            await send(message)
+
+        try:
+            await self._app(scope, receive, numbered)
+        except Exception as error:  # the server logs it with its traceback, and with this request's number
+            self._ended(scope, 500, begun_s, error=type(error).__name__)
+            raise
+        self._ended(scope, status, begun_s)
+
+    def _ended(self, scope: Scope, status: int, begun_s: float, **told: Any) -> None:
+        method = scope["method"] if scope["method"] in METHODS else "other"
+        self._figures.ended[method, f"{status // 100}xx" if status else "none"] += 1
+        level, limit = self._level_of(scope, status)
+        key = status if status >= 400 else 0
+        if limit is not None and not limit.admits(key):
+            self._figures.held_back += 1
+            return
+        if limit is not None and (before := limit.take_count(key)):
+            told["held_back"] = before
+        caller = scope.get("state", {}).get("caller")
+        if caller is not None:
+            told = {"by": caller.name, "via": caller.via, **told}
+        client = scope.get("client")
+        log.log(
+            level, "request.ended", method=method, path=scope["path"][:LONGEST_PATH], status=status,
+            took_s=round(self._clock.now_s() - begun_s, 3), client=client[0] if client else None, **told,
+        )  # fmt: skip
+
+    def _level_of(self, scope: Scope, status: int) -> tuple[int, RepetitionLimit | None]:
+        """Return the level of a request's record, and the bound on records of its kind."""
+        if status >= 400:
+            return (logging.ERROR if status >= 500 else logging.INFO), self._refused
+        if role_needed(scope["method"], scope["path"]) is Role.VIEWER:
+            return logging.DEBUG, None
+        return logging.INFO, self._done

@@ -1,0 +1,46 @@
+"""What the records of a thread or task have in common: the request that they belong to, and the campaign."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from structlog.contextvars import bind_contextvars, bound_contextvars, clear_contextvars, get_contextvars
+
+#: A number that a client gives its request is taken over if it is one word.
+_GIVEN = re.compile(r"[A-Za-z0-9._-]{1,64}")
+
+
+def new_request_id(given: str = "") -> str:
+    """Return the number of a request: the one that it came with, else a new one."""
+    return given if _GIVEN.fullmatch(given) else secrets.token_hex(8)
+
+
+def request_id() -> str:
+    """Return the request that this thread or task works for; empty for none."""
+    return str(get_contextvars().get("request_id", ""))
+
+
+def begin_request(number: str) -> None:
+    """Let this task work for a request, and nothing else, to its end."""
+    clear_contextvars()
+    bind_contextvars(request_id=number)
+
+
+@contextmanager
+def for_request(number: str) -> Iterator[None]:
+    """Work for a request of another process while the block runs; for none where the number is empty."""
+    if not number:
+        yield
+        return
+    with bound_contextvars(request_id=number):
+        yield
+
+
+@contextmanager
+def for_campaign(campaign: int, bench: str) -> Iterator[None]:
+    """Let every record of this thread name a campaign and its bench while the block runs."""
+    with bound_contextvars(campaign=campaign, bench=bench):
+        yield

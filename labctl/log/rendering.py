@@ -1,0 +1,77 @@
+"""From the fields of a record to its line: JSON for programs, words in columns for a person at a terminal."""
+
+from __future__ import annotations
+
+import os
+import traceback
+from collections.abc import Mapping, MutableMapping
+from typing import Any
+
+import structlog
+from structlog.typing import Processor
+
+from labctl.log.redaction import Redaction
+
+Fields = MutableMapping[str, Any]
+#: In this order at the beginning of a line.
+FIRST = ("timestamp", "level", "event", "process")
+#: What a terminal could obey: control characters, and those that turn the direction of a text.
+_CONTROLS = {
+    code: f"\\x{code:02x}"
+    for code in (*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+}
+
+
+class Rendering:
+    """The last of structlog's processors, for labctl's own records and those of other libraries. Raises nothing."""
+
+    def __init__(self, process: str, redaction: Redaction, *, for_a_person: bool, colors: bool = False) -> None:
+        self._process = {"process": process, "pid": os.getpid()}
+        self._redaction = redaction
+        self._for_a_person = for_a_person
+        self._time = structlog.processors.TimeStamper(fmt="iso", utc=not for_a_person)
+        self._last: Processor = structlog.processors.JSONRenderer()
+        if for_a_person:
+            self._last = structlog.dev.ConsoleRenderer(
+                colors=colors, exception_formatter=structlog.dev.plain_traceback, pad_event_to=20, sort_keys=False
+            )
+
+    def __call__(self, logger: Any, method: str, fields: Fields) -> str:
+        """Return the line of a record."""
+        try:
+            return self._line(logger, method, fields)
+        except Exception as error:  # noqa: BLE001  a record that cannot be written must stop nobody
+            text = f"{type(error).__name__} in a record of {fields.get('event')!r:.100}"
+            return str(self._last(logger, "error", {"event": "log.unreadable", "level": "error", "error": text}))
+
+    def _line(self, logger: Any, method: str, fields: Fields) -> str:
+        chain = (
+            structlog.contextvars.merge_contextvars, structlog.processors.add_log_level, self._time,
+            structlog.processors.format_exc_info,
+        )  # fmt: skip
+        found: Any = {**self._process, **fields}
+        for each in chain:
+            found = each(logger, method, found)
+        if found["level"] == "warn":
+            found["level"] = "warning"
+        clean = self._redaction.fields(found)
+        ordered = {name: clean.pop(name) for name in FIRST if name in clean} | clean
+        return str(self._last(logger, method, self._shown(ordered) if self._for_a_person else ordered))
+
+    def _shown(self, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the fields for a terminal: the time of day alone, and nothing that it obeys."""
+        shown = {
+            name: value.translate(_CONTROLS) if isinstance(value, str) and name != "exception" else value
+            for name, value in fields.items()
+        }
+        return {**shown, "timestamp": str(shown["timestamp"])[11:19]}
+
+
+def error_fields(error: BaseException) -> dict[str, Any]:
+    """Return what a record says of an error that is expected, without its traceback."""
+    return {"error": str(error) or type(error).__name__, "error_type": type(error).__name__}
+
+
+def traceback_of(error: BaseException) -> str:
+    """Return the traceback of an error as text."""
+    return "".join(traceback.format_exception(error))
