@@ -66,7 +66,7 @@ class DataRefused(BadInput):
     status = 422
     slug = "data-refused"
 
-    def __init__(self, text: str, warnings: Sequence[Mapping[str, Any]] = ()) -> None:
+    def __init__(self, text: str, warnings: Sequence[Mapping[str, object]] = ()) -> None:
         super().__init__(text)
         self.warnings = list(warnings)
 

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
+from labctl.json_types.models import KeptAnswer
+from procedures.contracts.campaign_state import CampaignState
+
 
 @dataclass(frozen=True)
 class Unit:
@@ -83,7 +86,7 @@ class CampaignRow:
     bench: Mapping[str, Any]
     schedule_hash: str
     expected_s: float
-    state: str
+    state: CampaignState
     reason: str
     created_at: datetime
     started_at: datetime | None
@@ -134,7 +137,7 @@ class CalibrationRecord:
     created_at: datetime
     hash: str
     document: bytes
-    answer: Mapping[str, Any]  #: what `labctl fit --json` said
+    answer: KeptAnswer  #: what `labctl fit --json` said
 
 
 @dataclass(frozen=True)

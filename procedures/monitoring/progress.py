@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from instruments.clock import Clock
-from procedures.contracts.journal import CampaignState
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.operator import Prompt
 from procedures.monitoring.live_output import LiveOutput
 from procedures.monitoring.step_text import describe_step

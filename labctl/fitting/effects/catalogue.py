@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
 
 from labctl.errors import BadInput
 from labctl.fitting.effects import (
@@ -22,6 +21,7 @@ from labctl.fitting.effects import (
 )
 from labctl.fitting.effects.base import Effect, Term
 from labctl.fitting.effects.formula import Formula
+from labctl.json_types.effects import EffectJson
 
 FAMILIES = (
     bias,
@@ -69,7 +69,7 @@ def parse_term(text: str) -> Term:
     return Term(found.id, int(order_text))
 
 
-def describe_effects() -> list[dict[str, Any]]:
+def describe_effects() -> list[EffectJson]:
     """Return the catalogue as JSON, one record per effect."""
     return [
         {

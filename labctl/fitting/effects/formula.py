@@ -19,8 +19,9 @@ import numpy as np
 from instruments.toml_documents import read_toml
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Span, Term
+from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Span, Term
 from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.models import Origin
 
 OPERATORS: Mapping[type, Callable[..., Any]] = {
     ast.Add: operator.add,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -13,9 +12,10 @@ import pyarrow.parquet as pq
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
 from labctl.recording.data_files import read_table
+from labctl.services.schemas.compensation import CompensationResponse
 
 
-def compensate_file(calibration: Path, source: Path, target: Path, outside: str) -> dict[str, Any]:
+def compensate_file(calibration: Path, source: Path, target: Path, outside: str) -> CompensationResponse:
     """Write `source` with a corrected rate per axis and a flag; returns how many rows, and how many lay outside.
 
     Raises BadCalibrationFile, BadRecording, BadInput.
@@ -43,4 +43,4 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
         pq.write_table(table, target)
     else:
         pacsv.write_csv(table, target)
-    return {"rows": len(raw), "outside": int(corrected.outside.sum()), "file": str(target)}
+    return CompensationResponse(rows=len(raw), outside=int(corrected.outside.sum()), file=str(target))

@@ -5,12 +5,10 @@ from __future__ import annotations
 from datetime import datetime
 
 from labctl.errors import Conflict
-from labctl.services.campaigns.status import ENDED, campaign_status, outlives_its_process
+from labctl.services.campaigns.status import campaign_status, outlives_its_process
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
-
-#: States in which the bench may move or be hot; an interrupted campaign had its safe state.
-UNDER_WAY = frozenset({"running", "paused", "waiting"})
+from procedures.contracts.campaign_state import ENDED, UNDER_WAY, CampaignState
 
 
 def record_action(store: Store, at: datetime, action: str, campaign: int, reason: str) -> None:
@@ -30,7 +28,7 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
         text = f"the process that ran campaign {campaign} ended before it could make the bench safe"
         store.benches.mark(row.bench_name, text, at)
         said += f". Nobody has made bench {row.bench_name} safe: look at it, then `labctl bench clear`"
-    store.campaigns.close_unfinished(campaign, said, at, "aborted")
+    store.campaigns.close_unfinished(campaign, said, at, CampaignState.ABORTED)
     return campaign_status(store, campaign)
 
 

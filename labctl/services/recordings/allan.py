@@ -32,12 +32,16 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanRespon
 
     def work() -> AllanResponse:
         if dataset is None:
-            return AllanResponse(recording=recording, **_at_rest(store, recording, info).to_json())
+            return _response(recording, _at_rest(store, recording, info))
         columns = store.recordings.dataset(recording, dataset)
-        return AllanResponse(recording=recording, **_of_set(Recording(info, columns), dataset).to_json())
+        return _response(recording, _of_set(Recording(info, columns), dataset))
 
     question = {"recording": recording, "readings": store.recordings.fingerprint(recording), "dataset": dataset}
     return cached(AllanResponse, question, work)
+
+
+def _response(recording: int, found: StaticRecord) -> AllanResponse:
+    return AllanResponse.model_validate({"recording": recording, **found.to_json()}, extra="forbid")
 
 
 def _of_set(recording: Recording, dataset: int) -> StaticRecord:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import sqlalchemy as sa
 
 from labctl.errors import Conflict, NotCertified, NotFound, VersionTaken
+from labctl.json_types.models import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
@@ -85,7 +86,7 @@ class NewCalibration:
     model: str
     document: bytes
     hash: str
-    answer: dict[str, Any]
+    answer: KeptAnswer
 
 
 class Calibrations:

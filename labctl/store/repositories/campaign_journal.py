@@ -23,21 +23,13 @@ from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.sample_blocks import blocks_of, scaled, write_block
 from labctl.store.schema import tables
-from procedures.contracts.journal import (
-    NOT_SAFE,
-    CampaignState,
-    DataSetHeader,
-    DataSetState,
-    EnvironmentSample,
-    Event,
-)
+from procedures.contracts.campaign_state import ENDED, CampaignState
+from procedures.contracts.journal import NOT_SAFE, DataSetHeader, DataSetState, EnvironmentSample, Event
 from procedures.contracts.steps import StepResult
 from procedures.execution.signals import defer_signals
 
 #: Made once: a statement that is built anew for every second of a campaign costs more than writing it.
 _ADD_ENVIRONMENT = sa.insert(tables.environment)
-
-ENDED = frozenset({CampaignState.DONE, CampaignState.ABORTED, CampaignState.FAILED})
 
 
 class StoreJournal:
@@ -64,7 +56,7 @@ class StoreJournal:
 
     def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:
         """Record a change of state and why, as the campaign's state and as an event."""
-        values: dict[str, Any] = {"state": state.value, "reason": reason}
+        values: dict[str, Any] = {"state": state, "reason": reason}
         if state is CampaignState.RUNNING:
             values["started_at"] = sa.func.coalesce(
                 tables.campaigns.c.started_at, sa.bindparam("at", at, tables.Instant)
@@ -78,7 +70,7 @@ class StoreJournal:
                 sa.update(tables.campaigns).where(tables.campaigns.c.id == self._campaign).values(**values)
             )
             self._add_event(connection, Event("state", message, level), t_s, at)
-            change = {"state": state.value, "reason": reason}
+            change = {"state": state, "reason": reason}
             append(connection, at, "campaign state", f"campaign {self._campaign}", change)
 
     def step_started(self, index: int, t_s: float, at: datetime) -> None:

@@ -19,6 +19,7 @@ from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
 from labctl.store.repositories.recording_writer import new_recording
 from labctl.store.schema import tables
+from procedures.contracts.campaign_state import UNFINISHED, CampaignState
 
 #: Kind of the event that says who confirmed that the bench is clear.
 BENCH_CLEAR = "operator.bench_clear"
@@ -145,15 +146,15 @@ class Campaigns:
             recordings.setdefault(campaign, {})[serial] = recording
         return [CampaignRow(**row, recordings=recordings.get(row["id"], {})) for row in rows]
 
-    def state(self, campaign: int) -> str:
+    def state(self, campaign: int) -> CampaignState:
         """Return the state of one campaign; raises NotFound."""
         with self._database.reading() as connection:
             found = connection.scalar(sa.select(tables.campaigns.c.state).where(tables.campaigns.c.id == campaign))
         if found is None:
             raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows them")
-        return str(found)
+        return found
 
-    def states(self) -> list[str]:
+    def states(self) -> list[CampaignState]:
         """Return the state of every campaign."""
         with self._database.reading() as connection:
             return list(connection.scalars(sa.select(tables.campaigns.c.state)))
@@ -185,11 +186,15 @@ class Campaigns:
 
     def unfinished(self) -> list[CampaignRow]:
         """Return campaigns that a process left without an end."""
-        return self._rows(tables.campaigns.c.state.in_(("planned", "running", "paused", "waiting", "interrupted")))
+        return self._rows(tables.campaigns.c.state.in_(UNFINISHED))
 
     @transaction
     def close_unfinished(
-        self, campaign: int, reason: str, at: datetime, state: Literal["failed", "aborted"] = "failed"
+        self,
+        campaign: int,
+        reason: str,
+        at: datetime,
+        state: Literal[CampaignState.FAILED, CampaignState.ABORTED] = CampaignState.FAILED,
     ) -> None:
         """Mark a campaign that no process runs any more as over, with the reason."""
         with self._database.writing() as connection:
