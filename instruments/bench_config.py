@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -92,7 +92,7 @@ class GyroSettings(Strict):
     min_c: float = -40.0
     max_c: float = 85.0
     sample_rate_hz: float | None = None
-    options: dict[str, Any] = Field(default_factory=dict)  #: the driver's own settings, checked by the driver
+    options: dict[str, object] = Field(default_factory=dict)  #: the driver's own settings, checked by the driver
     datasheet: dict[str, float] = Field(default_factory=dict)
 
 
@@ -102,9 +102,9 @@ class SimulationSettings(Strict):
     seed: int = 1
     noise_seed: int = 0  #: another value measures the same units on another day
     latitude_deg: float | None = None  #: of the simulated world; default: the bench's
-    units: dict[str, dict[str, Any]] = Field(default_factory=dict)  #: gyro name -> profile and deviations from it
-    table: dict[str, Any] = Field(default_factory=dict)
-    chamber: dict[str, Any] = Field(default_factory=dict)
+    units: dict[str, dict[str, object]] = Field(default_factory=dict)  #: gyro name -> profile and deviations from it
+    table: dict[str, object] = Field(default_factory=dict)
+    chamber: dict[str, object] = Field(default_factory=dict)
     hidden: dict[str, float | str] = Field(default_factory=dict)  #: effect id -> size, hidden in every unit
     control: str | None = None  #: HOST:PORT of a simulator in another process, for its unit handler
     speed: float = Field(

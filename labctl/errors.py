@@ -29,7 +29,8 @@ LabctlError              exit 2, HTTP 400
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+
+from labctl.json_types import JsonObject
 
 
 class LabctlError(Exception):
@@ -40,7 +41,7 @@ class LabctlError(Exception):
     slug = "error"  #: last part of the problem document's `type`
 
     @property
-    def members(self) -> Mapping[str, Any]:
+    def members(self) -> JsonObject:
         """What the problem document has beside the members of every one, as JSON."""
         return {}
 
@@ -71,7 +72,7 @@ class DataRefused(BadInput):
         self.warnings = list(warnings)
 
     @property
-    def members(self) -> Mapping[str, Any]:
+    def members(self) -> JsonObject:
         """The warnings."""
         return {"warnings": self.warnings}
 
@@ -90,7 +91,7 @@ class StartNotConfirmed(BadInput):
         self.questions = dict(questions or {})
 
     @property
-    def members(self) -> Mapping[str, Any]:
+    def members(self) -> JsonObject:
         """The questions that are open."""
         return {"questions": self.questions}
 

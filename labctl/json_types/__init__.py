@@ -2,3 +2,12 @@
 
 A key that is `NotRequired` is left out, not null, where it says nothing. All numbers are finite; null: unknown.
 """
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+#: A document whose form is known to those who wrote it; who reads it checks it against a model.
+JsonObject = Mapping[str, object]
+
+__all__ = ["JsonObject"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +42,7 @@ class RemoteWriter:
         self._folder = folder
         self._caller = Caller(folder / CALLS, TRANSACTION_S)
 
-    def run(self, name: str, args: Any, kwargs: Any) -> Any:
+    def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction there; returns or raises what it did. Raises BenchSilent."""
         return self._caller.call(f"store.{name}", args, kwargs)
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
+from labctl.json_types import JsonObject
+from labctl.json_types.calibrations import JudgementDetail
 from labctl.json_types.models import KeptAnswer
+from labctl.json_types.recordings import RawChannelJson
+from labctl.json_types.steps import StepJson
 from procedures.contracts.campaign_state import CampaignState
 
 
@@ -26,8 +29,8 @@ class NewUnit:
     """A unit that a campaign is about to measure: how it is called on the bench, and what its recording will say."""
 
     gyro: str
-    info: Mapping[str, Any]  #: RecordingInfo as JSON
-    channels: tuple[Mapping[str, Any], ...]  #: name, unit, scale, offset of each raw channel
+    info: JsonObject  #: RecordingInfo as JSON
+    channels: tuple[RawChannelJson, ...]  #: name, unit, scale, offset of each raw channel
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class RecordingRow:
     campaign: int | None
     gyro: str | None
     kind: str
-    info: Mapping[str, Any]
+    info: JsonObject
     created_at: datetime
     datasets: int
     readings: int
@@ -81,9 +84,9 @@ class CampaignRow:
 
     id: int
     recipe_name: str
-    recipe: Mapping[str, Any]
+    recipe: JsonObject
     bench_name: str
-    bench: Mapping[str, Any]
+    bench: JsonObject
     schedule_hash: str
     expected_s: float
     state: CampaignState
@@ -100,12 +103,12 @@ class StepRow:
 
     number: int
     kind: str
-    body: Mapping[str, Any]
+    body: StepJson
     expected_s: float
     state: str
     started_s: float | None
     ended_s: float | None
-    result: Mapping[str, Any] | None
+    result: JsonObject | None
 
 
 @dataclass(frozen=True)
@@ -148,7 +151,7 @@ class Judgement:
     recording: int | None  #: of that criticism
     at: datetime | None  #: when that criticism was made
     override: bool  #: whether it was certified against objections
-    detail: Mapping[str, Any]  #: reason, text, error figures, objections
+    detail: JudgementDetail  #: reason, text, error figures, objections
 
 
 @dataclass(frozen=True)
@@ -174,7 +177,7 @@ class AuditRow:
     who: str
     action: str
     subject: str
-    detail: Mapping[str, Any]
+    detail: JsonObject
     hash: str
 
 

@@ -83,7 +83,7 @@ class ProgressTracker:
         """Update the forecast at the end of a step."""
         self._publish(self._forecast(self._left_after_s[index]))
 
-    def update(self, t_s: float | None = None, **changes: Any) -> None:
+    def update(self, t_s: float | None = None, **changes: object) -> None:
         """Change fields of the progress; with a campaign time the forecast is computed again too."""
         if t_s is not None:
             left_s = max(self._expected_s[self._index] - (t_s - self.step_began_s), 0.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,7 @@ class Covered:
 
 
 def covered_by(
-    table_rates_dps: tuple[Array, Array], position: NDArray[Any], temperature_c: Range, up_rate_dps: float = 0.0
+    table_rates_dps: tuple[Array, Array], position: NDArray[np.generic], temperature_c: Range, up_rate_dps: float = 0.0
 ) -> Covered:
     """Return what data sets with lowest and highest table rates, (m,) each, in positions (m,) cover.
 

@@ -18,7 +18,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 
 #: Logged columns by name, (n,) each.
-LoggedColumns = Mapping[str, NDArray[Any]]
+LoggedColumns = Mapping[str, NDArray[np.generic]]
 #: What an effect asks of a temperature course (k,) with one parameter, (k,).
 CourseFunction = Callable[[Array, float], Array]
 #: Spacing of a resampled temperature course, s.

@@ -11,7 +11,9 @@ import pyarrow.parquet as pq
 
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
+from labctl.fitting.numeric.arrays import Array
 from labctl.recording.data_files import read_table
+from labctl.recording.recording import Column
 from labctl.services.schemas.compensation import CompensationResponse
 
 
@@ -31,9 +33,9 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
     for name in (*(f"gyro_{axis}" for axis in compensator.axes), "temperature_c", *compensator.needs):
         if name not in columns:
             raise BadInput(f"{source}: column {name!r} is missing (the calibration is of axes {compensator.axes})")
-    raw = np.column_stack([columns[f"gyro_{axis}"] for axis in compensator.axes])
+    raw = np.column_stack([_floats(columns[f"gyro_{axis}"]) for axis in compensator.axes])
     corrected = compensator.compensate_output(
-        raw, columns["temperature_c"], {name: columns[name] for name in compensator.needs}
+        raw, _floats(columns["temperature_c"]), {name: _floats(columns[name]) for name in compensator.needs}
     )
     for index, axis in enumerate(compensator.axes):
         columns[f"rate_{axis}_dps"] = corrected.rate_dps[:, index]
@@ -44,3 +46,7 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
     else:
         pacsv.write_csv(table, target)
     return CompensationResponse(rows=len(raw), outside=int(corrected.outside.sum()), file=str(target))
+
+
+def _floats(column: Column) -> Array:
+    return np.asarray(column, dtype=np.float64)

@@ -11,10 +11,12 @@ from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
 from labctl.errors import BadInput, Conflict
+from labctl.json_types.recordings import RawChannelJson
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.services.benches.confirmation import describe_bench
 from labctl.services.benches.power_failure import boot_id
 from labctl.services.planning.loading import load_recipe
+from labctl.services.planning.timeline import step_json
 from labctl.store import NewCampaign, NewUnit, Store
 from labctl.store.sample_codec import load_compressor
 from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator
@@ -125,7 +127,7 @@ def prepare(
             bench=bench_file.model_dump(mode="json"),
             schedule_hash=plan.schedule_hash,
             expected_s=plan.expected_s,
-            steps=[step.model_dump(mode="json") for step in plan.steps],
+            steps=[step_json(step) for step in plan.steps],
             units=units,
             boot_id=boot_id(),
             bench_clear=bench_clear,
@@ -157,5 +159,7 @@ def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
         datasheet=dict(identity.datasheet),
         output={axis: OutputUnit.model_validate(dict(unit)) for axis, unit in identity.output.items()},
     )
-    channels = tuple({"name": c.name, "unit": c.unit, "scale": c.scale, "offset": c.offset} for c in gyro.channels)
+    channels: tuple[RawChannelJson, ...] = tuple(
+        {"name": c.name, "unit": c.unit, "scale": c.scale, "offset": c.offset} for c in gyro.channels
+    )
     return NewUnit(gyro.name, info.model_dump(mode="json"), channels)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -68,7 +66,7 @@ def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
     rows = store.recordings.data_sets(recording)
     still = [row.number for row in rows if row.state == "complete" and row.n and row.table_rate_dps == 0]
     names = (*NEEDED, *(f"gyro_{axis}" for axis in info.axes))
-    parts: list[dict[str, NDArray[Any]]] = []
+    parts: list[dict[str, NDArray[np.generic]]] = []
     for number in still:
         columns = store.recordings.dataset(recording, number)
         parts.append({name: columns[name] for name in names if name in columns})

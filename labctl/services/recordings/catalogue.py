@@ -92,8 +92,8 @@ def _of_table(numbers: list[int], points: Recording) -> dict[str, ChannelColumns
         if name in NO_CHANNEL or name.endswith("_std") or np.asarray(values).dtype.kind not in "fiu":
             continue
         spread = points.columns.get(f"{name}_std")
-        std = nothing if spread is None else _numbers(np.asarray(spread)[order])
-        found[name] = ChannelColumns(mean=_numbers(np.asarray(values)[order]), std=std)
+        std = nothing if spread is None else _numbers(np.asarray(spread, dtype=np.float64)[order])
+        found[name] = ChannelColumns(mean=_numbers(np.asarray(values, dtype=np.float64)[order]), std=std)
     return found
 
 

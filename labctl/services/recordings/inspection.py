@@ -46,8 +46,8 @@ def _response(summary: Summary, recording: Recording) -> RecordingInspection:
         dataset=summary["dataset"].tolist(),
         rate_low_dps=summary["rate_low_dps"].tolist(),
         rate_high_dps=summary["rate_high_dps"].tolist(),
-        temperature_low_c=_numbers(summary["temperature_low_c"]),
-        temperature_high_c=_numbers(summary["temperature_high_c"]),
+        temperature_low_c=_numbers(np.asarray(summary["temperature_low_c"], dtype=np.float64)),
+        temperature_high_c=_numbers(np.asarray(summary["temperature_high_c"], dtype=np.float64)),
         position=[str(position) for position in summary["position"]],
         quantisation_dps={axis: u.tolist() for axis, (step, u) in coarse.items() if step is not None},
     )

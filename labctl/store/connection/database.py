@@ -6,10 +6,10 @@ process writes; `writer_lock` enforces it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import sqlalchemy as sa
 from sqlalchemy.exc import DatabaseError
@@ -32,7 +32,7 @@ SQLITE_FULL, POSTGRESQL_DISK_FULL = 13, "53100"
 class Writer(Protocol):
     """The process that writes, as another one reaches it."""
 
-    def run(self, name: str, args: Any, kwargs: Any) -> Any:
+    def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run the transaction of this name there; returns or raises what it did."""
         ...
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import sqlalchemy as sa
 
 from labctl.errors import Conflict, NotCertified, NotFound, VersionTaken
+from labctl.json_types.calibrations import JudgementDetail
 from labctl.json_types.models import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
@@ -44,7 +45,7 @@ _ACTS = _acts_query()
 def _act(row: sa.Row[Any]) -> CertificationRow:
     known = None
     if row.override is not None:
-        detail = row.assessment or {}
+        detail: JudgementDetail = row.assessment or JudgementDetail()
         known = Judgement(row.verdict, row.verdict_recording, row.verdict_at, bool(row.override), detail)
     return CertificationRow(row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, known)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import sqlalchemy as sa
@@ -21,7 +21,7 @@ from labctl.store.connection.database import Database
 from labctl.store.dataset_statistics import means_rows
 from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.sample_blocks import blocks_of, scaled, write_block
+from labctl.store.repositories.sample_blocks import DataSetHead, blocks_of, scaled, write_block
 from labctl.store.schema import tables
 from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.journal import NOT_SAFE, DataSetHeader, DataSetState, EnvironmentSample, Event
@@ -47,7 +47,7 @@ class StoreJournal:
         self._recordings = {gyro: recording for gyro, recording, _ in rows}
         self._channels = {gyro: channels for gyro, _, channels in rows}
         #: What the open data sets' blocks hold, so that closing one need not read it back.
-        self._open: dict[tuple[int, str], list[dict[str, NDArray[Any]]]] = {}
+        self._open: dict[tuple[int, str], list[dict[str, NDArray[np.generic]]]] = {}
 
     @contextmanager
     def _writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
@@ -168,7 +168,7 @@ class StoreJournal:
 
     def _raw_of(
         self, connection: sa.Connection, gyro: str, recording: int, dataset: int
-    ) -> dict[str, NDArray[Any]] | None:
+    ) -> dict[str, NDArray[np.generic]] | None:
         """Return a data set's readings as the device sent them; None when there are none."""
         parts = self._open.pop((dataset, gyro), None) or blocks_of(connection, recording, dataset)
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else None
@@ -181,7 +181,7 @@ class StoreJournal:
         dataset: int,
         state: DataSetState,
         reason: str,
-        raw: dict[str, NDArray[Any]] | None,
+        raw: dict[str, NDArray[np.generic]] | None,
     ) -> None:
         d, b = tables.data_sets, tables.sample_blocks
         this = (d.c.recording_id == recording, d.c.number == dataset)
@@ -190,7 +190,9 @@ class StoreJournal:
             valid = raw["valid"] != 0
             n = int(valid.sum())
             head = connection.execute(sa.select(d).where(*this)).mappings().one()
-            means = means_rows(recording, dataset, scaled(raw, self._channels[gyro], dict(head)), valid)
+            means = means_rows(
+                recording, dataset, scaled(raw, self._channels[gyro], cast(DataSetHead, dict(head))), valid
+            )
             connection.execute(sa.insert(tables.data_set_means), means)
             connection.execute(sa.delete(b).where(b.c.recording_id == recording, b.c.number == dataset))
             write_block(connection, recording, dataset, 0, sample_codec.pack(raw, sample_codec.FINAL))
@@ -240,7 +242,7 @@ class StoreJournal:
         )
 
 
-def _columns(readings: Readings, chamber_c: float) -> dict[str, NDArray[Any]]:
+def _columns(readings: Readings, chamber_c: float) -> dict[str, NDArray[np.generic]]:
     return {
         "t_ns": np.rint(readings.t_s * 1e9).astype(np.int64),
         **readings.raw,

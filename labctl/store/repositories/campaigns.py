@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Literal
+from typing import Literal
 
 import sqlalchemy as sa
 
 from labctl.errors import NotFound
+from labctl.json_types import JsonObject
+from labctl.json_types.steps import StepJson
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
@@ -30,12 +32,12 @@ class NewCampaign:
     """What a campaign starts from."""
 
     recipe_name: str
-    recipe: Mapping[str, Any]
+    recipe: JsonObject
     bench_name: str
-    bench: Mapping[str, Any]
+    bench: JsonObject
     schedule_hash: str
     expected_s: float
-    steps: Sequence[Mapping[str, Any]]  #: JSON of every step, in order; `kind` and `expected_s` among the keys
+    steps: Sequence[StepJson]  #: JSON of every step, in order; `kind` and `expected_s` among the keys
     units: Sequence[NewUnit]
     boot_id: str | None = None  #: of the host that runs it
     bench_clear: str = ""  #: what a person has confirmed about the bench before the start, and who
@@ -87,13 +89,14 @@ class Campaigns:
             for unit in new.units:
                 info = RecordingInfo.model_validate(unit.info)
                 new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
-            what: dict[str, Any] = {
+            what: dict[str, object] = {
                 "recipe": new.recipe_name,
                 "bench": new.bench_name,
                 "units": [str(unit.info["serial"]) for unit in new.units],
                 "schedule_hash": new.schedule_hash,
             }
-            if hidden := (new.bench.get("simulation") or {}).get("hidden"):
+            simulation = new.bench.get("simulation")
+            if isinstance(simulation, Mapping) and (hidden := simulation.get("hidden")):
                 what["hidden"] = hidden
             if new.bench_clear:
                 what["bench_clear"] = new.bench_clear

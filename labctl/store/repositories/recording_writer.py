@@ -7,7 +7,6 @@ under the mark is seen by no reading method; what a killed process left is disca
 from __future__ import annotations
 
 import secrets
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -16,6 +15,8 @@ from typing import Any
 import sqlalchemy as sa
 
 from labctl.errors import Conflict
+from labctl.json_types import JsonObject
+from labctl.json_types.recordings import RawChannelJson
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
@@ -43,7 +44,7 @@ def new_recording(
     *,
     campaign: int | None = None,
     gyro: str | None = None,
-    channels: tuple[Mapping[str, Any], ...] = (),
+    channels: tuple[RawChannelJson, ...] = (),
 ) -> int:
     """Make the row of a recording, and of its unit where that is new; returns the recording's number."""
     remember_unit(connection, info.serial, info.model, info.technology, at)
@@ -83,7 +84,7 @@ class Imports:
                     connection.execute(sa.insert(tables.metadata.tables[name]), rows)
 
     @transaction
-    def finish(self, ticket: ImportTicket, at: datetime, action: str, detail: Mapping[str, Any]) -> int:
+    def finish(self, ticket: ImportTicket, at: datetime, action: str, detail: JsonObject) -> int:
         """Take the mark away and write the audit row; returns the recording's number. Raises Conflict as `add_part`."""
         r = tables.recordings
         with self._database.writing() as connection:
