@@ -12,7 +12,7 @@ from datetime import datetime
 from functools import cached_property
 from importlib.metadata import version as package_version
 from pathlib import Path
-from typing import get_args
+from typing import cast, get_args
 
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
@@ -141,6 +141,7 @@ def build_calibration(
             "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' "
             "subtracts it as a function of that rate, 'rate' solves rate = true + error(true) for the true rate"
         ),
+        "hash": "",
     }
     document["hash"] = hash_of(document)
     return Calibration(document)
@@ -179,7 +180,7 @@ def read_calibration(source: Path | bytes) -> Calibration:
             f"{name}: was edited or damaged: its hash is {found[:16]}…, it says {str(written)[:16]}…; fetch it again "
             "with `labctl calibration`"
         )
-    return Calibration(document)
+    return Calibration(cast(CalibrationJson, document))
 
 
 def _content(path: Path) -> bytes:

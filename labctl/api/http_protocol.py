@@ -153,7 +153,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
             raise _Refused
         self._understood = True
         self._enter(Phase.BODY)
-        self.scope["state"][RESERVED] = self.table.on_reserve(self)
+        self.scope.setdefault("state", {})[RESERVED] = self.table.on_reserve(self)
         super().on_headers_complete()
 
     def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:

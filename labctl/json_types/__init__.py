@@ -7,7 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from pydantic import JsonValue
+
 #: A document whose form is known to those who wrote it; who reads it checks it against a model.
 JsonObject = Mapping[str, object]
 
-__all__ = ["JsonObject"]
+#: The same, whose values were read from JSON.
+JsonDocument = Mapping[str, JsonValue]
+
+__all__ = ["JsonDocument", "JsonObject"]

@@ -74,7 +74,7 @@ class CalibrationJson(TypedDict):
     use: NotRequired[dict[str, AxisEvidenceJson]]
     provenance: dict[str, object]
     how_to_use: str
-    hash: NotRequired[str]
+    hash: str
 
 
 class ObjectionJson(TypedDict):

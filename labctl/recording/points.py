@@ -104,9 +104,10 @@ def to_points(recording: Recording) -> Recording:
         if name in FIRST or values.dtype.kind not in "fiu":
             points[name] = values[starts]
         elif name == "t_s":
-            ends = values[starts + counts - 1]
-            points[name] = (values[starts] + ends) / 2
-            points["duration_s"] = (ends - values[starts]) * counts / np.maximum(counts - 1, 1)
+            t_s = np.asarray(values, dtype=np.float64)
+            ends = t_s[starts + counts - 1]
+            points[name] = (t_s[starts] + ends) / 2
+            points["duration_s"] = (ends - t_s[starts]) * counts / np.maximum(counts - 1, 1)
         else:
             points[name], spread = _mean_and_std(values.astype(np.float64), starts, counts)
             if name.startswith("gyro_"):

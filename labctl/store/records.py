@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Literal
 
-from labctl.json_types import JsonObject
+from labctl.json_types import JsonDocument, JsonObject
 from labctl.json_types.calibrations import JudgementDetail
 from labctl.json_types.models import KeptAnswer
 from labctl.json_types.recordings import RawChannelJson
@@ -29,7 +30,7 @@ class NewUnit:
     """A unit that a campaign is about to measure: how it is called on the bench, and what its recording will say."""
 
     gyro: str
-    info: JsonObject  #: RecordingInfo as JSON
+    info: JsonDocument  #: RecordingInfo as JSON
     channels: tuple[RawChannelJson, ...]  #: name, unit, scale, offset of each raw channel
 
 
@@ -42,7 +43,7 @@ class RecordingRow:
     campaign: int | None
     gyro: str | None
     kind: str
-    info: JsonObject
+    info: JsonDocument
     created_at: datetime
     datasets: int
     readings: int
@@ -120,7 +121,7 @@ class EventRow:
     at: datetime
     t_s: float
     kind: str
-    level: str
+    level: Literal["info", "warning", "error"]
     message: str
     device: str | None
     value: float | None
@@ -177,7 +178,7 @@ class AuditRow:
     who: str
     action: str
     subject: str
-    detail: JsonObject
+    detail: JsonDocument
     hash: str
 
 

@@ -126,13 +126,13 @@ def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most:
     found: list[WorstDataSet] = []
     for axis, residuals in left.items():
         order = np.argsort(-np.abs(residuals.score))[:most]
-        found += [
-            {
-                "axis": axis,
-                "dataset": int(data.dataset[i]),
-                "residual_dps": float(residuals.means[i]),
-                "over_floor": float(residuals.score[i]),
-            }
+        found.extend(
+            WorstDataSet(
+                axis=axis,
+                dataset=int(data.dataset[i]),
+                residual_dps=float(residuals.means[i]),
+                over_floor=float(residuals.score[i]),
+            )
             for i in order
-        ]
+        )
     return sorted(found, key=lambda line: -abs(line["over_floor"]))[:most]

@@ -53,7 +53,7 @@ class Channels:
         """Return the same channels with other rates along the body axes."""
         return replace(self, rates=rates)
 
-    def take(self, rows: NDArray[np.generic]) -> Channels:
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Channels:
         """Return the channels of some rows, by index or mask."""
         return Channels(
             {name: values[rows] for name, values in self.columns.items()},
@@ -94,7 +94,9 @@ class Channels:
 
     def decayed(self, tau_s: float) -> Array:
         """Return the mean over each row of exp(-time since its data set's begin / tau), (n,)."""
-        begin = np.asarray(self.columns["since_begin_s"]) if "since_begin_s" in self.columns else np.zeros(len(self))
+        begin = np.zeros(len(self))
+        if "since_begin_s" in self.columns:
+            begin = np.asarray(self.columns["since_begin_s"], dtype=np.float64)
         length = np.maximum(self.durations_s(), 1e-9)
         return np.asarray(np.exp(-begin / tau_s) * -np.expm1(-length / tau_s) * tau_s / length)
 

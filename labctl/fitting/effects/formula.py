@@ -25,7 +25,7 @@ from labctl.json_types.models import Origin
 
 #: What an operator or function takes and returns.
 Operand = float | Array
-OPERATORS: Mapping[type, Callable[..., Operand]] = {
+OPERATORS: Mapping[type, Callable[..., object]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,

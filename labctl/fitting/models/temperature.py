@@ -75,4 +75,4 @@ def basis_from_dict(record: TemperatureBasisJson) -> TemperatureBasis:
     """Return the basis that `to_dict` described."""
     if record["kind"] == "constant":
         return Constant()
-    return LagrangeTable(tuple(record["nodes_c"]), record["points"])
+    return LagrangeTable(tuple(record.get("nodes_c", ())), record.get("points", 3))

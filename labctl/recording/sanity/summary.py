@@ -40,7 +40,7 @@ class Summary:
         """Return a figure of one output axis, (m,)."""
         return np.asarray(self.columns[f"{name}_{axis}"], dtype=np.float64)
 
-    def take(self, rows: NDArray[np.generic]) -> Summary:
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Summary:
         """Return the summary of some data sets, by index or mask."""
         return Summary(self.info, {name: values[rows] for name, values in self.columns.items()})
 
@@ -67,7 +67,7 @@ def _of_readings(recording: Recording) -> Summary:
     if not valid.any():
         return Summary(recording.info, {"dataset": np.zeros(0, dtype=np.int64)})
     outputs: dict[str, NDArray[np.float64]] = {a: recording.gyro_dps(a)[valid] for a in recording.info.axes}
-    starts = dataset_starts(rows["dataset"])
+    starts = dataset_starts(np.asarray(rows["dataset"], dtype=np.int64))
     sets = [
         _one_set(recording.info, rows, outputs, slice(int(begin), int(end)))
         for begin, end in zip(starts, np.append(starts[1:], len(rows["dataset"])), strict=True)

@@ -12,7 +12,7 @@ from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
 from labctl.errors import BadInput, Conflict
 from labctl.json_types.recordings import RawChannelJson
-from labctl.recording import OutputUnit, RecordingInfo
+from labctl.recording import RecordingInfo
 from labctl.services.benches.confirmation import describe_bench
 from labctl.services.benches.power_failure import boot_id
 from labctl.services.planning.loading import load_recipe
@@ -146,18 +146,20 @@ def _rest(bench: Bench, clock: Clock) -> None:
 def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
     identity = gyro.identify()
     latitude = bench.latitude_deg
-    info = RecordingInfo(
-        serial=identity.serial,
-        model=identity.model,
-        axes=gyro.axes,
-        kind="samples",
-        started_at=clock.utc(),
-        latitude_deg=latitude,
-        sample_rate_hz=gyro.sample_rate_hz,
-        max_rate_dps=gyro.limits.max_rate_dps,
-        technology=identity.technology or None,
-        datasheet=dict(identity.datasheet),
-        output={axis: OutputUnit.model_validate(dict(unit)) for axis, unit in identity.output.items()},
+    info = RecordingInfo.model_validate(
+        {
+            "serial": identity.serial,
+            "model": identity.model,
+            "axes": gyro.axes,
+            "kind": "samples",
+            "started_at": clock.utc(),
+            "latitude_deg": latitude,
+            "sample_rate_hz": gyro.sample_rate_hz,
+            "max_rate_dps": gyro.limits.max_rate_dps,
+            "technology": identity.technology or None,
+            "datasheet": dict(identity.datasheet),
+            "output": {axis: dict(unit) for axis, unit in identity.output.items()},
+        }
     )
     channels: tuple[RawChannelJson, ...] = tuple(
         {"name": c.name, "unit": c.unit, "scale": c.scale, "offset": c.offset} for c in gyro.channels

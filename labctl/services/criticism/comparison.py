@@ -76,8 +76,8 @@ def _columns(data: FitData, errors: Mapping[str, Array]) -> ComparisonColumns:
     rate = data.channels.table_rate_dps()
     level = rate_levels(rate)
     parts = [_axis(data, axis, errors[axis], position, level_centres(rate, level), level) for axis in errors]
-    names = ComparisonColumns.model_fields
-    return ComparisonColumns(**{name: [value for part in parts for value in part[name]] for name in names})
+    columns = {name: [value for part in parts for value in part[name]] for name in ComparisonColumns.model_fields}
+    return ComparisonColumns.model_validate(columns, extra="forbid")
 
 
 def _axis(

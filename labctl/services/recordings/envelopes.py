@@ -92,6 +92,6 @@ def _bounds(values: Array, begins: NDArray[np.int64], width: NDArray[np.int64]) 
             np.minimum.reduceat(low, begins),
             np.maximum.reduceat(high, begins),
             np.add.reduceat(total, begins) / np.maximum(count, 1),
-            count,
+            count.astype(np.float64),
         ]
     )

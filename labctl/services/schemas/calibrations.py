@@ -131,7 +131,6 @@ class ImproveResponse(ChangedModel):
 class PreviewResponse(ChangedModel):
     """What a changed model would be; nothing was kept, so it has no version of its own."""
 
-    recording: int
     residuals: ResidualColumns = Field(description="What the changed model leaves, data set by data set.")
 
 
@@ -181,7 +180,6 @@ class CalibrationRow(ResponseModel):
 class VersionFacts(ResponseModel):
     """When a version was made, from what, and whether it is in force."""
 
-    parent: int | None = None
     created_at: datetime
     in_force: bool
     due: datetime | None = Field(default=None, description="Until when it is in force as certified; null: no date.")
@@ -193,11 +191,11 @@ class VersionFacts(ResponseModel):
 class VersionResponse(VersionFacts, FitResponse):
     """A calibration version that a fit made, as it was made, and whether it is in force."""
 
+    parent: int | None = None
+
 
 class ImprovedVersionResponse(VersionFacts, ImproveResponse):
     """A calibration version that a change of effects made, and whether it is in force."""
-
-    parent: int
 
 
 class Surface(ResponseModel):

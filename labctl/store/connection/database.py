@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Protocol
 
 import sqlalchemy as sa
+from sqlalchemy import event as sa_event
+from sqlalchemy import exc
 from sqlalchemy.exc import DatabaseError
 
 from labctl.errors import DiskFull, StoreError
@@ -98,7 +100,7 @@ class Database:
             return
         self._identity = identity = FileIdentity(self.location)
         for event in ("connect", "close"):  # an interrupt inside a write opens the connection anew
-            sa.event.listen(self._engine, event, lambda *_: identity.forget_log())
+            sa_event.listen(self._engine, event, lambda *_: identity.forget_log())
 
     def _migrate(self, *, write: bool) -> None:
         try:
@@ -161,15 +163,15 @@ class Database:
                     yield connection
                     self._refuse_other_file()
                     commits = count_commit(connection) if counted else 0
-            except sa.exc.DatabaseError as error:
-                if isinstance(error, sa.exc.IntegrityError | sa.exc.ProgrammingError):
+            except exc.DatabaseError as error:
+                if isinstance(error, exc.IntegrityError | exc.ProgrammingError):
                     raise
                 self._refuse_other_file()
                 raise self._trouble(error) from error
             if counted:
                 seal(self.location, commits)
 
-    def _trouble(self, error: sa.exc.DatabaseError) -> StoreError:
+    def _trouble(self, error: exc.DatabaseError) -> StoreError:
         full = getattr(error.orig, "sqlite_errorcode", None) == SQLITE_FULL
         if full or getattr(error.orig, "sqlstate", None) == POSTGRESQL_DISK_FULL:
             cause = f"{self._shown}: the disk is full"
@@ -194,7 +196,7 @@ class Database:
         try:
             with self._reader.connect() as connection:
                 yield connection
-        except sa.exc.DatabaseError as error:
+        except exc.DatabaseError as error:
             raise StoreError(f"{self._shown}: {error.orig}") from error
 
     def note_address(self, address: ServiceAddress) -> None:

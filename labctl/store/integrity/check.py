@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
+from sqlalchemy import exc
 
 from labctl.errors import BadCalibrationFile, StoreError
 from labctl.store import migrate, sample_codec
@@ -94,7 +95,7 @@ class _Check:
         self._progress(part, 0, 0)
         try:
             return check_part(connection)
-        except sa.exc.DatabaseError as error:
+        except exc.DatabaseError as error:
             self.find(part, f"cannot be read: {error.orig}")
         except (ValueError, TypeError) as error:  # the row is there, its content is of another kind
             self.find(part, f"cannot be read: {error}")

@@ -7,6 +7,7 @@ from datetime import datetime
 from typing import Any, Literal
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 
 from labctl.errors import Conflict, NotCertified, NotFound, VersionTaken
 from labctl.json_types.calibrations import JudgementDetail
@@ -31,7 +32,7 @@ def _in_force_query() -> sa.Select[bytes, str]:
     return _document_query().where(tables.calibrations.c.version == act)
 
 
-def _acts_query() -> sa.Select[Any]:
+def _acts_query() -> sa.Select[*tuple[Any, ...]]:
     """Return the query of a unit's acts of certifying and revoking, newest first."""
     x = tables.certifications.c
     columns = (x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at)
@@ -120,7 +121,7 @@ class Calibrations:
                 detail = {"model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash}
                 act = "fit" if new.parent is None else "improve"
                 append(connection, at, act, f"{serial} version {version}", detail)
-        except sa.exc.IntegrityError as error:  # where several processes write: after the look, before the end
+        except exc.IntegrityError as error:  # where several processes write: after the look, before the end
             if self.next_version(serial) == version:
                 raise
             raise taken from error

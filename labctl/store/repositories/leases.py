@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from datetime import datetime
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
@@ -58,7 +59,7 @@ class Leases:
                     x.c.beat == replacing.beat,
                 )
                 return connection.execute(sa.update(x).where(*seen).values(**asdict(lease))).rowcount == 1
-        except sa.exc.IntegrityError:
+        except exc.IntegrityError:
             return False
 
     @transaction

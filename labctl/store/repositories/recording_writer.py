@@ -13,6 +13,7 @@ from datetime import datetime, timedelta
 from typing import Any
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 
 from labctl.errors import Conflict
 from labctl.json_types import JsonObject
@@ -141,7 +142,7 @@ class Imports:
             r = tables.recordings
             serial = connection.scalar(sa.delete(r).where(r.c.id == number).returning(r.c.serial))
         # nothing but a recording brings a unit in; another import that begins now may need the row: then it stays
-        with suppress(sa.exc.IntegrityError), self._database.writing(synced=False) as connection:
+        with suppress(exc.IntegrityError), self._database.writing(synced=False) as connection:
             u = tables.units.c
             unused = ~sa.exists().where(r.c.serial == u.serial)
             connection.execute(sa.delete(tables.units).where(u.serial == serial, unused))

@@ -14,7 +14,7 @@ from labctl.fitting.criticism.diagnostics.thinning import drawn_rows
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
-from labctl.json_types.views import ChannelLine, DataSetColumns, MeanLine, PreviousRateLine, TimeAxis, TimeLine
+from labctl.json_types.views import ChannelLine, DataSetColumns, MeanLine, PreviousRateLine, TimeLine
 
 #: Points of a running mean, and how many levels of a channel are still shown one by one.
 POINTS = 24
@@ -138,12 +138,8 @@ def time_line(view: AxisView) -> TimeLine:
     _, along = time_axis(view)
     line = running_mean(view, along, np.ones(len(view), dtype=bool))
     z, p = runs_test(view.whitened)
-    at, power_on = line["at"], plain_list(along[begins])
-    timed: TimeAxis = {"t_s": at, "power_on_t_s": power_on}
-    in_order: TimeAxis = {"order": at, "power_on_order": power_on}
-    return {
+    found: TimeLine = {
         "axis": view.axis,
-        **(timed if view.timed else in_order),
         "mean_dps": line["mean_dps"],
         "low_dps": line["low_dps"],
         "high_dps": line["high_dps"],
@@ -153,6 +149,11 @@ def time_line(view: AxisView) -> TimeLine:
         "runs_z": plain(z),
         "runs_p": plain(p),
     }
+    if view.timed:
+        found["t_s"], found["power_on_t_s"] = line["at"], plain_list(along[begins])
+    else:
+        found["order"], found["power_on_order"] = line["at"], plain_list(along[begins])
+    return found
 
 
 def runs_test(values: Array) -> tuple[float, float]:
