@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
 
@@ -103,9 +103,9 @@ class SimulationSettings(Strict):
     seed: int = 1
     noise_seed: int = 0  #: another value measures the same units on another day
     latitude_deg: float | None = None  #: of the simulated world; default: the bench's
-    units: dict[str, dict[str, Any]] = Field(default_factory=dict)  #: gyro name -> profile and deviations from it
-    table: dict[str, Any] = Field(default_factory=dict)
-    chamber: dict[str, Any] = Field(default_factory=dict)
+    units: dict[str, dict[str, object]] = Field(default_factory=dict)  #: gyro name -> profile and deviations from it
+    table: dict[str, object] = Field(default_factory=dict)
+    chamber: dict[str, object] = Field(default_factory=dict)
     hidden: dict[str, float | str] = Field(default_factory=dict)  #: effect id -> size, hidden in every unit
     control: str | None = None  #: HOST:PORT of a simulator in another process, for its unit handler
     speed: float = Field(

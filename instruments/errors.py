@@ -12,10 +12,8 @@ InstrumentError
 
 from __future__ import annotations
 
-from typing import Any
 
-
-def copy_of(kind: type[Exception], args: tuple[Any, ...], attributes: dict[str, Any]) -> Exception:
+def copy_of(kind: type[Exception], args: tuple[object, ...], attributes: dict[str, object]) -> Exception:
     """Return an error with this text and these attributes, whatever its constructor takes; for `__reduce__`."""
     error = kind.__new__(kind, *args)
     error.__dict__.update(attributes)
@@ -29,7 +27,7 @@ class InstrumentError(Exception):
         super().__init__(f"{device}: {message}")
         self.device = device
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Pickle it whole: a subclass may take other arguments than its text."""
         return copy_of, (type(self), self.args, self.__dict__)
 

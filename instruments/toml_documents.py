@@ -11,7 +11,6 @@ import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from reprlib import Repr
-from typing import Any
 
 #: The largest file or text that is read.
 MOST_BYTES = 1 << 20
@@ -32,7 +31,7 @@ _SHOWN.maxstring = _SHOWN.maxother = 80
 _SHOWN.maxlevel = 1
 
 
-def shown(value: Any) -> str:
+def shown(value: object) -> str:
     """Return a value as a message shows it: whole where it is short, else its beginning."""
     return _SHOWN.repr(value)
 
@@ -53,7 +52,7 @@ def read_toml_text(path: Path) -> str:
     return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
 
 
-def parse_toml(text: str) -> dict[str, Any]:
+def parse_toml(text: str) -> dict[str, object]:
     """Return what a TOML text says. Raises TOMLDecodeError, also where it is too long or nested too deeply."""
     if len(text) > MOST_BYTES:
         raise tomllib.TOMLDecodeError(f"{len(text)} characters; at most {MOST_BYTES} are read")
@@ -66,7 +65,7 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise tomllib.TOMLDecodeError(str(error).partition(";")[0]) from None
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> dict[str, object]:
     """Return what a TOML file says. Raises OSError, UnicodeDecodeError, TOMLDecodeError."""
     return parse_toml(read_toml_text(path))
 

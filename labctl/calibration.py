@@ -12,12 +12,14 @@ from datetime import datetime
 from functools import cached_property
 from importlib.metadata import version as package_version
 from pathlib import Path
-from typing import Any, get_args
+from typing import cast, get_args
 
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
 from labctl.fitting.models.paper_units import in_paper_units
 from labctl.fitting.uncertainty import AxisEvidence
+from labctl.json_types import JsonObject
+from labctl.json_types.calibrations import CalibrationJson, OutputUnitJson
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.recording.info import Axis
 
@@ -26,12 +28,12 @@ SCHEMA = "labctl-calibration/1"
 MOST_BYTES = 64 << 20
 
 
-def canonical(document: Mapping[str, Any]) -> bytes:
+def canonical(document: JsonObject) -> bytes:
     """Return the one way to write a document: sorted keys, no spaces, UTF-8, shortest exact numbers."""
     return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
 
 
-def hash_of(document: Mapping[str, Any]) -> str:
+def hash_of(document: JsonObject) -> str:
     """Return the SHA-256 of everything in a document but its hash."""
     return hashlib.sha256(canonical({k: v for k, v in document.items() if k != "hash"})).hexdigest()
 
@@ -40,7 +42,7 @@ def hash_of(document: Mapping[str, Any]) -> str:
 class Calibration:
     """A calibration as it is exported: the document, and the fitted model in it."""
 
-    document: Mapping[str, Any]
+    document: CalibrationJson
 
     @property
     def serial(self) -> str:
@@ -107,7 +109,7 @@ def build_calibration(
     version: int,
     parent: int | None,
     issued_at: datetime,
-    provenance: Mapping[str, Any],
+    provenance: JsonObject,
     evidence: Mapping[str, AxisEvidence] | None = None,
 ) -> Calibration:
     """Make the document of a fit. What belongs to bench, fixture or environment is left out, and named.
@@ -115,7 +117,7 @@ def build_calibration(
     `evidence`, by axis, is what the uncertainty in use is computed from; without it that is unknown.
     """
     exported, left_out = result.fitted.exported()
-    document: dict[str, Any] = {
+    document: CalibrationJson = {
         "schema": SCHEMA,
         "serial": info.serial,
         "version": version,
@@ -124,14 +126,14 @@ def build_calibration(
         "unit": {"model": info.model, "technology": info.technology},
         "software": {"name": "labctl", "version": package_version("labctl")},
         "axes": list(exported.axes),
-        "output": {axis: info.output.get(axis, OutputUnit()).model_dump() for axis in info.axes},
+        "output": {axis: _unit_json(info.output.get(axis, OutputUnit())) for axis in info.axes},
         "model": exported.to_dict(),
         "coefficients": {axis: coefficients_json(exported.model, fit) for axis, fit in exported.axes.items()},
         "papers": in_paper_units(exported),
         "left_out": left_out,
         "error": result.error.to_dict(),
         "noise": dict(result.noise),
-        "environment": dict(result.environment),
+        "environment": result.environment,
         "validity": {"temperature_c": list(result.temperature_c), "rate_dps": list(result.rate_dps)},
         "use": {axis: one.to_json() for axis, one in (evidence or {}).items()},
         "provenance": dict(provenance),
@@ -139,9 +141,14 @@ def build_calibration(
             "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' "
             "subtracts it as a function of that rate, 'rate' solves rate = true + error(true) for the true rate"
         ),
+        "hash": "",
     }
     document["hash"] = hash_of(document)
     return Calibration(document)
+
+
+def _unit_json(unit: OutputUnit) -> OutputUnitJson:
+    return {"unit": unit.unit, "scale": unit.scale, "offset": unit.offset}
 
 
 def read_calibration(source: Path | bytes) -> Calibration:
@@ -173,7 +180,7 @@ def read_calibration(source: Path | bytes) -> Calibration:
             f"{name}: was edited or damaged: its hash is {found[:16]}…, it says {str(written)[:16]}…; fetch it again "
             "with `labctl calibration`"
         )
-    return Calibration(document)
+    return Calibration(cast(CalibrationJson, document))
 
 
 def _content(path: Path) -> bytes:
@@ -184,14 +191,14 @@ def _content(path: Path) -> bytes:
     return content
 
 
-def _canonical_and_hash(document: Mapping[str, Any]) -> tuple[bytes, str]:
+def _canonical_and_hash(document: JsonObject) -> tuple[bytes, str]:
     """Return `canonical` and `hash_of` of a document, written once for both."""
     parts = [(key, canonical({key: document[key]})[1:-1]) for key in sorted(document)]
     hashed = b"{" + b",".join(part for key, part in parts if key != "hash") + b"}"
     return b"{" + b",".join(part for _, part in parts) + b"}", hashlib.sha256(hashed).hexdigest()
 
 
-def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _object(pairs: list[tuple[str, object]]) -> dict[str, object]:
     made = dict(pairs)
     if len(made) != len(pairs):
         keys = [key for key, _ in pairs]

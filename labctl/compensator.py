@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
@@ -135,7 +135,7 @@ class Compensator:
             )
         return np.asarray(cold | fast)
 
-    def step(self, raw_dps: Any, temperature_c: float) -> tuple[Array, bool]:
+    def step(self, raw_dps: ArrayLike, temperature_c: float) -> tuple[Array, bool]:
         """Correct one sample, (axes,) deg/s; returns the corrected rates and whether it lay outside."""
         found = self.compensate(np.asarray(raw_dps, dtype=np.float64).reshape(1, -1), np.array([temperature_c]))
         return found.rate_dps[0], bool(found.outside[0])
@@ -157,7 +157,7 @@ def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
     def general(raw: Array, temperature_c: Array, channels: Mapping[str, Array]) -> Array:
         n = len(raw)
         warm = np.broadcast_to(temperature_c, (n,)) if temperature_c.ndim < 2 else temperature_c.mean(axis=1)
-        columns: dict[str, Any] = {"temperature_c": warm, **channels}
+        columns: dict[str, Array] = {"temperature_c": warm, **channels}
         if temperature_c.ndim == 2:
             columns |= {f"temperature_{axis}_c": temperature_c[:, i] for i, axis in enumerate(axes)}
         outputs = {axis: raw[:, i] for i, axis in enumerate(axes)}

@@ -30,7 +30,8 @@ LabctlError              exit 2, HTTP 400
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+
+from labctl.json_types import JsonObject
 
 
 class LabctlError(Exception):
@@ -41,7 +42,7 @@ class LabctlError(Exception):
     slug = "error"  #: last part of the problem document's `type`
 
     @property
-    def members(self) -> Mapping[str, Any]:
+    def members(self) -> JsonObject:
         """What the problem document has beside the members of every one, as JSON."""
         return {}
 
@@ -67,12 +68,12 @@ class DataRefused(BadInput):
     status = 422
     slug = "data-refused"
 
-    def __init__(self, text: str, warnings: Sequence[Mapping[str, Any]] = ()) -> None:
+    def __init__(self, text: str, warnings: Sequence[Mapping[str, object]] = ()) -> None:
         super().__init__(text)
         self.warnings = list(warnings)
 
     @property
-    def members(self) -> Mapping[str, Any]:
+    def members(self) -> JsonObject:
         """The warnings."""
         return {"warnings": self.warnings}
 
@@ -91,7 +92,7 @@ class StartNotConfirmed(BadInput):
         self.questions = dict(questions or {})
 
     @property
-    def members(self) -> Mapping[str, Any]:
+    def members(self) -> JsonObject:
         """The questions that are open."""
         return {"questions": self.questions}
 

@@ -34,7 +34,7 @@ class Registers:
         write_function: WriteFunction = WRITE_SINGLE,
     ) -> None:
         self._link = ModbusLink(device, address, clock, open_client, pause_s=pause_s)
-        self._word_order = word_order
+        self._word_order: WordOrder = word_order
         self._write_function: WriteFunction = write_function
 
     def get(self, register: Register) -> float:

@@ -6,7 +6,6 @@ No request waits for a computation in one of the server's threads: those answer 
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from functools import partial
@@ -15,9 +14,9 @@ from typing import Any, ParamSpec, TypeVar
 import anyio
 import anyio.to_thread
 from fastapi import Request
-from fastapi.responses import StreamingResponse
 from starlette.exceptions import HTTPException
 
+from labctl.api.event_stream import EventStream
 from labctl.api.problems import as_problem
 from labctl.errors import LabctlError
 from labctl.progress import Progress
@@ -27,6 +26,7 @@ from labctl.services.computation.computation import Work
 from labctl.services.computation.job import Call
 from labctl.services.lab_service import LabService
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.criticism import StageResponse
 
 #: An open stream says that it is alive after this long without a stage, s.
 HEARTBEAT_S = 10.0
@@ -73,7 +73,7 @@ async def while_connected(
 
 async def follow(
     request: Request, service: LabService, work: Work[..., ResponseModel], *args: object, **named: object
-) -> StreamingResponse:
+) -> EventStream:
     """Return server-sent events: `stage` for each stage of `work`, then `answer` or, where it fails, `problem`.
 
     The work is ended at once when the client leaves. Raises what fails before the first stage.
@@ -101,7 +101,7 @@ async def follow(
             shown, stage = None, first
             while stage is not None:
                 if stage != shown:
-                    yield _event("stage", json.dumps({"stage": stage}))
+                    yield _event("stage", StageResponse(stage=stage).model_dump_json())
                 shown = stage
                 try:
                     stage = await asyncio.wait_for(stages.get(), HEARTBEAT_S)
@@ -112,7 +112,7 @@ async def follow(
         finally:
             await _end(asked, left)
 
-    return StreamingResponse(stream(), media_type="text/event-stream", headers={"Cache-Control": "no-cache"})
+    return EventStream(stream(), headers={"Cache-Control": "no-cache"})
 
 
 async def execute(service: LabService, command: Command[RequestT, ResponseT], asked: RequestT) -> ResponseT:

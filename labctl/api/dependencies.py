@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Annotated, Any, TypeVar, cast
+from typing import Annotated, TypeVar, cast
 
-from fastapi import APIRouter, Depends, Request
+from fastapi import APIRouter, Depends, Request, params
+from fastapi.datastructures import Default
 
-from labctl.services.commands.command import Command
+from labctl.services.commands.command import Command, RequestT, ResponseT
 from labctl.services.lab_service import LabService
 
 CONTROL_THREADS = 4
@@ -49,20 +50,25 @@ def get_control_pool(request: Request) -> ControlPool:
 
 ControlPoolDep = Annotated[ControlPool, Depends(get_control_pool)]
 
-EndpointT = TypeVar("EndpointT", bound=Callable[..., Any])
+EndpointT = TypeVar("EndpointT", bound=Callable[..., object])
 
 
 def command_route(
-    router: APIRouter, command: Command[Any, Any], summary: str, **options: Any
+    router: APIRouter,
+    command: Command[RequestT, ResponseT],
+    summary: str,
+    *,
+    dependencies: Sequence[params.Depends] | None = None,
+    response_model: object = Default(None),
 ) -> Callable[[EndpointT], EndpointT]:
     """Route a command: method, path, status and other responses are the command's own."""
     usual, *others = command.responses.items()
-    if others:
-        options["responses"] = {status: {"model": model} for status, model in others}
     return router.api_route(
         command.path.removeprefix(router.prefix),
         methods=[command.method],
         status_code=usual[0],
         summary=summary,
-        **options,
+        responses={status: {"model": model} for status, model in others},
+        dependencies=dependencies,
+        response_model=response_model,
     )

@@ -8,10 +8,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from http import HTTPStatus
-from typing import Any, ClassVar, cast
+from typing import ClassVar, cast
 
 from uvicorn._types import ASGI3Application
+from uvicorn.config import Config
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
+from uvicorn.server import ServerState
 
 from labctl.api.connection_limits import RESERVED, ConnectionLimits
 from labctl.api.connection_table import ConnectionTable, Phase, source_of
@@ -29,8 +31,14 @@ class BoundedHttpProtocol(HttpToolsProtocol):
 
     table: ClassVar[ConnectionTable]
 
-    def __init__(self, *arguments: Any, **named: Any) -> None:
-        super().__init__(*arguments, **named)
+    def __init__(
+        self,
+        config: Config,
+        server_state: ServerState,
+        app_state: dict[str, object],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        super().__init__(config, server_state, app_state, _loop)
         self.phase = Phase.HEADERS
         self.since = self.loop.time()
         self.source = ""
@@ -145,7 +153,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
             raise _Refused
         self._understood = True
         self._enter(Phase.BODY)
-        self.scope["state"][RESERVED] = self.table.on_reserve(self)
+        self.scope.setdefault("state", {})[RESERVED] = self.table.on_reserve(self)
         super().on_headers_complete()
 
     def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import tempfile
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -24,7 +23,7 @@ UNREADABLE = "There was an error parsing the body"
 TYPE_PREFIX = "urn:labctl:problem:"
 
 
-def problem(status: int, slug: str, title: str, detail: str, instance: str, **members: Any) -> JSONResponse:
+def problem(status: int, slug: str, title: str, detail: str, instance: str, **members: object) -> JSONResponse:
     """Make a problem document; `members` are those beside the usual ones."""
     body = {"type": TYPE_PREFIX + slug, "title": title, "status": status, "detail": detail, "instance": instance}
     body |= members
@@ -96,7 +95,7 @@ def _of_http(request: Request, error: HTTPException) -> JSONResponse:
     return answer
 
 
-HANDLERS: Mapping[type[Exception], Callable[[Request, Any], JSONResponse]] = {
+HANDLERS: Mapping[type[Exception], Callable[..., JSONResponse]] = {
     LabctlError: _of_labctl,
     InstrumentError: _of_an_instrument,
     ProcedureError: _of_a_procedure,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from labctl.cli.output import console, format_number, print_warnings, table
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
 if TYPE_CHECKING:
+    from labctl.json_types.models import Coefficients, Entry
     from labctl.services.schemas.calibrations import FitResponse
     from labctl.services.schemas.certification import CertificationResponse
 
@@ -28,14 +29,15 @@ def print_fit(answer: FitResponse) -> None:
     console.print(f"  valid              {low:.1f} to {high:.1f} deg C, {rates}")
     for axis, content in answer.axes.items():
         coefficients = content["coefficients"]
-        if "temperature_c" in coefficients:
-            console.print(f"\n[bold]axis {axis}[/]: a table over {len(coefficients['temperature_c'])} temperatures")
+        if isinstance(nodes := coefficients.get("temperature_c"), list):
+            console.print(f"\n[bold]axis {axis}[/]: a table over {len(nodes)} temperatures")
             print_table(coefficients)
             continue
         rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
         for name, entry in coefficients.items():
-            shown = rounded_to_uncertainty(entry["value"], entry["u"])
-            rows.add_row(name, entry["unit"], shown.value + shown.power, shown.u + shown.power if shown.u else "-")
+            (value, *_), (u, *_), unit = _at_nodes(entry)
+            shown = rounded_to_uncertainty(value, u)
+            rows.add_row(name, unit, shown.value + shown.power, shown.u + shown.power if shown.u else "-")
         console.print(rows)
 
 
@@ -73,17 +75,25 @@ def _print_objections(answer: CertificationResponse) -> None:
         console.print(f"  overridden: {each.text}", style="bold red", markup=False, soft_wrap=True)
 
 
-def print_table(coefficients: Mapping[str, Any]) -> None:
+def print_table(coefficients: Coefficients) -> None:
     """Print a coefficient table over temperature, one row per temperature, rounded to their uncertainties."""
+    nodes, _, _ = _at_nodes(coefficients["temperature_c"])
     names = [name for name in coefficients if name != "temperature_c"]
-    nodes: list[float] = coefficients["temperature_c"]
     rows = table("", "deg C", *names, numbers=len(names) + 1)
     for index, node in enumerate(nodes):
         rows.add_row(f"{node:.2f}", *(_cell(coefficients[name], index) for name in names))
     console.print(rows)
 
 
-def _cell(coefficient: Mapping[str, Any], index: int) -> str:
-    u = coefficient.get("u")
-    shown = rounded_to_uncertainty(coefficient["value"][index], u[index] if u else None)
+def _cell(entry: Entry, index: int) -> str:
+    values, us, _ = _at_nodes(entry)
+    shown = rounded_to_uncertainty(values[index], us[index])
     return shown.value + shown.power
+
+
+def _at_nodes(entry: Entry) -> tuple[list[float], list[float | None], str]:
+    """Return values and uncertainties, one or one at each node of a temperature table, and the unit."""
+    if isinstance(entry, list):
+        return entry, [None] * len(entry), "deg C"
+    value, u = entry["value"], entry["u"]
+    return value if isinstance(value, list) else [value], u if isinstance(u, list) else [u], entry["unit"]

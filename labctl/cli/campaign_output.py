@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from labctl.cli.output import console, format_number, print_json, table
+from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse
@@ -52,7 +53,7 @@ def hours(seconds: float) -> str:
 def print_end(answer: CampaignResponse, *, as_json: bool) -> None:
     """Print how a campaign ended; exit 1 when that is not as it was meant."""
     print_json(answer) if as_json else print_campaign(answer)
-    if answer.state in {"failed", "aborted", "interrupted"}:
+    if answer.state in STOPPED_EARLY:
         raise typer.Exit(1)
 
 
@@ -76,7 +77,7 @@ def print_campaign(answer: CampaignResponse) -> None:
         f"  step {answer.step or '–'} of {answer.steps}  {answer.step_text}  {100 * answer.progress:.1f} %",
         markup=False,
     )
-    if answer.expected_end and answer.state in {"running", "paused", "waiting"}:
+    if answer.expected_end and answer.state in UNDER_WAY:
         clock = "simulated time" if answer.simulated_time else "UTC"
         console.print(f"  expected end {answer.expected_end:%Y-%m-%d %H:%M} {clock}")
     if answer.chamber_c is not None:
@@ -107,7 +108,7 @@ def _print_advice(answer: CampaignResponse) -> None:
         console.print(f"  what happened: {answer.advice.happened}", markup=False, soft_wrap=True)
         console.print(f"  what labctl did: {answer.advice.done}", markup=False, soft_wrap=True)
         console.print(f"  what to do next: {answer.advice.next}", markup=False, soft_wrap=True)
-    if answer.state in {"failed", "aborted", "interrupted"} and answer.resume_reason:
+    if answer.state in STOPPED_EARLY and answer.resume_reason:
         word = "resume with care" if answer.resumable else "not resumable"
         console.print(f"  {word}: {answer.resume_reason}", style="yellow", markup=False, soft_wrap=True)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from math import log10
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from labctl.cli.output import console, format_number, print_warnings, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.calibrations import FitResponse, LadderResponse
+    from labctl.json_types.criticism import ResidualMap, Suspect
+    from labctl.json_types.noise import StaticRecordJson
+    from labctl.services.schemas.calibrations import ImproveResponse, LadderResponse
     from labctl.services.schemas.criticism import CriticismResponse, VerificationResponse
 
 
@@ -50,9 +52,9 @@ def print_criticism(answer: CriticismResponse) -> None:
         f"held-out {format_number(error['heldout_rms_dps'])}, noise floor {format_number(error['noise_floor_dps'])}",
         style="dim",
     )
-    if answer.noise.get("static"):
-        _print_static(answer.noise["static"])
-    for picture in getattr(answer, "maps", []):
+    if (static := answer.noise["static"]) is not None:
+        _print_static(static)
+    for picture in answer.maps:
         _print_map(picture)
     if answer.suspects:
         rows = table("suspects", "effect", "origin", "log BF", "after", "held-out", "alike", numbers=4)
@@ -89,10 +91,11 @@ def _not_testable(answer: CriticismResponse) -> list[str]:
     return said + [f"not recorded: {channel}, which would show {', '.join(each)}" for channel, each in lacking.items()]
 
 
-def _print_static(static: dict[str, Any]) -> None:
+def _print_static(static: StaticRecordJson) -> None:
     """Print what the longest stretch at rest shows."""
     for axis, noise in static["axes"].items():
-        shown = [(letter, noise[letter]) for letter in ("N", "B", "K") if noise[letter]["value"] is not None]
+        figures = (("N", noise["N"]), ("B", noise["B"]), ("K", noise["K"]))
+        shown = [(letter, figure) for letter, figure in figures if figure["value"] is not None]
         said = ", ".join(
             f"{letter} {format_number(f['value'], 3)} +- {format_number(f['u'], 2)} {f['unit']}" for letter, f in shown
         )
@@ -101,11 +104,11 @@ def _print_static(static: dict[str, Any]) -> None:
         console.print(text, style="dim", markup=False)
 
 
-def _name_of(suspect: dict[str, Any]) -> str:
-    return str(suspect["effect"]) + ("" if suspect.get("physical", True) else " (not physical)")
+def _name_of(suspect: Suspect) -> str:
+    return suspect["effect"] + ("" if suspect["physical"] else " (not physical)")
 
 
-def _print_map(picture: dict[str, Any], columns: int = 21) -> None:
+def _print_map(picture: ResidualMap, columns: int = 21) -> None:
     """Draw residual over floor, rates across and temperatures down."""
     rates = sorted({round(rate, 2) for rate in picture["table_rate_dps"]})
     warm = sorted({round(value) for value in picture["temperature_c"]}, reverse=True)
@@ -129,24 +132,23 @@ def _print_map(picture: dict[str, Any], columns: int = 21) -> None:
     console.print(f"            {rates[0]:g} to {rates[-1]:g} deg/s", style="dim", markup=False)
 
 
-def print_improvement(answer: FitResponse) -> None:
+def print_improvement(answer: ImproveResponse) -> None:
     """Print what a change brought."""
-    extra: dict[str, Any] = answer.model_extra or {}
-    before = extra["before"]
+    before = answer.before
     print_warnings(answer.warnings)
-    console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {extra['parent']}: {answer.model.name}")
+    console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {answer.parent}: {answer.model.name}")
     rows = table("", "deg/s", "before", "after", numbers=2)
-    rows.add_row("RMS", format_number(before["rms_dps"]), format_number(answer.error.rms_dps))
-    rows.add_row("held-out", format_number(before["heldout_rms_dps"]), format_number(answer.error.heldout_rms_dps))
-    rows.add_row("noise floor", format_number(before["noise_floor_dps"]), format_number(answer.error.noise_floor_dps))
+    rows.add_row("RMS", format_number(before.rms_dps), format_number(answer.error.rms_dps))
+    rows.add_row("held-out", format_number(before.heldout_rms_dps), format_number(answer.error.heldout_rms_dps))
+    rows.add_row("noise floor", format_number(before.noise_floor_dps), format_number(answer.error.noise_floor_dps))
     console.print(rows)
-    for effect_id, span in extra["plausible"].items():
+    for effect_id, span in answer.plausible.items():
         if not span["inside"]:
             console.print(
                 f"  {effect_id}: larger than is usual ({span['from']:g} to {span['to']:g}); look again at its rivals",
                 style="yellow",
             )
-    for left in extra["left_out"]:
+    for left in answer.left_out:
         console.print(f"  {left['effect']} stays on the bench ({left['origin']}); a calibration file leaves it out")
     console.print(f"next: labctl criticise {answer.serial}", style="dim")
 

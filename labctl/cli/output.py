@@ -4,33 +4,37 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
-from pydantic import BaseModel
+from pydantic import BaseModel, JsonValue
 from rich.console import Console
 from rich.table import Table
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.warnings import DataWarning
 
 #: Where nobody looks at a terminal, lines are not cut to its width.
 console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
 stderr = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
-def print_warnings(warnings: Iterable[Any]) -> None:
+def print_warnings(warnings: Iterable[DataWarning]) -> None:
     """Print the warnings of an answer, each on one line."""
     for warning in warnings:
         word = "wrong" if warning.severity == "certain" else "check"
         console.print(f"{word}: {warning.text}", style="bold red", markup=False, soft_wrap=True)
 
 
-def print_json(answer: Any, *, one_line: bool = False) -> None:
+def print_json(answer: BaseModel | Sequence[BaseModel] | Mapping[str, JsonValue], *, one_line: bool = False) -> None:
     """Print one JSON document on standard output; on one line and at once where a program waits for it."""
+    document: object = answer
     if isinstance(answer, BaseModel):
-        answer = answer.model_dump(mode="json", by_alias=True, exclude_none=False)
-    elif isinstance(answer, list):
-        answer = [a.model_dump(mode="json", by_alias=True) if isinstance(a, BaseModel) else a for a in answer]
+        document = answer.model_dump(mode="json", by_alias=True)
+    elif not isinstance(answer, Mapping):
+        document = [each.model_dump(mode="json", by_alias=True) for each in answer]
     indent = None if one_line else 2
-    sys.stdout.write(json.dumps(answer, indent=indent, ensure_ascii=False, allow_nan=False) + "\n")
+    sys.stdout.write(json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False) + "\n")
     if one_line:
         sys.stdout.flush()
 

@@ -15,8 +15,8 @@ from typing import Any
 from instruments.interfaces.gyro import Readings
 from labctl.log import get_logger
 from labctl.log.rendering import error_fields
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import (
-    CampaignState,
     DataSetHeader,
     DataSetState,
     EnvironmentSample,

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TypeVar
 
 import plotly.graph_objects as go
 
+from labctl.json_types.answers import ComparisonJson
 from labctl.plots.temperature_scale import temperature_colour, temperature_marker
 from labctl.plots.theme import grid_of, place
 
+T = TypeVar("T")
 #: Far enough that the names of the axes are inside of the picture.
 CAMERA = {"eye": {"x": 1.55, "y": 1.55, "z": 0.9}, "center": {"x": 0.0, "y": 0.0, "z": -0.18}}
 #: The same box for every panel.
 ASPECT = {"x": 1.0, "y": 1.0, "z": 0.8}
 
 
-def error_over_rate(comparison: Mapping[str, Any]) -> go.Figure | None:
+def error_over_rate(comparison: ComparisonJson) -> go.Figure | None:
     """Return a panel for each output and position: measured errors as dots, a line for each temperature level."""
     columns = comparison["columns"]
     if not columns["dataset"]:
@@ -37,9 +39,9 @@ def error_over_rate(comparison: Mapping[str, Any]) -> go.Figure | None:
         rows = [k for k, pair in enumerate(pairs) if pair == (axis, there)]
         figure.add_trace(
             go.Scatter(
-                x=_of(columns, "table_rate_dps", rows), y=_of(columns, "measured_error_dps", rows), mode="markers",
-                name=f"{axis} about {there}", customdata=_of(columns, "dataset", rows),
-                marker=temperature_marker(_of(columns, "temperature_c", rows), low, high, size=4),
+                x=_of(columns["table_rate_dps"], rows), y=_of(columns["measured_error_dps"], rows), mode="markers",
+                name=f"{axis} about {there}", customdata=_of(columns["dataset"], rows),
+                marker=temperature_marker(_of(columns["temperature_c"], rows), low, high, size=4),
                 hovertemplate="data set %{customdata}<br>%{x:.5g} deg/s: %{y:.4g} deg/s<extra></extra>",
             ),
             **where,
@@ -49,13 +51,13 @@ def error_over_rate(comparison: Mapping[str, Any]) -> go.Figure | None:
     return figure
 
 
-def full_turn(comparison: Mapping[str, Any]) -> go.Figure | None:
+def full_turn(comparison: ComparisonJson) -> go.Figure | None:
     """Return the error after a full turn over rate and temperature, before and after; None where nothing turns."""
     columns = comparison["columns"]
     rows = [k for k, error in enumerate(columns["turn_before_deg"]) if error is not None]
     if not rows:
         return None
-    axes = _in_order(_of(columns, "axis", rows))
+    axes = _in_order(_of(columns["axis"], rows))
     words = ("static bias off only", "after the calibration")
     figure = grid_of(
         [f"{axis}: {word}" for axis in axes for word in words], 2, specs=[[{"type": "scene"}] * 2 for _ in axes]
@@ -63,14 +65,17 @@ def full_turn(comparison: Mapping[str, Any]) -> go.Figure | None:
     low, high = min(columns["temperature_c"]), max(columns["temperature_c"])
     for row, axis in enumerate(axes, 1):
         own = [k for k in rows if columns["axis"][k] == axis]
-        errors = {name: _of(columns, name, own) for name in ("turn_before_deg", "turn_after_deg")}
+        errors = {
+            "turn_before_deg": _known(_of(columns["turn_before_deg"], own)),
+            "turn_after_deg": _known(_of(columns["turn_after_deg"], own)),
+        }
         least, most = (end(value for values in errors.values() for value in values) for end in (min, max))
         for col, (name, values) in enumerate(errors.items(), 1):
-            marker = temperature_marker(_of(columns, "temperature_c", own), low, high, size=3)
+            marker = temperature_marker(_of(columns["temperature_c"], own), low, high, size=3)
             figure.add_trace(
                 go.Scatter3d(
-                    x=_of(columns, "own_rate_dps", own), y=_of(columns, "temperature_c", own), z=values,
-                    mode="markers", name=f"{axis} {name}", customdata=_of(columns, "dataset", own), marker=marker,
+                    x=_of(columns["own_rate_dps"], own), y=_of(columns["temperature_c"], own), z=values,
+                    mode="markers", name=f"{axis} {name}", customdata=_of(columns["dataset"], own), marker=marker,
                     hovertemplate="data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C: %{z:.3g} deg",
                 ),
                 row=row, col=col,
@@ -87,5 +92,9 @@ def _in_order(names: Sequence[str]) -> list[str]:
     return sorted(set(names))
 
 
-def _of(columns: Mapping[str, Any], name: str, rows: Sequence[int]) -> list[Any]:
-    return [columns[name][k] for k in rows]
+def _of(column: Sequence[T], rows: Sequence[int]) -> list[T]:
+    return [column[k] for k in rows]
+
+
+def _known(column: Sequence[float | None]) -> list[float]:
+    return [value for value in column if value is not None]

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import plotly.graph_objects as go
 
+from labctl.json_types.answers import CriticismJson, LadderJson
+from labctl.json_types.noise import AllanJson
+from labctl.json_types.views import Numbers, Repeats, Views
 from labctl.plots.theme import ACCENT, INK, WARM, colour_of, grid_of, place
 
 
-def allan(answer: Mapping[str, Any]) -> go.Figure | None:
+def allan(answer: CriticismJson) -> go.Figure | None:
     """Return the Allan deviation with its 95 % interval and the fitted terms; None without a static record."""
-    static = (answer.get("noise") or {}).get("static")
+    noise = answer.get("noise")
+    static = noise["static"] if noise else None
     if not static:
         return None
-    axes: Mapping[str, Any] = static["axes"]
+    axes = static["axes"]
     figure = grid_of([_figures_text(axis, line) for axis, line in axes.items()], min(len(axes), 3))
     for panel, (axis, line) in enumerate(axes.items()):
         where, colour = place(panel, min(len(axes), 3)), colour_of(axis)
@@ -25,8 +26,8 @@ def allan(answer: Mapping[str, Any]) -> go.Figure | None:
                 x=line["tau_s"], y=sigma, mode="markers", marker={"color": colour}, name=axis,
                 error_y={
                     "type": "data", "symmetric": False, "color": colour,
-                    "array": [h - s for h, s in zip(line["high_dps"], sigma, strict=True)],
-                    "arrayminus": [s - low for s, low in zip(sigma, line["low_dps"], strict=True)],
+                    "array": _apart(line["high_dps"], sigma),
+                    "arrayminus": _apart(sigma, line["low_dps"]),
                 },
             ),
             **where,
@@ -43,18 +44,23 @@ def allan(answer: Mapping[str, Any]) -> go.Figure | None:
     return figure
 
 
-def _figures_text(axis: str, line: Mapping[str, Any]) -> str:
+def _apart(high: Numbers, low: Numbers) -> Numbers:
+    pairs = zip(high, low, strict=True)
+    return [None if upper is None or lower is None else upper - lower for upper, lower in pairs]
+
+
+def _figures_text(axis: str, line: AllanJson) -> str:
     said = [
-        f"{letter} = {line[letter]['value']:.3g} {line[letter]['unit']}"
-        for letter in ("N", "B", "K")
-        if line[letter]["value"] is not None
+        f"{letter} = {figure['value']:.3g} {figure['unit']}"
+        for letter, figure in (("N", line["N"]), ("B", line["B"]), ("K", line["K"]))
+        if figure["value"] is not None
     ]
     return f"{axis}: {', '.join(said) or 'no slope shows'}"
 
 
-def repeats(answer: Mapping[str, Any]) -> go.Figure | None:
+def repeats(answer: CriticismJson) -> go.Figure | None:
     """Return the differences of points measured again against the time between; None where nothing was repeated."""
-    views = answer.get("views") or {}
+    views = answer.get("views") or Views()
     lines = views.get("repeats") or []
     if not lines:
         return None
@@ -64,7 +70,7 @@ def repeats(answer: Mapping[str, Any]) -> go.Figure | None:
         where = place(panel, min(len(lines), 3))
         figure.add_trace(
             go.Scatter(
-                x=[t / 60 for t in line["apart_s"]] if timed else line["apart_sets"],
+                x=_minutes(line.get("apart_s", [])) if timed else line["apart_sets"],
                 y=line["difference_dps"], mode="markers",
                 marker={"color": colour_of(line["axis"]), "size": 5}, name=line["axis"],
                 text=[f"data sets {a} and {b}" for a, b in line["datasets"]],
@@ -72,37 +78,42 @@ def repeats(answer: Mapping[str, Any]) -> go.Figure | None:
             ),
             **where,
         )  # fmt: skip
-        for level in (-2, 2):
-            figure.add_hline(
-                y=level * 2**0.5 * line["floor_dps"], line={"color": INK, "dash": "dash", "width": 1}, **where
-            )
+        floor_dps = line["floor_dps"]
+        levels = () if floor_dps is None else (-2 * 2**0.5 * floor_dps, 2 * 2**0.5 * floor_dps)
+        for level in levels:
+            figure.add_hline(y=level, line={"color": INK, "dash": "dash", "width": 1}, **where)
     figure.update_xaxes(title="apart, min" if timed else "apart, data sets")
     figure.update_yaxes(title="difference, deg/s", col=1)
     return figure
 
 
-def _repeats_text(line: Mapping[str, Any]) -> str:
+def _minutes(seconds: Numbers) -> Numbers:
+    return [None if value is None else value / 60 for value in seconds]
+
+
+def _repeats_text(line: Repeats) -> str:
     shown = len(line["difference_dps"])
     drawn = f"; {shown} of {line['pairs']} pairs drawn" if shown < line["pairs"] else ""
-    return f"{line['axis']}: {line['over_floor']:.2f} of the floor{drawn}"
+    return f"{line['axis']}: {line['over_floor'] or 0.0:.2f} of the floor{drawn}"
 
 
-def ladder(answer: Mapping[str, Any]) -> go.Figure | None:
+def ladder(answer: LadderJson) -> go.Figure | None:
     """Return the errors of every version down to the noise floor; None without any error."""
-    steps = [step for step in answer.get("steps", ()) if step["rms_dps"] is not None]
+    steps = [step for step in answer["steps"] if step["rms_dps"] is not None]
     if not steps:
         return None
     figure = grid_of([""], 1)
     names = [f"{step['version']}: {step['model']}" for step in steps]
-    for key, word, colour in (("rms_dps", "on its own data", ACCENT), ("heldout_rms_dps", "held out", WARM)):
+    own, unseen = [step["rms_dps"] for step in steps], [step["heldout_rms_dps"] for step in steps]
+    for errors, word, colour in ((own, "on its own data", ACCENT), (unseen, "held out", WARM)):
         figure.add_trace(
             go.Scatter(
-                x=names, y=[step[key] for step in steps], mode="lines+markers", line={"color": colour, "shape": "hv"},
+                x=names, y=errors, mode="lines+markers", line={"color": colour, "shape": "hv"},
                 name=word, text=[", ".join(step["effects"]) for step in steps],
                 hovertemplate="%{y:.4g} deg/s<br>%{text}<extra></extra>",
             )
         )  # fmt: skip
-    floor = answer.get("noise_floor_dps")
+    floor = answer["noise_floor_dps"]
     if floor:
         line = {"color": INK, "dash": "dash"}
         figure.add_trace(

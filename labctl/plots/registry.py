@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Generic, TypeVar
 
 import plotly.graph_objects as go
 
+from labctl.json_types.answers import ComparisonJson, CriticismJson, LadderJson
+from labctl.json_types.views import Views
 from labctl.plots import model_lines, noise, residual_lines, residual_maps, spectra
+
+AnswerT = TypeVar("AnswerT")
 
 
 @dataclass(frozen=True)
@@ -23,11 +27,11 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class _Kind:
+class _Kind(Generic[AnswerT]):
     id: str
     title: str
     caption: str
-    draw: Callable[[Mapping[str, Any]], go.Figure | None]
+    draw: Callable[[AnswerT], go.Figure | None]
 
 
 KINDS = (
@@ -130,7 +134,7 @@ COMPARED = (
 
 
 def pictures_of(
-    criticism: Mapping[str, Any], ladder: Mapping[str, Any] | None = None, comparison: Mapping[str, Any] | None = None
+    criticism: CriticismJson, ladder: LadderJson | None = None, comparison: ComparisonJson | None = None
 ) -> list[Picture]:
     """Return the pictures of a criticism, a ladder and a comparison, as far as there is something to draw.
 
@@ -138,18 +142,19 @@ def pictures_of(
     """
     found = [_picture(kind, criticism, _effects(kind.id, criticism)) for kind in KINDS]
     found += [_picture(kind, comparison, ()) for kind in COMPARED if comparison is not None]
-    found.append(_picture(LADDER, ladder or {}, ()))
+    if ladder is not None:
+        found.append(_picture(LADDER, ladder, ()))
     return [picture for picture in found if picture is not None]
 
 
-def _picture(kind: _Kind, answer: Mapping[str, Any], effects: tuple[str, ...]) -> Picture | None:
+def _picture(kind: _Kind[AnswerT], answer: AnswerT, effects: tuple[str, ...]) -> Picture | None:
     figure = kind.draw(answer)
     return Picture(kind.id, kind.title, kind.caption, figure, effects) if figure is not None else None
 
 
-def _effects(view: str, criticism: Mapping[str, Any]) -> tuple[str, ...]:
-    views = criticism.get("views") or {}
-    draws: Mapping[str, list[str]] = views.get("draws") or {}
+def _effects(view: str, criticism: CriticismJson) -> tuple[str, ...]:
+    views = criticism.get("views") or Views()
+    draws = views.get("draws") or {}
     if view != "channels":
         return tuple(draws.get(view, ()))
     names = [line["channel"] for line in views.get("channels", ())]

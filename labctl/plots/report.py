@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
-from typing import Any
 
 from plotly.offline import get_plotlyjs
 
+from labctl.json_types.answers import ComparisonJson, CriticismJson, LadderJson
+from labctl.json_types.criticism import CriticisedErrors, NotTestable, Suspect, WorstDataSet
 from labctl.plots.registry import Picture, pictures_of
 
 STYLE = """
@@ -27,15 +28,10 @@ for (const place of document.querySelectorAll("div[data-figure]")) {
   Plotly.newPlot(place, figure.data, figure.layout, {displaylogo: false, responsive: true});
 }
 """
-ERRORS = (
-    ("rms_dps", "left after the fit"),
-    ("heldout_rms_dps", "at temperatures that the fit has not seen"),
-    ("noise_floor_dps", "noise floor"),
-)
 
 
 def report_html(
-    criticism: Mapping[str, Any], ladder: Mapping[str, Any] | None = None, comparison: Mapping[str, Any] | None = None
+    criticism: CriticismJson, ladder: LadderJson | None = None, comparison: ComparisonJson | None = None
 ) -> str:
     """Return the page: the verdict in words, the figures behind it, then the pictures with how to read them."""
     pictures = pictures_of(criticism, ladder, comparison)
@@ -86,15 +82,20 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.4g}"
 
 
-def _errors(error: Mapping[str, Any]) -> str:
-    return _table(("RMS error", "deg/s"), [(word, _number(error.get(key))) for key, word in ERRORS])
+def _errors(error: CriticisedErrors) -> str:
+    figures = (
+        ("left after the fit", error["rms_dps"]),
+        ("at temperatures that the fit has not seen", error["heldout_rms_dps"]),
+        ("noise floor", error["noise_floor_dps"]),
+    )
+    return _table(("RMS error", "deg/s"), [(word, _number(figure)) for word, figure in figures])
 
 
-def _name_of(suspect: Mapping[str, Any]) -> str:
-    return str(suspect["effect"]) + ("" if suspect.get("physical", True) else " (not physical)")
+def _name_of(suspect: Suspect) -> str:
+    return suspect["effect"] + ("" if suspect.get("physical", True) else " (not physical)")
 
 
-def _suspects(suspects: Sequence[Mapping[str, Any]]) -> str:
+def _suspects(suspects: Sequence[Suspect]) -> str:
     rows = [
         (_name_of(s), s["origin"], _number(s["log_bayes_factor"]), _number(s["rms_after_dps"]),
          _number(s["heldout_rms_after_dps"]), ", ".join(e for e in s["alias_group"] if e != s["effect"]))
@@ -104,14 +105,14 @@ def _suspects(suspects: Sequence[Mapping[str, Any]]) -> str:
     return f"<h2>Suspects</h2>{_table(head, rows)}" if rows else ""
 
 
-def _worst(worst: Sequence[Mapping[str, Any]]) -> str:
+def _worst(worst: Sequence[WorstDataSet]) -> str:
     rows = [
         (f"{w['axis']}, data set {w['dataset']}", _number(w["residual_dps"]), _number(w["over_floor"])) for w in worst
     ]
     return f"<h2>Data sets furthest from the model</h2>{_table(('', 'deg/s', 'over floor'), rows)}" if rows else ""
 
 
-def _not_testable(lines: Sequence[Mapping[str, Any]]) -> str:
+def _not_testable(lines: Sequence[NotTestable]) -> str:
     if not lines:
         return ""
     names = ", ".join(str(line["effect"]) for line in lines)

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import sqrt
-from typing import Any
+from typing import TypeVar
 
 import plotly.graph_objects as go
 
+from labctl.json_types.answers import CriticismJson
+from labctl.json_types.criticism import ResidualMap
 from labctl.plots.theme import DIMMED_BELOW, SCALE, SCALE_LIMITS, grid_of, place
 
+T = TypeVar("T")
 #: Cells that fill less than this share of their rows and columns are drawn where they are, not in a grid.
 LEAST_FILLED = 0.3
 HOVER = "%{x} deg/s, %{y} deg C: %{z:.2f} floors<br>data set %{customdata}<extra></extra>"
 DIM = "rgba(128,128,128,0.5)"
 
 
-def maps(answer: Mapping[str, Any]) -> go.Figure | None:
+def maps(answer: CriticismJson) -> go.Figure | None:
     """Return the maps; None without any."""
     drawn = [picture for picture in answer.get("maps", ()) if picture["over_floor"]]
     if not drawn:
@@ -40,8 +43,8 @@ def maps(answer: Mapping[str, Any]) -> go.Figure | None:
     return figure
 
 
-def _panel(figure: go.Figure, picture: Mapping[str, Any], where: Mapping[str, int]) -> None:
-    columns, rows = (sorted(set(picture[key])) for key in ("rate_level_dps", "temperature_level_c"))
+def _panel(figure: go.Figure, picture: ResidualMap, where: Mapping[str, int]) -> None:
+    columns, rows = (sorted(set(levels)) for levels in (picture["rate_level_dps"], picture["temperature_level_c"]))
     cells: dict[tuple[float, float], list[int]] = {}
     for k, cell in enumerate(zip(picture["temperature_level_c"], picture["rate_level_dps"], strict=True)):
         cells.setdefault(cell, []).append(k)
@@ -52,7 +55,7 @@ def _panel(figure: go.Figure, picture: Mapping[str, Any], where: Mapping[str, in
         _scattered(figure, cells, mean, named, dim, where)
         return
 
-    def grid(values: Mapping[tuple[float, float], Any]) -> list[list[Any]]:
+    def grid(values: Mapping[tuple[float, float], T]) -> list[list[T | None]]:
         return [[values.get((row, column)) for column in columns] for row in rows]
 
     x, y = _labels(columns), _labels(rows)
@@ -75,7 +78,7 @@ def _panel(figure: go.Figure, picture: Mapping[str, Any], where: Mapping[str, in
 
 
 def _scattered(
-    figure: go.Figure, cells: Mapping[tuple[float, float], Any], mean: Mapping[tuple[float, float], float],
+    figure: go.Figure, cells: Mapping[tuple[float, float], list[int]], mean: Mapping[tuple[float, float], float],
     named: Mapping[tuple[float, float], str], dim: Mapping[tuple[float, float], int], where: Mapping[str, int],
 ) -> None:  # fmt: skip
     """Draw cells that share few rates or temperatures as squares at their own rate and temperature."""
@@ -92,7 +95,7 @@ def _scattered(
     )  # fmt: skip
 
 
-def cells_text(picture: Mapping[str, Any]) -> str:
+def cells_text(picture: ResidualMap) -> str:
     """Return how many data sets a panel shows, and what shares a cell."""
     cells = len(set(zip(picture["rate_level_dps"], picture["temperature_level_c"], strict=True)))
     n = len(picture["dataset"])

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import plotly.graph_objects as go
 
+from labctl.json_types.answers import CriticismJson
+from labctl.json_types.views import AngleSpectrum, Numbers, Views
 from labctl.plots.theme import INK, colour_of, grid_of, place
 
 
-def angle(answer: Mapping[str, Any]) -> go.Figure | None:
+def angle(answer: CriticismJson) -> go.Figure | None:
     """Return the periodogram in table angle; None where no angle was logged."""
-    lines = (answer.get("views") or {}).get("angle") or []
+    lines = (answer.get("views") or Views()).get("angle") or []
     if not lines:
         return None
     figure = grid_of([_lines_text(line) for line in lines], 1)
@@ -24,14 +25,12 @@ def angle(answer: Mapping[str, Any]) -> go.Figure | None:
     return figure
 
 
-def _lines_text(line: Mapping[str, Any]) -> str:
+def _lines_text(line: AngleSpectrum) -> str:
     above = ", ".join(f"{w['cycles_per_turn']} per turn {w['amplitude_dps']:.2g} deg/s" for w in line["lines"][:3])
     return f"{line['axis']}: {above or 'no line above the limit'}"
 
 
-def _stems(
-    figure: go.Figure, x: list[float], y: list[float], line: Mapping[str, Any], where: Mapping[str, int]
-) -> None:
+def _stems(figure: go.Figure, x: list[int], y: Numbers, line: AngleSpectrum, where: Mapping[str, int]) -> None:
     figure.add_trace(
         go.Bar(x=x, y=y, marker={"color": colour_of(line["axis"])}, name=line["axis"],
                hovertemplate="%{x} per turn: %{y:.2f}<extra></extra>"),
@@ -40,15 +39,15 @@ def _stems(
     _limit(figure, x, line["limit"], where)
 
 
-def _limit(figure: go.Figure, x: list[float], y: list[float], where: Mapping[str, int]) -> None:
+def _limit(figure: go.Figure, x: Sequence[float | None], y: Numbers, where: Mapping[str, int]) -> None:
     figure.add_trace(
         go.Scatter(x=x, y=y, mode="lines", line={"color": INK, "dash": "dash", "width": 1}, name="limit"), **where
     )
 
 
-def frequency(answer: Mapping[str, Any]) -> go.Figure | None:
+def frequency(answer: CriticismJson) -> go.Figure | None:
     """Return the periodograms in time, within data sets and between them; None where there is neither."""
-    views = answer.get("views") or {}
+    views = answer.get("views") or Views()
     within, between = views.get("frequency_within") or [], views.get("frequency") or []
     if not within and not between:
         return None
@@ -64,14 +63,16 @@ def frequency(answer: Mapping[str, Any]) -> go.Figure | None:
                        name=f"{line['axis']}: noise"),
             **where,
         )  # fmt: skip
-    for line in within:
+    for spectrum in within:
         where = place(1, 2)
-        colour = colour_of(line["axis"])
+        colour = colour_of(spectrum["axis"])
         figure.add_trace(
-            go.Scatter(x=line["hz"], y=line["over_white"], mode="lines", line={"color": colour}, name=line["axis"]),
+            go.Scatter(
+                x=spectrum["hz"], y=spectrum["over_white"], mode="lines", line={"color": colour}, name=spectrum["axis"]
+            ),
             **where,
         )
-        _limit(figure, line["hz"], line["limit"], where)
+        _limit(figure, spectrum["hz"], spectrum["limit"], where)
     figure.update_xaxes(type="log", title="cycles per hour", col=1)
     figure.update_xaxes(title="Hz", col=2)
     figure.update_yaxes(type="log", title="amplitude, deg/s", col=1)

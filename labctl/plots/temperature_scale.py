@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from plotly.colors import sample_colorscale
 
@@ -27,6 +26,8 @@ def temperature_colour(temperature_c: float, low_c: float, high_c: float) -> str
     return str(colour).replace(" ", "")
 
 
-def temperature_marker(temperature_c: Sequence[float], low_c: float, high_c: float, **more: Any) -> dict[str, Any]:
+def temperature_marker(
+    temperature_c: Sequence[float], low_c: float, high_c: float, **more: object
+) -> dict[str, object]:
     """Return a Plotly marker coloured by temperature, of a range from low_c to high_c shared by a figure's traces."""
     return {"color": list(temperature_c), "colorscale": TEMPERATURE_SCALE, "cmin": low_c, "cmax": high_c, **more}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
+
+from labctl.json_types.views import Numbers
 
 INK = "#7d8590"
 GRID = "rgba(128,128,128,0.25)"
@@ -38,7 +39,7 @@ TEMPLATE = go.layout.Template(
 )
 
 
-def grid_of(titles: Sequence[str], columns: int = 1, **subplots: Any) -> go.Figure:
+def grid_of(titles: Sequence[str], columns: int = 1, **subplots: object) -> go.Figure:
     """Return an empty figure with a panel for each title, filled row by row."""
     rows = max(-(-len(titles) // columns), 1)
     height = ROW_PX * rows + 90
@@ -70,7 +71,7 @@ def translucent(colour: str, opacity: float = BAND_OPACITY) -> str:
 
 
 def banded(
-    figure: go.Figure, at: Sequence[Any], mean: Sequence[Any], low: Sequence[Any], high: Sequence[Any], colour: str,
+    figure: go.Figure, at: Numbers, mean: Numbers, low: Numbers, high: Numbers, colour: str,
     name: str, **where: int,
 ) -> None:  # fmt: skip
     """Draw a line with its band."""
@@ -89,9 +90,7 @@ def banded(
     )
 
 
-def dots(
-    figure: go.Figure, x: Sequence[Any], y: Sequence[Any], colour: str, texts: Sequence[str], **where: int
-) -> None:
+def dots(figure: go.Figure, x: Numbers, y: Numbers, colour: str, texts: Sequence[str], **where: int) -> None:
     """Draw data sets as faint dots."""
     figure.add_trace(
         go.Scatter(

@@ -105,7 +105,7 @@ class CallServer:
         return True
 
 
-def answer_with(work: Callable[[], Any]) -> Answer:
+def answer_with(work: Callable[[], object]) -> Answer:
     """Return what `work` returns, or what it raises."""
     try:
         return Answer(work())

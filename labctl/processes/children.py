@@ -51,7 +51,7 @@ class Child:
         """The process's number."""
         return self._process.pid
 
-    def open(self, settings: Any) -> None:
+    def open(self, settings: object) -> None:
         """Let it begin with its settings, and wait until it is ready; raises what kept it from that."""
         try:
             self.line.send(settings)
@@ -105,7 +105,7 @@ def line_to_parent() -> tuple[Line, Any]:
     return line, line.recv()
 
 
-def tell(line: Line, what: Any) -> None:
+def tell(line: Line, what: object) -> None:
     """Say something to the parent; nothing where it has gone."""
     with contextlib.suppress(OSError, ValueError):
         line.send(what)

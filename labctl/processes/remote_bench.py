@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.schemas.benches import BenchDescription
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
 
@@ -44,7 +45,7 @@ class RemoteWriter:
         self._folder = folder
         self._caller = Caller(folder / CALLS, TRANSACTION_S)
 
-    def run(self, name: str, args: Any, kwargs: Any) -> Any:
+    def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction there; returns or raises what it did. Raises BenchSilent."""
         return self._caller.call(f"store.{name}", args, kwargs)
 
@@ -116,7 +117,7 @@ class RemoteBench:
         self._heard = Elapsed()
         self._silent = False
         self._last_live: CampaignResponse | None = None
-        self._described: dict[str, Any] | None = None
+        self._described: BenchDescription | None = None
         self._over = threading.Event()
         self._watch: threading.Thread | None = None
 
@@ -176,18 +177,18 @@ class RemoteBench:
         """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
         return self._listeners.add(listener)
 
-    def describe(self) -> dict[str, Any] | None:
+    def describe(self) -> BenchDescription | None:
         """Return the bench and what it is doing; while nothing is heard what was last known, as unconfirmed."""
         if self.bench is None:
             return None
         with contextlib.suppress(BenchSilent):
             self._described = self._ask("bench.describe")
-        known = self._described or {
-            "name": self.bench.name, "simulated": self.bench.is_simulated, "latitude_deg": self.bench.latitude_deg,
-            "units": [], "campaign": None, "unconfirmed": "",
-        }  # fmt: skip
+        known = self._described or BenchDescription(
+            name=self.bench.name, simulated=self.bench.is_simulated, latitude_deg=self.bench.latitude_deg, units=[],
+            campaign=None, unconfirmed="",
+        )  # fmt: skip
         silent = {"unconfirmed": self._silence} if self.heard_s > SILENT_S else {}
-        return {**known, **silent, "heard_s": round(self.heard_s, 1)}
+        return known.model_copy(update={**silent, "heard_s": round(self.heard_s, 1)})
 
     def start(self) -> None:
         """Hear of the bench process from now on; what it begins, it begins by itself."""

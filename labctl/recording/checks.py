@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, needed
 from labctl.recording.constant_rate import rate_change
 from labctl.recording.data_set_limits import refuse_large_numbers, refuse_too_many_data_sets
 from labctl.recording.info import RecordingInfo
+from labctl.recording.recording import Column
 
 #: What no gyro, table or chamber has ever been at: another unit, or a slip.
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
@@ -21,7 +22,7 @@ LARGEST = 1e100
 POSITIONS = frozenset(sign + axis for sign in ("", "-") for axis in "xyz")
 
 
-def checked(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict[str, Column]:
     """Return the columns with the format's defaults filled in; raises BadRecording on the first thing that is wrong."""
     for name in needed(info):
         if name not in columns:
@@ -31,7 +32,7 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -
         _finite(path, name, columns[name], columns.get("valid"))
     for name, (low, high) in POSSIBLE.items():
         if name in columns:
-            _possible(path, name, columns[name], low, high)
+            _possible(path, name, np.asarray(columns[name], dtype=np.float64), low, high)
     for name, values in columns.items():
         _squarable(path, name, values, columns.get("valid"))
     refuse_large_numbers(path, columns)
@@ -39,14 +40,14 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -
         return columns
     refuse_too_many_data_sets(path, info, columns)
     if "t_s" in columns:
-        _time(path, columns["t_s"], strict=info.kind == "samples")
-    _datasets(path, columns["dataset"], points=info.kind == "points")
+        _time(path, np.asarray(columns["t_s"], dtype=np.float64), strict=info.kind == "samples")
+    _datasets(path, np.asarray(columns["dataset"], dtype=np.int64), points=info.kind == "points")
     if info.kind == "samples":
         _one_rate(path, columns)
     return _defaults(path, info, columns)
 
 
-def _possible(path: Path, name: str, values: NDArray[Any], low: float, high: float) -> None:
+def _possible(path: Path, name: str, values: NDArray[np.float64], low: float, high: float) -> None:
     wrong = (values < low) | (values > high)
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -56,8 +57,8 @@ def _possible(path: Path, name: str, values: NDArray[Any], low: float, high: flo
         )
 
 
-def _squarable(path: Path, name: str, values: NDArray[Any], valid: NDArray[Any] | None) -> None:
-    if values.dtype.kind != "f" or not values.size:
+def _squarable(path: Path, name: str, values: Column, valid: Column | None) -> None:
+    if not _are_floats(values) or not values.size:
         return
     if max(np.nanmax(values, initial=0.0), -np.nanmin(values, initial=0.0)) <= LARGEST:
         return
@@ -72,7 +73,11 @@ def _squarable(path: Path, name: str, values: NDArray[Any], valid: NDArray[Any] 
         )
 
 
-def checked_environment(path: Path, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def _are_floats(values: Column) -> TypeGuard[NDArray[np.floating]]:
+    return values.dtype.kind == "f"
+
+
+def checked_environment(path: Path, columns: dict[str, Column]) -> dict[str, Column]:
     """Return the environment's columns; raises BadRecording when time or temperature is missing or not in order."""
     for name in ENVIRONMENT_NEEDED:
         if name not in columns:
@@ -80,13 +85,13 @@ def checked_environment(path: Path, columns: dict[str, NDArray[Any]]) -> dict[st
         _finite(path, name, columns[name], None)
     for name, values in columns.items():
         _squarable(path, name, values, None)
-    _time(path, columns["t_s"], strict=False)
+    _time(path, np.asarray(columns["t_s"], dtype=np.float64), strict=False)
     refuse_large_numbers(path, columns)
     columns.setdefault("run", np.ones(len(columns["t_s"]), dtype=np.int64))
     return columns
 
 
-def _finite(path: Path, name: str, values: NDArray[Any], valid: NDArray[Any] | None) -> None:
+def _finite(path: Path, name: str, values: Column, valid: Column | None) -> None:
     if values.dtype.kind != "f":
         return
     bad = ~np.isfinite(values)
@@ -124,10 +129,10 @@ def _datasets(path: Path, dataset: NDArray[np.int64], *, points: bool) -> None:
         )
 
 
-def _one_rate(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+def _one_rate(path: Path, columns: dict[str, Column]) -> None:
     rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(rate), dtype=bool)
-    change = rate_change(columns["dataset"], rate, valid)
+    change = rate_change(np.asarray(columns["dataset"], dtype=np.int64), rate, valid)
     if change is not None:
         raise BadRecording(
             f"{path}: column 'table_rate_dps', row {change.row + 1}: {change.after_dps:g} deg/s in data set "
@@ -136,7 +141,7 @@ def _one_rate(path: Path, columns: dict[str, NDArray[Any]]) -> None:
         )
 
 
-def _defaults(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def _defaults(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict[str, Column]:
     n = len(columns["dataset"])
     if "position" not in columns:
         columns["position"] = np.full(n, info.axes[0])
@@ -146,11 +151,11 @@ def _defaults(path: Path, info: RecordingInfo, columns: dict[str, NDArray[Any]])
         changed = (columns["run"][1:] != columns["run"][:-1]) | (columns["position"][1:] != columns["position"][:-1])
         columns["mounting"] = np.concatenate([[1], 1 + np.cumsum(changed)]).astype(np.int64)
     if "power_s" not in columns and info.power_on_s is not None and "t_s" in columns and (columns["run"] == 1).all():
-        columns["power_s"] = columns["t_s"] - info.power_on_s
+        columns["power_s"] = np.asarray(columns["t_s"], dtype=np.float64) - info.power_on_s
     return columns
 
 
-def _positions(path: Path, position: NDArray[Any]) -> None:
+def _positions(path: Path, position: Column) -> None:
     for word in np.unique(position):
         if word not in POSITIONS:
             row = int(np.argmax(position == word))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +20,10 @@ def with_quantisation(recording: Recording) -> Recording:
     column keep it: those that were averaged do not show the steps any more.
     """
     columns = recording.columns
-    dataset = np.asarray(columns["dataset"])
+    dataset = np.asarray(columns["dataset"], dtype=np.int64)
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     known, starts = dataset[valid], dataset_starts(dataset[valid])
-    found: dict[str, NDArray[Any]] = {}
+    found: dict[str, NDArray[np.generic]] = {}
     for name in (f"gyro_{axis}" for axis in recording.info.axes):
         if name + QUANTISATION not in columns and len(known):
             sets = np.split(np.asarray(columns[name], dtype=np.float64)[valid], starts[1:])
@@ -35,7 +34,7 @@ def with_quantisation(recording: Recording) -> Recording:
 
 def quantisation_of(points: Recording) -> Mapping[str, NDArray[np.float64]]:
     """Return the columns of means that say what coarse steps leave in them."""
-    return {name: np.asarray(v) for name, v in points.columns.items() if name.endswith(QUANTISATION)}
+    return {name: np.asarray(v, dtype=np.float64) for name, v in points.columns.items() if name.endswith(QUANTISATION)}
 
 
 def per_reading(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +36,7 @@ def temperature_of(columns: Columns) -> NDArray[np.float64] | None:
 
 def pieces(columns: Columns) -> NDArray[np.int64]:
     """Return labels (n,) of readings: they rise with the data set, and within one that is taken in pieces."""
-    dataset, warm = np.asarray(columns["dataset"]), temperature_of(columns)
+    dataset, warm = np.asarray(columns["dataset"], dtype=np.int64), temperature_of(columns)
     piece = np.zeros(len(dataset), dtype=np.int64)
     if len(dataset) and "t_s" in columns and warm is not None:
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
@@ -69,9 +68,9 @@ def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Rec
     read. What the readings do not say, such as the set point, a piece has from its data set.
     """
     columns = {name: np.asarray(values) for name, values in points.columns.items()}
-    if not np.any(columns.get("duration_s", np.zeros(1)) > LONG_S):
+    if not np.any(np.asarray(columns.get("duration_s", 0.0), dtype=np.float64) > LONG_S):
         return points
-    rows: list[dict[str, NDArray[Any]]] = []
+    rows: list[dict[str, NDArray[np.generic]]] = []
     for row in range(len(points)):
         kept = {name: values[row : row + 1] for name, values in columns.items()}
         if kept["duration_s"][0] > LONG_S:
@@ -100,14 +99,15 @@ def to_points(recording: Recording) -> Recording:
     rows = {name: np.asarray(values)[valid] for name, values in columns.items() if name != "valid"}
     starts = dataset_starts(pieces(rows))
     counts = np.diff(np.append(starts, len(rows["dataset"])))
-    points: dict[str, NDArray[Any]] = {}
+    points: dict[str, NDArray[np.generic]] = {}
     for name, values in rows.items():
         if name in FIRST or values.dtype.kind not in "fiu":
             points[name] = values[starts]
         elif name == "t_s":
-            ends = values[starts + counts - 1]
-            points[name] = (values[starts] + ends) / 2
-            points["duration_s"] = (ends - values[starts]) * counts / np.maximum(counts - 1, 1)
+            t_s = np.asarray(values, dtype=np.float64)
+            ends = t_s[starts + counts - 1]
+            points[name] = (t_s[starts] + ends) / 2
+            points["duration_s"] = (ends - t_s[starts]) * counts / np.maximum(counts - 1, 1)
         else:
             points[name], spread = _mean_and_std(values.astype(np.float64), starts, counts)
             if name.startswith("gyro_"):

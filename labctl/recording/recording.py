@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.info import RecordingInfo
 
-Columns = Mapping[str, NDArray[Any]]
+#: One column: numbers, whole numbers or texts, (n,).
+Column = NDArray[np.generic]
+Columns = Mapping[str, Column]
 
 
 @dataclass(frozen=True)

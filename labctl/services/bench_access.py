@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 from instruments.bench_config import BenchFile
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.commands.context import CampaignControl
+from labctl.services.schemas.benches import BenchDescription
 from labctl.services.schemas.campaigns import CampaignResponse
 
 
@@ -56,7 +57,7 @@ class BenchAccess(Protocol):
         """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
         ...
 
-    def describe(self) -> dict[str, Any] | None:
+    def describe(self) -> BenchDescription | None:
         """Return the bench and what it is doing; None without a bench."""
         ...
 

@@ -4,28 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
 
 from labctl.errors import BadInput
 from labctl.fitting import describe_effects, describe_presets
 from labctl.fitting.effects import CATALOGUE, Effect, Formula, Term, checked_formulas, formulas
 from labctl.fitting.effects.trial import first_column
 from labctl.fitting.models.error_model import is_exported
+from labctl.json_types.effects import CataloguedEffect
+from labctl.services.schemas.effects import CatalogueResponse
 
 #: Sizes that are not told as a coefficient: how far the thermometer is off.
 OTHER_UNITS = {"thermometer_error": "K"}
 
 
-def catalogue() -> dict[str, Any]:
+def catalogue() -> CatalogueResponse:
     """Return every effect and every model preset as JSON.
 
     `unit` is that of an effect's plausible sizes; `leaves` says whether a calibration takes it out of the house.
     """
     units = _units()
-    effects = [
+    effects: list[CataloguedEffect] = [
         {**about, "unit": units[about["id"]], "leaves": is_exported(Term(about["id"]))} for about in describe_effects()
     ]
-    return {"effects": effects, "models": describe_presets()}
+    return CatalogueResponse(effects=effects, models=describe_presets())
 
 
 @cache

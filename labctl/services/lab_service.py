@@ -7,7 +7,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
@@ -17,18 +16,21 @@ from labctl.services.benches.start_confirmation import start_questions
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.resumability import NO_BENCH, with_resume
-from labctl.services.campaigns.status import ENDED, from_rows, mark_abandoned, statuses_of
+from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses_of
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.computed import carry_out
 from labctl.services.commands.context import CommandContext
 from labctl.services.computation import Computation, InThreads, Pending
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
+from labctl.services.schemas.benches import BenchResponse
 from labctl.services.schemas.campaigns import (
     CampaignResponse,
     EventResponse,
 )
+from labctl.services.schemas.health import HealthResponse, HeartbeatResponse, PulseResponse
 from labctl.store import Store
+from procedures.contracts.campaign_state import ENDED
 from procedures.execution.signals import shutdown_hook
 
 VERSION = version("labctl")
@@ -108,12 +110,12 @@ class LabService:
         """Begin to execute a command that computes; returns at once. Raises TooBusy."""
         return self.computation.submit(carry_out, command.handler, request, self.clock.utc(), writes=True)
 
-    def benches(self) -> list[dict[str, Any]]:
+    def benches(self) -> list[BenchResponse]:
         """Describe the bench of this service."""
         described = self.bench_access.describe()
         if described is None or self.bench is None:
             return []
-        return [{**described, "start_questions": start_questions(self.bench)}]
+        return [BenchResponse(**dict(described), start_questions=start_questions(self.bench))]
 
     def status(self, campaign: int) -> CampaignResponse:
         """Return where a campaign is: live when it runs here, else as the database tells."""
@@ -142,26 +144,26 @@ class LabService:
         access = self.bench_access
         return self._event_stream.follow(campaign, after, over=lambda: access.stops and not access.runs(campaign))
 
-    def pulse(self) -> dict[str, Any]:
+    def pulse(self) -> PulseResponse:
         """Return what a caller without a key may know: that the service answers, and its version."""
-        return {"status": "ok", "version": VERSION}
+        return PulseResponse(version=VERSION)
 
-    def heartbeat(self) -> dict[str, Any]:
+    def heartbeat(self) -> HeartbeatResponse:
         """Return what every open page asks once a second: that the service answers; reads no database."""
-        return {**self.pulse(), "heard_s": round(self.bench_access.heard_s, 1)}
+        return HeartbeatResponse(version=VERSION, heard_s=round(self.bench_access.heard_s, 1))
 
-    def health(self) -> dict[str, Any]:
+    def health(self) -> HealthResponse:
         """Return whether the service is well."""
         bench = self.bench_access.describe()
-        unconfirmed = any(row.unconfirmed for row in self.store.benches.all()) or bool(bench and bench["unconfirmed"])
-        return {
-            **self.pulse(),
-            **({"status": "look at the bench"} if unconfirmed else {}),
-            "database": Path(self.store.location).name,  # a folder, or a password in a URL, is not shown
-            "since": self._opened_at.isoformat(),
-            "bench": bench,
-            "schedule_trouble": self.bench_access.schedule_trouble,
-        }
+        unconfirmed = any(row.unconfirmed for row in self.store.benches.all()) or bool(bench and bench.unconfirmed)
+        return HealthResponse(
+            status="look at the bench" if unconfirmed else "ok",
+            version=VERSION,
+            database=Path(self.store.location).name,  # a folder, or a password in a URL, is not shown
+            since=self._opened_at.isoformat(),
+            bench=bench,
+            schedule_trouble=self.bench_access.schedule_trouble,
+        )
 
     def metrics(self) -> ServiceFigures:
         """Return figures for a monitor."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
@@ -14,6 +13,7 @@ from labctl.services.benches.confirmation import describe_bench, describe_safe_s
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.commands.service_control import ServiceControl
 from labctl.services.schedule.scheduler import Scheduler
+from labctl.services.schemas.benches import BenchDescription
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
 
@@ -57,7 +57,7 @@ class LocalBench:
         """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
         return (lambda: None) if self.runner is None else self.runner.listen(listener)
 
-    def describe(self) -> dict[str, Any] | None:
+    def describe(self) -> BenchDescription | None:
         """Return the bench and what it is doing; None without a bench."""
         return None if self.runner is None else self.runner.describe()
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 from labctl.store.connection.database import Database, Writer
 from labctl.store.connection.location import is_url
@@ -139,7 +138,7 @@ class Store:
         """Write down at which address the service that holds this database is reached now."""
         self._database.note_address(address)
 
-    def run(self, name: str, args: Any, kwargs: Any) -> Any:
+    def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction that another process sent. Raises KeyError for an unknown name, and what it raises."""
         return run_transaction({type(each).__name__: each for each in vars(self).values()}, name, args, kwargs)
 

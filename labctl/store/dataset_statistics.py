@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +40,8 @@ def statistics(values: NDArray[np.float64], *, spectrum: bool) -> Statistics:
 
 
 def means_rows(
-    recording: int, number: int, columns: Mapping[str, NDArray[Any]], valid: NDArray[np.bool_]
-) -> list[dict[str, Any]]:
+    recording: int, number: int, columns: Mapping[str, NDArray[np.generic]], valid: NDArray[np.bool_]
+) -> list[dict[str, object]]:
     """Return the rows of data_set_means of one data set; only valid readings count."""
     rows = []
     for name, values in columns.items():

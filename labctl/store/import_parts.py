@@ -5,14 +5,13 @@ All that takes time (means, packing) is done here, outside of any transaction.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labctl.recording import Recording, dataset_starts
+from labctl.recording.recording import Columns
 from labctl.store import sample_codec
 from labctl.store.dataset_statistics import means_rows
 
@@ -27,8 +26,8 @@ BLOCK_BYTES = 2 << 20
 TABLES = ("data_sets", "data_set_means", "sample_blocks", "environment")
 ENVIRONMENT = ("t_s", "run", "temperature_c", "chamber_c", "chamber_setpoint_c")
 
-Row = dict[str, Any]
-Columns = Mapping[str, NDArray[Any]]
+#: Column -> value, as SQL takes them.
+Row = dict[str, object]
 
 
 @dataclass
@@ -49,7 +48,8 @@ def import_parts(number: int, recording: Recording) -> Iterator[ImportPart]:
     part = ImportPart()
     for rows in _pieces(number, recording):
         n = sum(map(len, rows.values()))
-        size = sum(len(row["data"]) for row in rows.get("sample_blocks", ()))
+        packed = [row["data"] for row in rows.get("sample_blocks", ())]
+        size = sum(len(data) for data in packed if isinstance(data, bytes))
         if not part.takes(n, size):
             yield part
             part = ImportPart()
@@ -87,7 +87,7 @@ def _pieces(number: int, recording: Recording) -> Iterator[dict[str, list[Row]]]
 
 
 def _data_sets(recording: int, columns: Columns) -> Iterator[dict[str, list[Row]]]:
-    starts = dataset_starts(columns["dataset"])
+    starts = dataset_starts(np.asarray(columns["dataset"], dtype=np.int64))
     ends = np.append(starts[1:], len(columns["dataset"]))
     for start, end in zip(starts, ends, strict=True):
         part = {name: values[start:end] for name, values in columns.items()}

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Literal
+
+from labctl.json_types import JsonDocument, JsonObject
+from labctl.json_types.calibrations import JudgementDetail
+from labctl.json_types.models import KeptAnswer
+from labctl.json_types.recordings import RawChannelJson
+from labctl.json_types.steps import StepJson
+from procedures.contracts.campaign_state import CampaignState
 
 
 @dataclass(frozen=True)
@@ -23,8 +30,8 @@ class NewUnit:
     """A unit that a campaign is about to measure: how it is called on the bench, and what its recording will say."""
 
     gyro: str
-    info: Mapping[str, Any]  #: RecordingInfo as JSON
-    channels: tuple[Mapping[str, Any], ...]  #: name, unit, scale, offset of each raw channel
+    info: JsonDocument  #: RecordingInfo as JSON
+    channels: tuple[RawChannelJson, ...]  #: name, unit, scale, offset of each raw channel
 
 
 @dataclass(frozen=True)
@@ -36,7 +43,7 @@ class RecordingRow:
     campaign: int | None
     gyro: str | None
     kind: str
-    info: Mapping[str, Any]
+    info: JsonDocument
     created_at: datetime
     datasets: int
     readings: int
@@ -78,12 +85,12 @@ class CampaignRow:
 
     id: int
     recipe_name: str
-    recipe: Mapping[str, Any]
+    recipe: JsonObject
     bench_name: str
-    bench: Mapping[str, Any]
+    bench: JsonObject
     schedule_hash: str
     expected_s: float
-    state: str
+    state: CampaignState
     reason: str
     created_at: datetime
     started_at: datetime | None
@@ -97,12 +104,12 @@ class StepRow:
 
     number: int
     kind: str
-    body: Mapping[str, Any]
+    body: StepJson
     expected_s: float
     state: str
     started_s: float | None
     ended_s: float | None
-    result: Mapping[str, Any] | None
+    result: JsonObject | None
 
 
 @dataclass(frozen=True)
@@ -114,7 +121,7 @@ class EventRow:
     at: datetime
     t_s: float
     kind: str
-    level: str
+    level: Literal["info", "warning", "error"]
     message: str
     device: str | None
     value: float | None
@@ -134,7 +141,7 @@ class CalibrationRecord:
     created_at: datetime
     hash: str
     document: bytes
-    answer: Mapping[str, Any]  #: what `labctl fit --json` said
+    answer: KeptAnswer  #: what `labctl fit --json` said
 
 
 @dataclass(frozen=True)
@@ -145,7 +152,7 @@ class Judgement:
     recording: int | None  #: of that criticism
     at: datetime | None  #: when that criticism was made
     override: bool  #: whether it was certified against objections
-    detail: Mapping[str, Any]  #: reason, text, error figures, objections
+    detail: JudgementDetail  #: reason, text, error figures, objections
 
 
 @dataclass(frozen=True)
@@ -171,7 +178,7 @@ class AuditRow:
     who: str
     action: str
     subject: str
-    detail: Mapping[str, Any]
+    detail: JsonDocument
     hash: str
 
 

@@ -35,11 +35,11 @@ class Block:
     data: bytes
 
 
-def pack(columns: Mapping[str, NDArray[Any]], effort: int = LIVE) -> Block:
+def pack(columns: Mapping[str, NDArray[np.generic]], effort: int = LIVE) -> Block:
     """Pack columns (n,) of whole numbers, floats or words."""
     n = len(next(iter(columns.values()), ()))
-    heads: list[list[Any]] = []
-    groups: dict[str, list[NDArray[Any]]] = {}
+    heads: list[list[object]] = []
+    groups: dict[str, list[NDArray[np.generic]]] = {}
     for name, values in columns.items():
         if values.dtype.kind in "iub":
             how, residue = _shrink(values.astype(np.int64))
@@ -57,7 +57,7 @@ def pack(columns: Mapping[str, NDArray[Any]], effort: int = LIVE) -> Block:
     return Block(n, CODEC, zlib.crc32(data), data)
 
 
-def unpack(block: Block) -> dict[str, NDArray[Any]]:
+def unpack(block: Block) -> dict[str, NDArray[np.generic]]:
     """Return the columns of a block; raises StoreError when its bytes are not those that were written."""
     if zlib.crc32(block.data) != block.crc32:
         raise StoreError("a block of readings is damaged: its checksum does not fit; restore it from a backup")
@@ -82,7 +82,7 @@ def load_compressor() -> None:
     import blosc2  # noqa: F401, PLC0415  0.1 s that only readings need
 
 
-def _compress(stack: NDArray[Any], effort: int) -> bytes:
+def _compress(stack: NDArray[np.generic], effort: int) -> bytes:
     if stack.size == 0:
         return b""
     if effort == 0:
@@ -106,7 +106,7 @@ def _decompress(data: bytes) -> bytes:
     return bytes(blosc2.decompress2(data, nthreads=1)) if data else b""
 
 
-def _shrink(values: NDArray[np.int64]) -> tuple[list[Any], NDArray[Any] | None]:
+def _shrink(values: NDArray[np.int64]) -> tuple[list[Any], NDArray[np.generic] | None]:
     """Return how to restore whole numbers (n,), and what is left of them: nothing, or small unsigned numbers."""
     if len(values) == 0:
         return ["c", 0], None
@@ -133,14 +133,14 @@ def _even_ramp(values: NDArray[np.int64]) -> tuple[int, int, int] | None:
     return (first, span, steps) if np.array_equal(values, first + (index * span) // steps) else None
 
 
-def _narrow(values: NDArray[np.uint64], most: int) -> NDArray[Any]:
+def _narrow(values: NDArray[np.uint64], most: int) -> NDArray[np.generic]:
     for kind, limit in ((np.uint8, 2**8), (np.uint16, 2**16), (np.uint32, 2**32)):
         if most < limit:
             return values.astype(kind)
     return values
 
 
-def _restore(head: list[Any], residue: NDArray[Any] | None, n: int) -> NDArray[Any]:
+def _restore(head: list[Any], residue: NDArray[np.generic] | None, n: int) -> NDArray[np.generic]:
     kind = head[2]
     if kind == "c":
         return np.full(n, head[3], dtype=np.int64)

@@ -11,7 +11,7 @@ from fastapi.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 FOLDER = Path(__file__).parent / "static"
-PLOTLY = Path(plotly.__file__).parent / "package_data" / "plotly.min.js"
+PLOTLY = Path(str(plotly.__file__)).parent / "package_data" / "plotly.min.js"
 STATIC = "/static/"
 #: Address prefixes of the pages; the router in the browser handles the rest of an address.
 PAGES = ("/start", "/bench", "/campaigns", "/units", "/explore", "/recordings", "/effects")

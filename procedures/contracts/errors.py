@@ -17,7 +17,6 @@ ProcedureError
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from instruments.errors import copy_of
 
@@ -25,7 +24,7 @@ from instruments.errors import copy_of
 class ProcedureError(Exception):
     """Anything that a person can be told in one line."""
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Pickle it whole: a subclass may take other arguments than its text."""
         return copy_of, (type(self), self.args, self.__dict__)
 

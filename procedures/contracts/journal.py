@@ -2,44 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
 from typing import Protocol
 
 from instruments.interfaces.gyro import Readings
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.steps import Acquire, StepResult
-
-
-class CampaignState(StrEnum):
-    """Where a campaign is in its life."""
-
-    PLANNED = "planned"
-    RUNNING = "running"
-    PAUSED = "paused"
-    WAITING = "waiting"  #: for a person: a mounting to confirm
-    INTERRUPTED = "interrupted"  #: the bench had to be released; to be resumed
-    DONE = "done"
-    ABORTED = "aborted"
-    FAILED = "failed"
-
-
-_S = CampaignState
-#: Ways to stop before the end of the plan.
-_ENDS = frozenset({_S.INTERRUPTED, _S.ABORTED, _S.FAILED})
-#: Which state may follow which. Only `done` is final: what failed or was aborted goes on by a person's word, what was
-#: interrupted or a dying process left as it was by itself. A suspension inside a pause is a pause for another reason.
-NEXT: Mapping[CampaignState, frozenset[CampaignState]] = {
-    _S.PLANNED: frozenset({_S.RUNNING, *_ENDS}),
-    _S.RUNNING: frozenset({_S.RUNNING, _S.PAUSED, _S.WAITING, _S.DONE, *_ENDS}),
-    _S.PAUSED: frozenset({_S.RUNNING, _S.PAUSED, *_ENDS}),
-    _S.WAITING: frozenset({_S.RUNNING, *_ENDS}),
-    _S.INTERRUPTED: frozenset({_S.RUNNING, _S.FAILED}),
-    _S.DONE: frozenset(),
-    _S.ABORTED: frozenset({_S.RUNNING}),
-    _S.FAILED: frozenset({_S.RUNNING}),
-}
 
 
 class DataSetState(StrEnum):

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
 from procedures.contracts.bench import Bench
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.control import Control
 from procedures.contracts.errors import Aborted, Interrupted, ProcedureError
-from procedures.contracts.journal import CampaignState, Journal
+from procedures.contracts.journal import Journal
 from procedures.contracts.operator import Operator
 from procedures.contracts.steps import Mount
 from procedures.execution.active_bench import ActiveBench

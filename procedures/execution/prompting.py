@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import StepFailed, Unanswered
-from procedures.contracts.journal import CampaignState, Event
+from procedures.contracts.journal import Event
 from procedures.contracts.operator import Answer, Prompt
 from procedures.execution.context import POLL_S, ExecutionContext
 from procedures.execution.waiting import CHECK_S, pass_time

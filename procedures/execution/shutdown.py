@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from procedures.contracts.journal import NOT_SAFE, CampaignState, Event
+from procedures.contracts.campaign_state import CampaignState
+from procedures.contracts.journal import NOT_SAFE, Event
 from procedures.execution.context import ExecutionContext
 from procedures.execution.safe_state import make_safe
 from procedures.execution.signals import ignore_signals

@@ -10,10 +10,9 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
 
 #: What `signal.signal` takes and returns; None for a handler that was not set by Python.
-Handler = Callable[[int, FrameType | None], Any] | int | None
+Handler = Callable[[int, FrameType | None], object] | int | None
 
 #: The signals that end a process.
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -58,7 +57,7 @@ def shutdown_hook(hook: Callable[[], None]) -> Iterator[None]:
     A signal that is ignored, or ends the process without a Python handler, does not call it.
     """
 
-    def before_the(handler: Callable[[int, FrameType | None], Any]) -> Handler:
+    def before_the(handler: Callable[[int, FrameType | None], object]) -> Handler:
         def handle(number: int, frame: FrameType | None) -> None:
             hook()
             handler(number, frame)

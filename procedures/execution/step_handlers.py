@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro
@@ -159,7 +158,7 @@ def safe_state(context: ExecutionContext, _step: SafeState) -> Figures:
     return {}
 
 
-HANDLERS: Mapping[str, Callable[[ExecutionContext, Any], Figures]] = {
+HANDLERS: Mapping[str, Callable[..., Figures]] = {
     "home": home,
     "power_on": power_on,
     "power_off": power_off,

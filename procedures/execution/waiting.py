@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import Aborted, GuardTripped, Interrupted, StepFailed
-from procedures.contracts.journal import CampaignState, Event
+from procedures.contracts.journal import Event
 from procedures.execution.context import POLL_S, ExecutionContext
 
 CHECK_S = 1.0  #: how long the clock runs at most between two looks at the control

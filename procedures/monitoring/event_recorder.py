@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from instruments.clock import Clock
-from procedures.contracts.journal import CampaignState, Event, Journal
+from procedures.contracts.campaign_state import CampaignState
+from procedures.contracts.journal import Event, Journal
 from procedures.contracts.steps import StepResult
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.progress import ProgressTracker

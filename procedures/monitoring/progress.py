@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from instruments.clock import Clock
-from procedures.contracts.journal import CampaignState
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.operator import Prompt
 from procedures.monitoring.live_output import LiveOutput
 from procedures.monitoring.step_text import describe_step
@@ -83,7 +83,7 @@ class ProgressTracker:
         """Update the forecast at the end of a step."""
         self._publish(self._forecast(self._left_after_s[index]))
 
-    def update(self, t_s: float | None = None, **changes: Any) -> None:
+    def update(self, t_s: float | None = None, **changes: object) -> None:
         """Change fields of the progress; with a campaign time the forecast is computed again too."""
         if t_s is not None:
             left_s = max(self._expected_s[self._index] - (t_s - self.step_began_s), 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from instruments.bench_config import part_of
 from instruments.protocols import watlow_f4t_registers as f4t
+from instruments.protocols.modbus_registers import WordOrder
 from instruments.protocols.watlow_settings import WatlowSettings
 from instruments.simulators.links.modbus_device import Cell, ModbusDevice, constant, float32, int16, items
 from instruments.simulators.setup import InstrumentSetup
@@ -20,7 +21,7 @@ class SimulatedF4T(ModbusDevice):
     def __init__(self, setup: InstrumentSetup) -> None:
         chamber = part_of(setup.bench.chamber, WatlowSettings)
         self._world = setup.world
-        self._order = chamber.word_order
+        self._order: WordOrder = chamber.word_order
         self.part_number = [ord(letter) for letter in PART_NUMBER]
         self.status = f4t.STATUS_OK
         self.units = f4t.UNITS_CELSIUS  #: 30: Fahrenheit

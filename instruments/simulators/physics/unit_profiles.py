@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +135,7 @@ def usual_rate_hz(driver: str) -> float:
     return USUAL_RATE_HZ[driver]
 
 
-def make_unit(driver: str, axes: tuple[str, ...], settings: dict[str, Any], seed: list[int]) -> UnitTruth:
+def make_unit(driver: str, axes: tuple[str, ...], settings: Mapping[str, object], seed: list[int]) -> UnitTruth:
     """Return one unit of a profile with the deviations of the bench file; raises ValueError for unknown names."""
     given = dict(settings)
     profile = given.pop("profile", DEFAULT_PROFILES.get(driver))
@@ -145,7 +144,7 @@ def make_unit(driver: str, axes: tuple[str, ...], settings: dict[str, Any], seed
             f"gyro driver {driver!r}: no profile of a simulated unit is known; set one in [simulation.units] of the "
             f"bench file (there are {', '.join(PROFILES)})"
         )
-    if profile not in PROFILES:
+    if not isinstance(profile, str) or profile not in PROFILES:
         raise ValueError(f"simulated unit profile {profile!r} is not known (there are {', '.join(PROFILES)})")
     made = PROFILES[profile](axes, np.random.default_rng(seed))
     known = {

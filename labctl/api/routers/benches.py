@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fastapi import APIRouter
 
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.campaigns.bench_status import bench_statuses
 from labctl.services.commands.registry import CLEAR_BENCH
 from labctl.services.commands.requests import ToBench
-from labctl.services.schemas.benches import BenchStatus, ClearRequest
+from labctl.services.schemas.benches import BenchResponse, BenchStatus, ClearRequest
 
 router = APIRouter(prefix="/api", tags=["what there is"])
 
 
 @router.get("/benches", summary="This service's bench")
-def benches(service: ServiceDep) -> list[dict[str, Any]]:
+def benches(service: ServiceDep) -> list[BenchResponse]:
     """The bench that this service runs: its instruments, limits and what it is doing."""
     return service.benches()
 

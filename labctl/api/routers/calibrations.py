@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Request, Response
-from fastapi.responses import StreamingResponse
 
 from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.computation import execute, follow, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
+from labctl.api.event_stream import EventStream
 from labctl.fitting.effects import read_formulas
 from labctl.services.calibrations import fitting as services
 from labctl.services.calibrations.assessment import assess
@@ -28,7 +28,9 @@ from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
     FitResponse,
+    ImprovedVersionResponse,
     ImproveRequest,
+    ImproveResponse,
     LadderResponse,
     PreviewResponse,
     SurfaceResponse,
@@ -45,6 +47,7 @@ from labctl.services.schemas.criticism import (
     CriticismResponse,
     PictureResponse,
     ResidualsResponse,
+    StageResponse,
     VerificationResponse,
 )
 from labctl.services.schemas.uncertainty import UncertaintyResponse
@@ -89,13 +92,13 @@ async def fit(serial: str, request: FitRequest, service: ServiceDep) -> FitRespo
 
 
 @command_route(router, IMPROVE, "Change a model")
-async def improve(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> FitResponse:
+async def improve(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> ImproveResponse:
     """Add effects to a version, or take some out, and fit everything again; it becomes the unit's next version."""
     return await execute(service, IMPROVE, ToNewestOrVersion(serial, version, request))
 
 
 @router.get("/calibrations/{version}", summary="One version")
-def one_version(serial: str, version: int, service: ServiceDep) -> VersionResponse:
+def one_version(serial: str, version: int, service: ServiceDep) -> VersionResponse | ImprovedVersionResponse:
     """The version as its fit answered, when and from what it was made, and whether it is in force."""
     return services.one_version(service.store, serial, version)
 
@@ -148,7 +151,8 @@ async def criticism(
 @router.get(
     "/calibrations/{version}/criticism/events",
     summary="Follow a criticism while it is computed",
-    response_class=StreamingResponse,
+    response_class=EventStream,
+    responses={200: {"model": StageResponse | CriticismResponse, "description": "Stages, then the criticism."}},
 )
 async def criticism_events(
     request: Request,
@@ -158,7 +162,7 @@ async def criticism_events(
     recording: RecordingNumber = None,
     other_unit: OtherUnit = False,
     formula: Formulas = None,
-) -> StreamingResponse:
+) -> EventStream:
     """Server-sent events: `stage` as each stage begins, then `answer`, the criticism, or `problem`.
 
     The computation is cancelled when the client leaves.

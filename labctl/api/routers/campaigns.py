@@ -6,9 +6,9 @@ from collections.abc import AsyncIterator
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
-from fastapi.responses import StreamingResponse
 
 from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
+from labctl.api.event_stream import EventStream
 from labctl.services.campaigns.plan_view import campaign_plan
 from labctl.services.commands.registry import (
     ABORT_CAMPAIGN,
@@ -22,6 +22,7 @@ from labctl.services.schemas.campaigns import (
     CampaignRequest,
     CampaignResponse,
     ConfirmRequest,
+    EventResponse,
     ReasonRequest,
     ResumeRequest,
 )
@@ -91,10 +92,17 @@ def confirm(campaign: int, request: ConfirmRequest, service: ServiceDep) -> Camp
     return service.execute(CONFIRM_PROMPT, ToCampaign(campaign, request))
 
 
-@router.get("/{campaign}/events", summary="Follow a campaign", response_class=StreamingResponse)
+@router.get(
+    "/{campaign}/events",
+    summary="Follow a campaign",
+    response_class=EventStream,
+    responses={
+        200: {"model": EventResponse | CampaignResponse, "description": "Of `progress` a campaign, else an event."}
+    },
+)
 async def events(
     campaign: int, service: ServiceDep, last_event_id: Annotated[int | None, Header()] = None
-) -> StreamingResponse:
+) -> EventStream:
     """Server-sent events from the first or, with `Last-Event-ID`, from the one after it, until the campaign ends.
 
     Between them `progress`, without an id: where the campaign stands, whenever that has changed.
@@ -110,4 +118,4 @@ async def events(
                 yield f"id: {told.id}\nevent: {told.kind}\ndata: {told.model_dump_json()}\n\n".encode()
 
     service.status(campaign)
-    return StreamingResponse(stream(), media_type="text/event-stream", headers={"Cache-Control": "no-cache"})
+    return EventStream(stream(), headers={"Cache-Control": "no-cache"})

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fastapi import APIRouter
 
 from labctl.services.effects import catalogue
+from labctl.services.schemas.effects import CatalogueResponse
 
 router = APIRouter(prefix="/api", tags=["what there is"])
 
 
 @router.get("/effects", summary="The catalogue of physical effects")
-def effects() -> dict[str, Any]:
+def effects() -> CatalogueResponse:
     """Every effect a model can be made of: its standard term, sentence, origin, channels, coefficients and ranges."""
     return catalogue()

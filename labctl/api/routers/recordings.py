@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, UploadFile
 from fastapi.responses import StreamingResponse
@@ -20,7 +20,10 @@ from labctl.services.schemas.recordings import (
     DataSetsResponse,
     ExampleRequest,
     ImportResponse,
+    RecordingAlone,
     RecordingResponse,
+    RecordingWithPoints,
+    SamplesResponse,
     SimulatedRecordingResponse,
     SimulatedRequest,
     TraceResponse,
@@ -64,7 +67,7 @@ def recording(
     recording: int,
     service: ServiceDep,
     points: Annotated[bool, Query(description="With the means of its data sets.")] = True,
-) -> dict[str, Any]:
+) -> RecordingAlone | RecordingWithPoints:
     """What the recording is: unit, axes, channels, data sets."""
     return catalogue.describe_recording(service.store, recording, points=points)
 
@@ -119,6 +122,6 @@ def samples(
     service: ServiceDep,
     dataset: Annotated[int, Query(description="Number of the data set.")],
     limit: Annotated[int, Query(ge=1, le=100_000, description="At most this many readings.")] = 10_000,
-) -> dict[str, Any]:
+) -> SamplesResponse:
     """The readings of one data set, column by column, in the units named beside them."""
     return catalogue.dataset_samples(service.store, recording, dataset, limit)

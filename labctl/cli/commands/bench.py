@@ -23,15 +23,15 @@ def check(
     from labctl.services.benches.check import check_bench
 
     with one_clear_line():
-        checks = check_bench(bench)
+        answer = check_bench(bench)
     if as_json:
-        print_json({"bench": bench, "ok": all(c.ok for c in checks), "devices": [c.model_dump() for c in checks]})
+        print_json(answer)
     else:
-        for device in checks:
+        for device in answer.devices:
             mark = "[green]answers[/]" if device.ok else "[red]failed[/] "
             console.print(f"{mark}  {device.device:14} ", end="")
             console.print(f"{device.text}  [{device.driver} of {device.distribution} {device.version}]", markup=False)
-    if not all(c.ok for c in checks):
+    if not answer.ok:
         raise typer.Exit(1)
 
 
@@ -87,4 +87,4 @@ def list_(as_json: Json = False, database: Database = None) -> None:  # noqa: AR
         print_json(benches)
         return
     for bench in benches:
-        console.print(f"{bench['name']:18} {bench['text']}", markup=False)
+        console.print(f"{bench.name:18} {bench.text}", markup=False)

@@ -156,9 +156,9 @@ def compensate(
     if as_json:
         print_json(answer)
         return
-    console.print(f"{answer['rows']} readings -> {target}", markup=False)
-    if answer["outside"]:
+    console.print(f"{answer.rows} readings -> {target}", markup=False)
+    if answer.outside:
         console.print(
-            f"{answer['outside']} of them lie outside the calibrated range and are flagged in column `outside`",
+            f"{answer.outside} of them lie outside the calibrated range and are flagged in column `outside`",
             style="yellow",
         )

@@ -47,7 +47,7 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
             if not as_json and answer.last_error and answer.last_error != fault:
                 fault = answer.last_error
                 console.print(f"fault: {fault}", style="red", markup=False)
-            if answer.abandoned or answer.state not in {"planned", "running", "paused", "waiting"}:
+            if not answer.active:
                 break
             clock.sleep(1.0)
     print_json(answer) if as_json else print_campaign(answer)
@@ -122,12 +122,11 @@ def abort(
 def _at_its_end(database: str | None, answer: CampaignResponse) -> CampaignResponse:
     """Return where an aborted campaign is once its bench is safe, or after `SAFE_WITHIN_S`."""
     from instruments.clock import SystemClock
-    from labctl.services.campaigns.status import ENDED
     from labctl.services.commands.open import current_status
 
     clock = SystemClock()
     until_s = clock.now_s() + SAFE_WITHIN_S
-    while answer.state not in ENDED and clock.now_s() < until_s:
+    while not answer.ended and clock.now_s() < until_s:
         clock.sleep(LOOK_S)
         answer = current_status(database, answer.id)
     return answer

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, table
-
-if TYPE_CHECKING:
-    pass
 
 
 def effects(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001
@@ -20,10 +15,10 @@ def effects(as_json: Json = False, database: Database = None) -> None:  # noqa: 
         print_json(answer)
         return
     rows = table("effects", "id", "origin", "term", "what it is")
-    for effect in answer["effects"]:
+    for effect in answer.effects:
         rows.add_row(effect["id"], effect["origin"], effect["term"], effect["sentence"])
     console.print(rows)
     presets = table("\nmodels", "name", "what it is")
-    for preset in answer["models"]:
+    for preset in answer.models:
         presets.add_row(preset["name"], preset["sentence"])
     console.print(presets)

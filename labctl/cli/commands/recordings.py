@@ -62,11 +62,12 @@ def export_recording(
     """Write a recording in the interchange format: every reading, as it was measured."""
     from labctl.services.commands.open import open_readonly
     from labctl.services.recordings.transfer import export_recording as export
+    from labctl.services.schemas.recordings import ExportedRecording
 
     with one_clear_line(), open_readonly(database) as store:
         written = export(store, recording, out, "csv" if csv else "parquet", points=points)
     if as_json:
-        print_json({"recording": recording, "folder": str(out), "files": written})
+        print_json(ExportedRecording(recording=recording, folder=str(out), files=written))
     else:
         console.print(f"recording {recording} -> {out}: {', '.join(written)}")
 

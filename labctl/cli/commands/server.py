@@ -39,6 +39,7 @@ def serve(
     """Serve calibrations over HTTP and run campaigns on the bench. Stops with Ctrl-C, bench left safe."""
     from labctl.processes.settings import ServeRequest
     from labctl.processes.supervisor import Ready, serve_forever
+    from labctl.services.schemas.processes import ServiceReady
 
     request = ServeRequest(
         bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
@@ -49,7 +50,8 @@ def serve(
         named = request.bench_name
         unconfirmed, cut_short = ("", "") if named is None else _found(named, database)
         if as_json:
-            print_json({**asdict(service), "unconfirmed": unconfirmed, "cut_short": cut_short}, one_line=True)
+            said = ServiceReady(**asdict(service), unconfirmed=unconfirmed, cut_short=cut_short)
+            print_json(said, one_line=True)
             return
         console.print(f"labctl listens on {service.url}  (API text: {service.url}/api-docs)", markup=False)
         for text in filter(None, (unconfirmed, cut_short)):
@@ -89,10 +91,11 @@ def simulator(
 ) -> None:
     """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until Ctrl-C."""
     from labctl.services.benches.check import serve_simulator
+    from labctl.services.schemas.processes import SimulatorReady
 
     def ready(addresses: dict[str, str]) -> None:
         if as_json:
-            print_json({"addresses": addresses, "bench_file": str(out) if out else None}, one_line=True)
+            print_json(SimulatorReady(addresses=addresses, bench_file=str(out) if out else None), one_line=True)
             return
         for device, address in addresses.items():
             console.print(f"{device:14} {address}", markup=False)

@@ -22,11 +22,11 @@ def play(demo: DemoRunner, real_serial: str) -> None:
     demo.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])
     answer = _criticise_and_improve(demo, SERIAL)
     demo.say(f"(hidden in it was: {', '.join(HIDDEN)})")
-    demo.figures["hidden"] = {"hidden": list(HIDDEN), "named": answer.named, "verdict": answer.verdict}
+    demo.figures["hidden"] = {"hidden": list(HIDDEN), "named": [*answer.named], "verdict": answer.verdict}
     demo.title("The same walk through the real gyro's recording, from a plain model")
     demo.fit(real_serial, "bias_scale", demo.store.recordings.of_unit(real_serial)[0].id)
     answer = _criticise_and_improve(demo, real_serial)
-    demo.figures["real_walk"] = {"named": answer.named, "verdict": answer.verdict}
+    demo.figures["real_walk"] = {"named": [*answer.named], "verdict": answer.verdict}
 
 
 def _criticise_and_improve(demo: DemoRunner, serial: str) -> CriticismResponse:
@@ -36,12 +36,12 @@ def _criticise_and_improve(demo: DemoRunner, serial: str) -> CriticismResponse:
     if answer.named:
         added = answer.named[0]
         better = improve_unit(demo.store, serial, ImproveRequest(add=[added]), VirtualClock().utc())
-        before, after = (better.model_extra or {})["before"], better.error
+        before, after = better.before, better.error
         if answer.verdict == "ambiguous":
             demo.say(f"adding the first of them, to see how far it leads (not that it is the cause): {added}")
         demo.say(
-            f"added {added}: RMS {before['rms_dps']:.4f} -> {after.rms_dps:.4f} deg/s, held-out temperatures "
-            f"{before['heldout_rms_dps']:.4f} -> {after.heldout_rms_dps:.4f}, noise floor {after.noise_floor_dps:.4f}"
+            f"added {added}: RMS {before.rms_dps:.4f} -> {after.rms_dps:.4f} deg/s, held-out temperatures "
+            f"{before.heldout_rms_dps:.4f} -> {after.heldout_rms_dps:.4f}, noise floor {after.noise_floor_dps:.4f}"
         )
         demo.say(f"and then: {criticise_unit(demo.store, serial, None, None, []).text[0]}")
     for line in ladder_lines(ladder(demo.store, serial)):

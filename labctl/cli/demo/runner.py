@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
+from pydantic import JsonValue
 from rich.console import Console
 
 from instruments.bench_config import SimulationSettings
@@ -22,6 +22,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.calibrations import FitRequest, FitResponse
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
+from procedures.contracts.campaign_state import CampaignState
 from procedures.monitoring.progress import Progress
 
 
@@ -33,7 +34,7 @@ class DemoRunner:
     folder: Path
     console: Console
     quiet: bool
-    figures: dict[str, Any] = field(default_factory=dict)
+    figures: dict[str, JsonValue] = field(default_factory=dict)
 
     def title(self, text: str) -> None:
         """Print the title of a part."""
@@ -67,7 +68,7 @@ class DemoRunner:
                 bar.update(answer_of(row, progress))
 
             answer = run(self.store, prepared, observe=seen)
-        if answer.state != "done":
+        if answer.state is not CampaignState.DONE:
             raise RuntimeError(f"the demo's campaign {answer.id} ended {answer.state}: {answer.reason}")
         assert answer.started_at is not None
         assert answer.ended_at is not None

@@ -20,7 +20,7 @@ def play(demo: DemoRunner) -> None:
     fitted = demo.fit(SERIAL, "ojeda2000", recording)
     points = demo.store.recordings.points(recording)
     context, result = fit_data_of(points), fit(points, "ojeda2000")
-    rate = np.asarray(points.columns["table_rate_dps"])
+    rate = np.asarray(points.columns["table_rate_dps"], dtype=np.float64)
     raw = context.outputs["z"] - context.true_rate_dps("z")
     at_rest = np.abs(rate) < 1e-9
     bias = float(raw[at_rest].mean())

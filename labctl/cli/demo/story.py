@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+
+from pydantic import JsonValue
 
 from instruments.clock import VirtualClock
 from labctl.cli.demo import example_data, find_missing_effect, serve_calibrations, single_axis, triaxial
 from labctl.cli.demo.runner import DemoRunner, maybe_silent
 from labctl.errors import BadInput
+from labctl.json_types.models import ErrorFiguresJson
 from labctl.services.calibrations.certification import certify
 from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import open_store
@@ -19,7 +20,7 @@ from labctl.store import open_store
 DATABASE = "demo.sqlite"
 
 
-def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) -> dict[str, Any]:
+def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) -> dict[str, JsonValue]:
     """Play the whole story into `folder`; returns its figures, each computed in this run."""
     location = database or str(_fresh(folder) / DATABASE)
     with maybe_silent(quiet) as console, open_store(location, write=True) as store:
@@ -50,7 +51,7 @@ def _certify_best(demo: DemoRunner, serial: str) -> None:
         demo.say(f"  overridden: {each.text}")
 
 
-def _least_known(error: Mapping[str, float | None]) -> float:
+def _least_known(error: ErrorFiguresJson) -> float:
     known = (error["heldout_rms_dps"], error["rms_dps"])
     return next((value for value in known if value is not None), math.inf)
 

@@ -31,13 +31,13 @@ def play(demo: DemoRunner, *, quick: bool) -> None:
         errors[model] = residuals(fitted, context, fit_turning(fitted, context))
     print_tables(demo, context, errors)
     floor = demo.store.calibrations.get(SERIAL, versions["yang2018"]).answer["error"]["noise_floor_dps"]
+    assert floor is not None
+    over_floor = {axis: float(np.sqrt(np.mean(values**2))) / floor for axis, values in errors["yang2018"].items()}
     demo.figures["triaxial"] = {
-        "held_out_rms_over_floor": {
-            axis: float(np.sqrt(np.mean(values**2))) / floor for axis, values in errors["yang2018"].items()
-        },
-        "raw_over_compensated": _gains(context, errors),
+        "held_out_rms_over_floor": {**over_floor},
+        "raw_over_compensated": {**_gains(context, errors)},
     }
-    ratios = ", ".join(f"{axis} {r:.2f}" for axis, r in demo.figures["triaxial"]["held_out_rms_over_floor"].items())
+    ratios = ", ".join(f"{axis} {r:.2f}" for axis, r in over_floor.items())
     demo.say(f"yang2018 on the unseen campaign, RMS over noise floor: {ratios}  (1 is perfect)")
 
 

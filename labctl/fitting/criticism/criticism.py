@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +27,8 @@ from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed, unchanged
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.json_types.criticism import NotTestable
+from labctl.json_types.views import Views
 from labctl.progress import report_stage
 from labctl.recording import Recording
 
@@ -49,9 +50,9 @@ class Criticism:
     comparison: Comparison | None  #: None where there is too little for a verdict
     fuller: Comparison | None = None  #: beside all that was found missing
     suspects: tuple[Suspect, ...] = ()
-    not_testable: tuple[Mapping[str, Any], ...] = ()
+    not_testable: tuple[NotTestable, ...] = ()
     explained: float | None = None
-    views: Mapping[str, Any] = field(default_factory=dict)
+    views: Views = field(default_factory=Views)
 
     @property
     def floor(self) -> NoiseFloor:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.noise_floor import NoiseFloor
 from labctl.fitting.data.temperature_levels import ONE_LEVEL_SPAN_C
 from labctl.fitting.numeric.arrays import Array, over
+from labctl.json_types.criticism import FailingRange, WorstDataSet
 
 #: Bins of a channel over which residuals are averaged.
 BINS = 8
@@ -84,9 +84,9 @@ def _axis(comparison: Comparison, axis: str, floor_dps: Array) -> Residuals:
     )
 
 
-def where_it_fails(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
+def where_it_fails(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[FailingRange]:
     """Return the ranges of channels in which the mean residual is far from 0, worst first."""
-    found: list[dict[str, Any]] = []
+    found: list[FailingRange] = []
     for axis, residuals in left.items():
         for name, nodes in smooth_channels(data, axis).items():
             values = data.at_sets(nodes)
@@ -121,18 +121,18 @@ def has_one_rising_leg(data: ReducedRecording) -> bool:
     return span > ONE_LEVEL_SPAN_C and back < BACK_SHARE * span
 
 
-def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most: int = 10) -> list[dict[str, Any]]:
+def worst_data_sets(data: ReducedRecording, left: Mapping[str, Residuals], most: int = 10) -> list[WorstDataSet]:
     """Return the data sets with the largest mean residual over its floor, at most `most`, worst first."""
-    found: list[dict[str, Any]] = []
+    found: list[WorstDataSet] = []
     for axis, residuals in left.items():
         order = np.argsort(-np.abs(residuals.score))[:most]
-        found += [
-            {
-                "axis": axis,
-                "dataset": int(data.dataset[i]),
-                "residual_dps": float(residuals.means[i]),
-                "over_floor": float(residuals.score[i]),
-            }
+        found.extend(
+            WorstDataSet(
+                axis=axis,
+                dataset=int(data.dataset[i]),
+                residual_dps=float(residuals.means[i]),
+                over_floor=float(residuals.score[i]),
+            )
             for i in order
-        ]
+        )
     return sorted(found, key=lambda line: -abs(line["over_floor"]))[:most]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc
@@ -27,6 +26,7 @@ from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.numeric.json_numbers import none_for_nan
+from labctl.json_types.models import Coefficient
 from labctl.progress import report_stage
 
 #: At most this many suspects are reported.
@@ -42,7 +42,7 @@ class Suspect:
     candidate: Candidate
     probability: float
     p_value: float  #: of its gain in chi2, corrected for the number of options tried
-    coefficients: Mapping[str, Any]  #: axis -> name -> value, u (None: unknown), unit
+    coefficients: Mapping[str, Mapping[str, Coefficient]]  #: axis -> name -> value, u (None: unknown), unit
     is_fitted: bool  #: whether these are those of `after`, which a version with the effect has; else of the comparison
     share_removed: float  #: of the excess chi2, 0 to 1
     after: FitResult | None  #: fit with the effect added; None where it was not or cannot be fitted
@@ -105,9 +105,9 @@ def _fit_with(
         return None
 
 
-def _fitted_coefficients(after: FitResult, candidate: Candidate) -> dict[str, dict[str, dict[str, Any]]]:
+def _fitted_coefficients(after: FitResult, candidate: Candidate) -> dict[str, dict[str, Coefficient]]:
     """Return axis -> name -> value, u and unit of the candidate in a fit, on the axes on which it competed."""
-    found: dict[str, dict[str, dict[str, Any]]] = {}
+    found: dict[str, dict[str, Coefficient]] = {}
     for axis in (axis for axis in candidate.option if axis in after.fitted.axes):
         fit = after.fitted.axes[axis]
         rows = [k for k, owner in enumerate(fit.effects) if owner == candidate.id]

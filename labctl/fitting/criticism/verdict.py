@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.derived import with_derived
+from labctl.json_types.criticism import Remainder
+from labctl.json_types.models import Coefficient
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
 
@@ -74,7 +76,7 @@ class Verdict:
     terms: Mapping[str, Term] = field(default_factory=dict)  #: effect id -> the shape that fits best
     confounded: tuple[str, ...] = ()  #: channels that this schedule cannot tell from the first of `depends_on`
     not_physical: tuple[str, ...] = ()  #: effects alike in these data, at a size that this technology cannot have
-    remainder: Mapping[str, Any] | None = None  #: share of the excess that what is named leaves, and its channels
+    remainder: Remainder | None = None  #: share of the excess that what is named leaves, and its channels
     further: tuple[tuple[str, ...], ...] = ()  #: of an adequate model: what would take off noise, and is not missing
     axes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: leading effect id -> the axes that show it
 
@@ -284,14 +286,14 @@ def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
     return {c.id: float(w / total) for c, w in zip(effects, weights, strict=True)}
 
 
-def coefficients_of(comparison: Comparison, candidate: Candidate) -> dict[str, dict[str, dict[str, float | str]]]:
+def coefficients_of(comparison: Comparison, candidate: Candidate) -> dict[str, dict[str, Coefficient]]:
     """Return axis -> name -> value, standard uncertainty and unit of a candidate's best shape beside the base."""
-    found: dict[str, dict[str, dict[str, float | str]]] = {}
+    found: dict[str, dict[str, Coefficient]] = {}
     for axis, index in candidate.option.items():
         option = comparison.designs[axis].options[index]
         values, covariance = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
         u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        plain = {
+        plain: dict[str, Coefficient] = {
             name: {"value": float(value), "u": float(error), "unit": unit}
             for name, unit, value, error in zip(option.names, option.units, values, u, strict=True)
         }

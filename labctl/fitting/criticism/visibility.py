@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import usual_model
+from labctl.json_types.criticism import NotTestable
 from labctl.recording import Recording
 
 #: An effect of which less than this share is visible beside the model cannot be shown by the schedule.
@@ -114,10 +115,10 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
     return EffectVisibility(effect_id, True, share, sizes.get(unit), unit)
 
 
-def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> list[Mapping[str, Any]]:
+def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> list[NotTestable]:
     """Return the effects that a recording cannot show, as JSON: a channel is missing, or the schedule hides them."""
     absent = untestable_channels(comparison.data, catalogue)
-    found: list[Mapping[str, Any]] = [
+    found: list[NotTestable] = [
         {"effect": effect_id, "why": "channel", "needs": needs} for effect_id, needs in absent.items()
     ]
     shares = visible_shares(comparison)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,7 @@ class Channels:
     `rates` is the argument of a rate regressor: the true rate for a forward law, the gyro's output for a direct one.
     """
 
-    columns: Mapping[str, NDArray[Any]]
+    columns: Mapping[str, NDArray[np.generic]]
     rates: Mapping[str, Array]  #: body axis -> (n,) deg/s
     history: TemperatureHistory = field(default_factory=TemperatureHistory)  #: of the whole recording
     harmonics: Mapping[Carrier, Array] = field(default_factory=dict)  #: means over each row of waves in the table angle
@@ -38,7 +37,7 @@ class Channels:
     def __contains__(self, name: str) -> bool:
         return name in self.columns
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
+    def __getitem__(self, name: str) -> NDArray[np.generic]:
         return self.columns[name]
 
     def rate_dps(self, axis: str) -> Array:
@@ -54,7 +53,7 @@ class Channels:
         """Return the same channels with other rates along the body axes."""
         return replace(self, rates=rates)
 
-    def take(self, rows: NDArray[Any]) -> Channels:
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Channels:
         """Return the channels of some rows, by index or mask."""
         return Channels(
             {name: values[rows] for name, values in self.columns.items()},
@@ -95,7 +94,9 @@ class Channels:
 
     def decayed(self, tau_s: float) -> Array:
         """Return the mean over each row of exp(-time since its data set's begin / tau), (n,)."""
-        begin = np.asarray(self.columns["since_begin_s"]) if "since_begin_s" in self.columns else np.zeros(len(self))
+        begin = np.zeros(len(self))
+        if "since_begin_s" in self.columns:
+            begin = np.asarray(self.columns["since_begin_s"], dtype=np.float64)
         length = np.maximum(self.durations_s(), 1e-9)
         return np.asarray(np.exp(-begin / tau_s) * -np.expm1(-length / tau_s) * tau_s / length)
 
@@ -104,7 +105,7 @@ class Channels:
         return [name for name in names if name not in self.columns and name not in {"table_rate_dps", "temperature_c"}]
 
 
-def body_rates(table_rate_dps: Array, position: NDArray[Any]) -> dict[str, Array]:
+def body_rates(table_rate_dps: Array, position: NDArray[np.generic]) -> dict[str, Array]:
     """Return the table's rate along each body axis, axis -> (n,), for positions like "x" or "-z", (n,)."""
     signs = np.where(np.char.startswith(position.astype(np.str_), "-"), -1.0, 1.0)
     names = np.char.lstrip(position.astype(np.str_), "-")

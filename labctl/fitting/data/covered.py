@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,7 @@ class Covered:
 
 
 def covered_by(
-    table_rates_dps: tuple[Array, Array], position: NDArray[Any], temperature_c: Range, up_rate_dps: float = 0.0
+    table_rates_dps: tuple[Array, Array], position: NDArray[np.generic], temperature_c: Range, up_rate_dps: float = 0.0
 ) -> Covered:
     """Return what data sets with lowest and highest table rates, (m,) each, in positions (m,) cover.
 
@@ -47,7 +46,7 @@ def covered_by_readings(recording: Recording, up_rate_dps: float = 0.0) -> Cover
     if warm is None or not valid.any():
         return None
     rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)[valid]
-    starts = dataset_starts(np.asarray(columns["dataset"])[valid])
+    starts = dataset_starts(np.asarray(columns["dataset"], dtype=np.int64)[valid])
     axis = recording.info.axes[0]
     position = np.asarray(columns["position"])[valid][starts] if "position" in columns else np.full(len(starts), axis)
     ends = np.minimum.reduceat(rate, starts), np.maximum.reduceat(rate, starts)

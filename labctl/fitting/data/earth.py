@@ -63,7 +63,7 @@ def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array
     if info.latitude_deg is None or "table_angle_deg" not in channels or "duration_s" not in channels:
         return np.zeros((len(channels), 0))
     start = np.deg2rad(np.asarray(channels["table_angle_deg"], dtype=np.float64))
-    turned = np.deg2rad(np.asarray(channels["table_rate_dps"]) * np.asarray(channels["duration_s"]))
+    turned = np.deg2rad(channels.table_rate_dps() * np.asarray(channels["duration_s"], dtype=np.float64))
     middle, half = start + turned / 2, turned / 2
     shrink = np.sinc(half / np.pi)  # the mean of a cosine over what was turned
     cosine, sine = np.cos(middle) * shrink, np.sin(middle) * shrink

@@ -84,7 +84,7 @@ class FitData:
         t_s = np.asarray(self.channels["t_s"], dtype=np.float64) if "t_s" in self.channels else np.arange(float(m))
         return Scatter(
             t_s,
-            np.asarray(self.channels["run"]) if "run" in self.channels else np.ones(m, dtype=np.int64),
+            np.asarray(self.channels["run"], dtype=np.int64) if "run" in self.channels else np.ones(m, dtype=np.int64),
             np.asarray(self.channels["table_rate_dps"], dtype=np.float64),
             None if self.white_var is None else self.white_var[axis],
             self.info.datasheet.get("bias_stability_dps"),

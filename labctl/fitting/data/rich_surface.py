@@ -163,4 +163,4 @@ def _scaled(values: Array, *, about_zero: bool = False) -> Array:
 
 
 def _chebyshev(temperature_c: Array, degree: int) -> NDArray[np.float64]:
-    return np.asarray(chebyshev.chebvander(_scaled(temperature_c), degree))
+    return np.asarray(chebyshev.chebvander(_scaled(temperature_c), degree), dtype=np.float64)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, allan
+from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, Figure, allan
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
+from labctl.json_types.noise import AllanJson, NoiseFigure, StaticRecordJson
 from labctl.recording import Recording
 from labctl.recording.points import temperature_of
 
@@ -41,7 +41,7 @@ class StaticRecord:
             return None
         return self.axes[axis].instability_dps
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> StaticRecordJson:
         """Return this as JSON: where it is, and the deviation and the figures by axis."""
         return {
             "datasets": [self.first_dataset, self.last_dataset],
@@ -53,17 +53,25 @@ class StaticRecord:
         }
 
 
-def _axis_json(noise: Allan, is_prior: bool) -> dict[str, Any]:
+def _axis_json(noise: Allan, is_prior: bool) -> AllanJson:
     return {
         "tau_s": plain_list(noise.tau_s),
         "deviation_dps": plain_list(noise.deviation_dps),
         "low_dps": plain_list(noise.low_dps),
         "high_dps": plain_list(noise.high_dps),
         "model_dps": plain_list(noise.model_dps),
-        **{letter: asdict(figure) for letter, figure in noise.figures.items()},
+        "N": _figure_json(noise.figures["N"]),
+        "B": _figure_json(noise.figures["B"]),
+        "K": _figure_json(noise.figures["K"]),
         "trend_dps": plain(noise.trend_dps),
         "replaces_datasheet": is_prior,
     }
+
+
+def _figure_json(figure: Figure) -> NoiseFigure:
+    return {
+        "value": figure.value, "u": figure.u, "unit": figure.unit, "at_most": figure.at_most, "why": figure.why,
+    }  # fmt: skip
 
 
 def static_record(recording: Recording, least_s: float = 0.0) -> StaticRecord | None:

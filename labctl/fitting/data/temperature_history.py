@@ -18,7 +18,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 
 #: Logged columns by name, (n,) each.
-LoggedColumns = Mapping[str, NDArray[Any]]
+LoggedColumns = Mapping[str, NDArray[np.generic]]
 #: What an effect asks of a temperature course (k,) with one parameter, (k,).
 CourseFunction = Callable[[Array, float], Array]
 #: Spacing of a resampled temperature course, s.
@@ -94,7 +94,7 @@ def _slope(temperature_c: Array, over_s: float) -> Array:
     padded = np.pad(temperature_c, half, mode="edge")
     weights = np.arange(-half, half + 1, dtype=np.float64)
     weights /= (weights**2).sum() * SPACING_S / 60.0
-    return np.asarray(np.convolve(padded, weights[::-1], mode="valid"))
+    return np.asarray(np.convolve(padded, weights[::-1], mode="valid"), dtype=np.float64)
 
 
 def _lag(temperature_c: Array, tau_s: float) -> Array:

@@ -7,8 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from labctl.fitting.data.channels import BODY_AXES, Channels
-from labctl.fitting.effects.base import Column, Effect, Origin, Parameter, Reference, Rows, Span, Term, by_parameter
+from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.models import Origin
 
 GRAVITY = 9.80665
 

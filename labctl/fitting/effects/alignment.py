@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from labctl.fitting.data.channels import BODY_AXES, Channels
-from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Term
+from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Term
+from labctl.json_types.models import Origin
 
 
 class Misalignment(Effect):

@@ -15,8 +15,8 @@ import numpy as np
 
 from labctl.fitting.data.channels import Carrier, Channels
 from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.models import Origin
 
-Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
 #: Which output axes an effect shows on: the one that turns, the others, or all alike.
 Rows = Literal["own", "cross", "all"]
 #: How many values of a nonlinear parameter compete.

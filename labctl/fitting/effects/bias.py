@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Span, Term, powers
+from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Span, Term, powers
+from labctl.json_types.models import Origin
 
 
 class Bias(Effect):

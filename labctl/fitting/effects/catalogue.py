@@ -27,6 +27,7 @@ from labctl.fitting.effects import (
 from labctl.fitting.effects.base import Effect, Term
 from labctl.fitting.effects.formula import NAME, Formula
 from labctl.fitting.effects.trial import refuse_useless
+from labctl.json_types.effects import EffectJson
 
 _OWN = (
     bias,
@@ -125,7 +126,7 @@ def parse_term(text: str) -> Term:
     return Term(found.id, int(order_text))
 
 
-def describe_effects() -> list[dict[str, Any]]:
+def describe_effects() -> list[EffectJson]:
     """Return the catalogue as JSON, one record per effect."""
     return [
         {

@@ -19,10 +19,13 @@ import numpy as np
 from instruments.toml_documents import read_toml
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Rows, Span, Term
+from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Span, Term
 from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.models import Origin
 
-OPERATORS: Mapping[type, Callable[..., Any]] = {
+#: What an operator or function takes and returns.
+Operand = float | Array
+OPERATORS: Mapping[type, Callable[..., object]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
@@ -31,7 +34,7 @@ OPERATORS: Mapping[type, Callable[..., Any]] = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
-FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
+FUNCTIONS: Mapping[str, Callable[[Operand], Operand]] = {
     name: getattr(np, name) for name in ("exp", "log", "sqrt", "abs", "sin", "cos", "tanh", "sign")
 }
 #: What a formula may call the rate along the gyro's own axis, besides the names of logged columns.
@@ -65,7 +68,7 @@ class Formula(Effect):
         names = {"table_rate_dps" if name == OWN_RATE else name for name in _names(self._tree)}
         self.draws = tuple("time" if name == "t_s" else name for name in sorted(names))
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Pickle the text, which is read again."""
         return type(self), (self.name, self.text, self.sentence)
 
@@ -198,6 +201,8 @@ def read_formula(line: str) -> Formula:
 def _from_file(path: Path) -> list[Formula]:
     try:
         records = read_toml(path)["effects"]
+        if not isinstance(records, list):
+            raise TypeError("[[effects]]")
         return [_made(str(r["id"]), str(r["formula"]), str(r.get("sentence", ""))) for r in records]
     except (OSError, UnicodeDecodeError, TOMLDecodeError) as error:
         raise BadInput(f"formulas {path}: {error}") from error

@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.effects.base import Column, Effect, Origin, Reference, Term, powers
+from labctl.fitting.effects.base import Column, Effect, Reference, Term, powers
+from labctl.json_types.models import Origin
 
 TEMPERATURE_ORDER = 2
 

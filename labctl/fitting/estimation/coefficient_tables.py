@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,10 +49,12 @@ def from_coefficients(recording: Recording) -> FitResult:
 
 
 def _rows_of(recording: Recording, axis: str) -> tuple[Array, Array, Array]:
-    columns: dict[str, NDArray[Any]] = dict(recording.columns)
+    columns: dict[str, NDArray[np.generic]] = dict(recording.columns)
     rows = columns["axis"] == axis if "axis" in columns else np.ones(len(recording), dtype=bool)
     order = np.argsort(columns["temperature_c"][rows])
-    nodes, scale, offset = (columns[name][rows][order] for name in ("temperature_c", "scale_factor", "offset"))
+    nodes, scale, offset = (
+        np.asarray(columns[name], dtype=np.float64)[rows][order] for name in ("temperature_c", "scale_factor", "offset")
+    )
     if len(nodes) < 2 or np.any(np.diff(nodes) <= 0):
         raise NotEnoughData(
             f"{recording.info.serial}, axis {axis}: a table needs at least two different temperatures, each once; "

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.models import ErrorFiguresJson
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,15 @@ class ErrorFigures:
     noise_floor_dps: float | None
     noise_floor_source: str = "none"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> ErrorFiguresJson:
         """Return this as JSON."""
-        return asdict(self)
+        return {
+            "raw_rms_dps": self.raw_rms_dps,
+            "rms_dps": self.rms_dps,
+            "heldout_rms_dps": self.heldout_rms_dps,
+            "noise_floor_dps": self.noise_floor_dps,
+            "noise_floor_source": self.noise_floor_source,
+        }
 
 
 @dataclass(frozen=True)

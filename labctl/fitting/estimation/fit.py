@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from labctl.fitting.models.presets import Preset, preset_for
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.least_squares import Solution
+from labctl.json_types.models import AxisNoiseJson, FitEnvironment
 from labctl.recording import Recording
 
 
@@ -83,7 +83,7 @@ def _with_shapes(model: ErrorModel, fits: Mapping[str, AxisFit]) -> ErrorModel:
     return model.with_terms(tuple(map(shaped, model.terms)))
 
 
-def _noise_json(noise: AxisNoise, solution: Solution) -> dict[str, Any]:
+def _noise_json(noise: AxisNoise, solution: Solution) -> AxisNoiseJson:
     drift = noise.drift
     return {
         "white_dps": noise.white_dps,
@@ -94,10 +94,10 @@ def _noise_json(noise: AxisNoise, solution: Solution) -> dict[str, Any]:
     }
 
 
-def _environment(data: FitData, turning: Mapping[str, Array]) -> dict[str, Any]:
+def _environment(data: FitData, turning: Mapping[str, Array]) -> FitEnvironment:
     """Return which thermometer the fit went by and how the Earth's rate was treated, as JSON."""
     info = data.info
-    found: dict[str, Any] = {}
+    found: FitEnvironment = {}
     if is_chambers(data.channels.columns):
         found["temperature"] = "the chamber's: the recording has no thermometer of the unit's own"
     if info.latitude_deg is None:

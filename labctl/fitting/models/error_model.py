@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Column, Reference, Term, kind_of
 from labctl.fitting.models.temperature import Constant, TemperatureBasis, basis_from_dict
 from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.models import ErrorModelJson, TermJson
 
 Argument = Literal["rate", "output"]
 #: Effects of these origins belong to the unit and are exported with its calibration.
@@ -63,18 +63,18 @@ class ErrorModel:
         """Return the same model with other effects."""
         return replace(self, terms=terms, name=name or self.name)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> ErrorModelJson:
         """Return the model without coefficients, as JSON."""
         return {
             "name": self.name,
             "argument": self.argument,
-            "terms": [{**asdict(t), "parameters": dict(t.parameters)} for t in self.terms],
+            "terms": [_term_json(term) for term in self.terms],
             "temperature": self.temperature.to_dict(),
             "reference": {"temperature_c": self.reference.temperature_c},
         }
 
     @staticmethod
-    def from_dict(record: Mapping[str, Any]) -> ErrorModel:
+    def from_dict(record: ErrorModelJson) -> ErrorModel:
         """Return the model that `to_dict` described."""
         return ErrorModel(
             record["name"],
@@ -90,6 +90,13 @@ class ErrorModel:
     def forward(self) -> ErrorModel:
         """Return the same effects as a law of the true rate: the form that is physics, and that criticism judges."""
         return replace(self, argument="rate")
+
+
+def _term_json(term: Term) -> TermJson:
+    return {
+        "effect": term.effect, "order": term.order, "parameters": dict(term.parameters), "formula": term.formula,
+        "steady": term.steady,
+    }  # fmt: skip
 
 
 def expand(columns: Array, basis: Array) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from labctl.fitting.models.error_model import ErrorModel, is_exported
 from labctl.fitting.models.inversion import invert
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import none_for_nan
+from labctl.json_types.models import FittedModelJson, LeftOut
 
 
 @dataclass(frozen=True)
@@ -74,10 +74,10 @@ class FittedModel:
             self.model.name,
         )
 
-    def exported(self) -> tuple[FittedModel, list[dict[str, str]]]:
+    def exported(self) -> tuple[FittedModel, list[LeftOut]]:
         """Return the part that belongs to the unit, and what was left out with its origin."""
         kept = tuple(t for t in self.model.terms if is_exported(t))
-        left_out = [
+        left_out: list[LeftOut] = [
             {"effect": t.effect, "origin": kind_of(t).origin, "term": kind_of(t).term}
             for t in self.model.terms
             if not is_exported(t)
@@ -89,7 +89,7 @@ class FittedModel:
             model, {axis: _only(fit, set(model.effect_ids)) for axis, fit in self.axes.items()}
         ), left_out
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> FittedModelJson:
         """Return everything needed to rebuild this model, as JSON."""
         return {
             **self.model.to_dict(),
@@ -106,7 +106,7 @@ class FittedModel:
         }
 
     @staticmethod
-    def from_dict(record: Mapping[str, Any]) -> FittedModel:
+    def from_dict(record: FittedModelJson) -> FittedModel:
         """Return the model that `to_dict` described."""
         model = ErrorModel.from_dict(record)
         if any("sine_response" in fit["names"] for fit in record["axes"].values()):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from math import comb
-from typing import Any
 
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable
 
 
-def in_paper_units(fitted: FittedModel) -> dict[str, Any]:
+def in_paper_units(fitted: FittedModel) -> dict[str, object]:
     """Return what the papers would print of a model; empty for a model of no paper."""
     if fitted.model.name == "ojeda2000":
         reference = fitted.model.reference.temperature_c

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from labctl.fitting.data.temperature_levels import level_means
 from labctl.fitting.effects import Reference, Term, parse_term
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
+from labctl.json_types.effects import PresetJson
 
 Rows = NDArray[np.bool_]
 
@@ -169,6 +169,6 @@ def _custom(terms: tuple[Term, ...], data: FitData) -> ErrorModel:
     return ErrorModel("custom", terms, "rate", reference=_centre(data))
 
 
-def describe_presets() -> list[dict[str, Any]]:
+def describe_presets() -> list[PresetJson]:
     """Return every preset as JSON."""
     return [{"name": name, "sentence": sentence} for name, (_, sentence) in PRESETS.items()]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.models import TemperatureBasisJson
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Constant:
         """Return ones, (n, 1)."""
         return np.ones((len(temperature_c), 1))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> TemperatureBasisJson:
         """Return this as JSON."""
         return {"kind": "constant"}
 
@@ -52,7 +52,7 @@ class LagrangeTable:
         np.put_along_axis(full, stencil, weights, axis=1)
         return full
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> TemperatureBasisJson:
         """Return this as JSON."""
         return {"kind": "lagrange", "points": self.points, "nodes_c": list(self.nodes_c)}
 
@@ -71,8 +71,8 @@ def lagrange_weights(nodes: NDArray[np.float64], at: Array) -> NDArray[np.float6
     return weights
 
 
-def basis_from_dict(record: dict[str, Any]) -> TemperatureBasis:
+def basis_from_dict(record: TemperatureBasisJson) -> TemperatureBasis:
     """Return the basis that `to_dict` described."""
     if record["kind"] == "constant":
         return Constant()
-    return LagrangeTable(tuple(record["nodes_c"]), record["points"])
+    return LagrangeTable(tuple(record.get("nodes_c", ())), record.get("points", 3))

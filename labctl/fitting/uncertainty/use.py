@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from labctl.fitting.numeric.json_numbers import plain_list
 from labctl.fitting.uncertainty.cross_validation import left_variance
 from labctl.fitting.uncertainty.local_model_error import LocalModelError
 from labctl.fitting.uncertainty.repeatability import Repeatability, repeatability_of
+from labctl.json_types.calibrations import AxisEvidenceJson
 from labctl.recording import Recording
 
 
@@ -28,7 +28,7 @@ class AxisEvidence:
     model_error: LocalModelError
     repeatability: Repeatability | None  #: None where nothing tells how far a later power-on is off
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> AxisEvidenceJson:
         """Return this as JSON, the variances in (deg/s)^2."""
         local = self.model_error
         return {
@@ -42,10 +42,10 @@ class AxisEvidence:
         }
 
     @staticmethod
-    def from_json(record: Mapping[str, Any]) -> AxisEvidence:
+    def from_json(record: AxisEvidenceJson) -> AxisEvidence:
         """Return what `to_json` described."""
-        names = ("rate_dps", "temperature_c", "left_var", "white_var")
-        local = LocalModelError(*(np.asarray(record[name], dtype=np.float64) for name in names))
+        columns = (record["rate_dps"], record["temperature_c"], record["left_var"], record["white_var"])
+        local = LocalModelError(*(np.asarray(column, dtype=np.float64) for column in columns))
         u_dps = record["repeatability_dps"]
         if u_dps is None:
             return AxisEvidence(local, None)

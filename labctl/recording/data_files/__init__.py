@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
@@ -19,7 +20,7 @@ from labctl.recording.data_files.text import read_csv
 from labctl.recording.recording import Columns
 
 
-def read_table(path: Path) -> dict[str, NDArray[Any]]:
+def read_table(path: Path) -> dict[str, NDArray[np.generic]]:
     """Read a .parquet or .csv file into named columns; raises BadRecording naming file, column and row."""
     if path.stat().st_size == 0:
         raise BadRecording(f"{path}: the file is empty; expected a header and at least one row")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ MOST_FOOTER_BYTES = 16 << 20
 MAGIC = b"PAR1"
 
 
-def read_parquet(path: Path) -> dict[str, NDArray[Any]]:
+def read_parquet(path: Path) -> dict[str, NDArray[np.generic]]:
     """Read a Parquet file into named columns; raises BadRecording naming file, column and row.
 
     Rows x columns and the size unpacked are compared with the limits by the footer alone, before a value is read.
@@ -37,7 +37,7 @@ def read_parquet(path: Path) -> dict[str, NDArray[Any]]:
         raise BadRecording(f"{path}: not a whole Parquet file (truncated?): {first[:300]}") from error
 
 
-def _read(path: Path) -> dict[str, NDArray[Any]]:
+def _read(path: Path) -> dict[str, NDArray[np.generic]]:
     _refuse_large_footer(path)
     with pq.ParquetFile(path, buffer_size=BUFFER_BYTES, pre_buffer=False) as opened:
         metadata, schema = opened.metadata, opened.schema_arrow

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from labctl.recording.data_files.values import ColumnValues
 MOST_HEADER_BYTES = 1 << 16
 
 
-def read_csv(path: Path) -> dict[str, NDArray[Any]]:
+def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
     """Read a CSV file into named columns, block by block; raises BadRecording naming file, column and row."""
     names = _header(path)
     checked_names(path, names)

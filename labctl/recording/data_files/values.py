@@ -46,7 +46,7 @@ class ColumnValues:
             self._parts.append(_floats(piece))
         self.rows += len(piece)
 
-    def whole(self) -> NDArray[Any]:
+    def whole(self) -> NDArray[np.generic]:
         """Return all values, (rows,): text, int64 for whole numbers, else float64. Nothing is kept here."""
         parts, self._parts = self._parts, []
         if parts and isinstance(parts[0], pa.Array):  # an extra column, as text until all of it is known
@@ -71,14 +71,14 @@ class ColumnValues:
         except pa.ArrowInvalid:
             self._refuse_text(text)
 
-    def _numbers(self, text: pa.Array) -> NDArray[Any]:
+    def _numbers(self, text: pa.Array) -> NDArray[np.generic]:
         """Return numbers written as text; raises ArrowInvalid where one is none."""
         with contextlib.suppress(pa.ArrowInvalid):  # 1.0 and 1e3 are whole numbers too, and no number may be empty
             return self._within(np.asarray(text.cast(pa.int64()))) if self.kind == "integer" else _floats(text)
         values = _floats(_nan_where_empty(text).cast(pa.float64()))
         return self._whole(values) if self.kind == "integer" else values
 
-    def _words(self, piece: pa.Array) -> NDArray[Any]:
+    def _words(self, piece: pa.Array) -> NDArray[np.generic]:
         text = piece if pa.types.is_dictionary(piece.type) else piece.cast(pa.string()).dictionary_encode()
         text = self._readable(text)
         width = self._wide(text.dictionary)
@@ -113,7 +113,7 @@ class ColumnValues:
             raise self._wrong(row, f"{values[row]:g} is not a whole number")
         return self._within(values)
 
-    def _within(self, values: NDArray[Any]) -> NDArray[np.int64]:
+    def _within(self, values: NDArray[np.number]) -> NDArray[np.int64]:
         """Return whole numbers as int64; raises BadRecording where one is so large that two could become one."""
         bad = (values > LARGEST_WHOLE) | (values < -LARGEST_WHOLE)
         if bad.any():

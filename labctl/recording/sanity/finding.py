@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
 
-#: "certain": a fit of such data is wrong and is refused; "likely": it may be meant so, and is said.
-Severity = Literal["certain", "likely"]
+from labctl.json_types.findings import FindingJson, Severity
 
 
 @dataclass(frozen=True)
@@ -28,9 +26,12 @@ class Finding:
         """One sentence: where, what, and what to do."""
         return f"{self.where}: {self.said} (expected {self.expected}); {self.do}"
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> FindingJson:
         """Return the finding as JSON, with its sentence."""
-        return {**asdict(self), "text": self.text}
+        return {
+            "what": self.what, "severity": self.severity, "where": self.where, "said": self.said, "value": self.value,
+            "unit": self.unit, "expected": self.expected, "do": self.do, "text": self.text,
+        }  # fmt: skip
 
 
 def certain(findings: Iterable[Finding]) -> list[Finding]:

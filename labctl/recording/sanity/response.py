@@ -97,4 +97,4 @@ def _least_absolute(
         residual = output - design @ coefficients
         weight = 1.0 / np.maximum(np.abs(residual), least)
         weight /= weight.max()
-    return residual, np.asarray(coefficients)
+    return residual, np.asarray(coefficients, dtype=np.float64)

@@ -20,7 +20,7 @@ from labctl.recording.sanity.blocks import NO_CHANGE, level_change, noise_of_rea
 
 #: Time steps longer than this many usual ones, and than so many seconds, are a gap.
 GAP_STEPS, GAP_S = 5.0, 0.5
-_NONE: NDArray[Any] = np.zeros(0)
+_NONE: NDArray[np.float64] = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -28,19 +28,19 @@ class Summary:
     """m data sets of one recording; rates in deg/s, NaN where the recording does not say."""
 
     info: RecordingInfo
-    columns: Mapping[str, NDArray[Any]]  #: name -> (m,)
+    columns: Mapping[str, NDArray[np.generic]]  #: name -> (m,)
 
     def __len__(self) -> int:
         return len(self.columns["dataset"])
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
+    def __getitem__(self, name: str) -> NDArray[np.generic]:
         return self.columns[name]
 
     def of_axis(self, name: str, axis: str) -> NDArray[np.float64]:
         """Return a figure of one output axis, (m,)."""
         return np.asarray(self.columns[f"{name}_{axis}"], dtype=np.float64)
 
-    def take(self, rows: NDArray[Any]) -> Summary:
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Summary:
         """Return the summary of some data sets, by index or mask."""
         return Summary(self.info, {name: values[rows] for name, values in self.columns.items()})
 
@@ -67,7 +67,7 @@ def _of_readings(recording: Recording) -> Summary:
     if not valid.any():
         return Summary(recording.info, {"dataset": np.zeros(0, dtype=np.int64)})
     outputs: dict[str, NDArray[np.float64]] = {a: recording.gyro_dps(a)[valid] for a in recording.info.axes}
-    starts = dataset_starts(rows["dataset"])
+    starts = dataset_starts(np.asarray(rows["dataset"], dtype=np.int64))
     sets = [
         _one_set(recording.info, rows, outputs, slice(int(begin), int(end)))
         for begin, end in zip(starts, np.append(starts[1:], len(rows["dataset"])), strict=True)
@@ -152,7 +152,7 @@ def _of_means(recording: Recording) -> Summary:
     warm = np.full(m, np.nan) if warm is None else warm
     t_s = np.asarray(rows["t_s"], dtype=np.float64) if "t_s" in rows else np.full(m, np.nan)
     unknown = np.full(m, np.nan)
-    found: dict[str, NDArray[Any]] = {
+    found: dict[str, NDArray[np.generic]] = {
         "dataset": np.asarray(rows["dataset"]) if "dataset" in rows else np.arange(1, m + 1),
         "position": np.asarray(rows["position"]).astype(np.str_) if "position" in rows else np.full(m, info.axes[0]),
         "run": np.asarray(rows["run"]) if "run" in rows else np.ones(m, dtype=np.int64),

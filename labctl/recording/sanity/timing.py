@@ -56,7 +56,7 @@ def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
     span = float(summary["t_end_s"][-1] - summary["t_begin_s"][0])
     slow = (
         summary.info.sample_rate_hz is None and usual > SLOW_STEP_S
-        and float(np.median(np.asarray(summary["n"]))) >= LEAST_READINGS
+        and float(np.median(np.asarray(summary["n"], dtype=np.float64))) >= LEAST_READINGS
     )  # fmt: skip
     if slow or span > LONG_S:
         said = (

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from instruments.bench_config import is_simulated_address
+from labctl.json_types import JsonObject
 
 
-def has_simulated_time(bench: Mapping[str, Any]) -> bool:
+def has_simulated_time(bench: JsonObject) -> bool:
     """Return whether a bench, as its file says it, keeps a simulated clock, which may run faster than the wall's."""
-    if (bench.get("simulation") or {}).get("control"):  # simulators in another process set the pace
+    simulation, gyros = bench.get("simulation"), bench.get("gyros")
+    if isinstance(simulation, Mapping) and simulation.get("control"):  # simulators in another process set the pace
         return True
-    devices = [each for each in (bench.get("table"), bench.get("chamber"), *bench.get("gyros", ())) if each]
-    links = [link for device in devices for key in ("port", "host") if (link := device.get(key)) is not None]
-    return bool(links) and all(is_simulated_address(link) for link in links)
+    devices = [bench.get("table"), bench.get("chamber"), *(gyros if isinstance(gyros, list | tuple) else ())]
+    links = [
+        link
+        for device in devices
+        for key in ("port", "host")
+        if isinstance(device, Mapping) and (link := device.get(key)) is not None
+    ]
+    return bool(links) and all(is_simulated_address(str(link)) for link in links)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from instruments.bench import check
 from instruments.bench_config import shipped_benches
@@ -12,26 +11,27 @@ from instruments.clock import ScaledClock, SystemClock, VirtualClock
 from instruments.simulation import serve_simulation
 from labctl.errors import BadInput
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.benches import DeviceCheck
+from labctl.services.schemas.benches import BenchCheckResponse, DeviceCheck, ShippedBench
 
 
-def check_bench(source: str) -> list[DeviceCheck]:
+def check_bench(source: str) -> BenchCheckResponse:
     """Talk to every instrument of a bench and say what answered; nothing moves."""
     bench = load_bench(source)
     clock = VirtualClock() if bench.is_simulated else SystemClock()
-    return [
+    devices = [
         DeviceCheck(device=device, ok=ok, text=text, **bench.drivers[device].model_dump())
         for device, ok, text in check(bench, clock)
     ]
+    return BenchCheckResponse(bench=source, ok=all(each.ok for each in devices), devices=devices)
 
 
-def shipped() -> list[dict[str, Any]]:
+def shipped() -> list[ShippedBench]:
     """Return the benches that come with labctl: name, and what stands on them."""
     found = []
     for name, path in shipped_benches().items():
         bench = load_bench(str(path))
         units = ", ".join(f"{gyro.serial} ({gyro.driver})" for gyro in bench.gyros)
-        found.append({"name": name, "text": f"{bench.table.driver}, {bench.chamber.driver}, {units}"})
+        found.append(ShippedBench(name=name, text=f"{bench.table.driver}, {bench.chamber.driver}, {units}"))
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -12,10 +11,13 @@ import pyarrow.parquet as pq
 
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
+from labctl.fitting.numeric.arrays import Array
 from labctl.recording.data_files import read_table
+from labctl.recording.recording import Column
+from labctl.services.schemas.compensation import CompensationResponse
 
 
-def compensate_file(calibration: Path, source: Path, target: Path, outside: str) -> dict[str, Any]:
+def compensate_file(calibration: Path, source: Path, target: Path, outside: str) -> CompensationResponse:
     """Write `source` with a corrected rate per axis and a flag; returns how many rows, and how many lay outside.
 
     Raises BadCalibrationFile, BadRecording, BadInput.
@@ -31,9 +33,9 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
     for name in (*(f"gyro_{axis}" for axis in compensator.axes), "temperature_c", *compensator.needs):
         if name not in columns:
             raise BadInput(f"{source}: column {name!r} is missing (the calibration is of axes {compensator.axes})")
-    raw = np.column_stack([columns[f"gyro_{axis}"] for axis in compensator.axes])
+    raw = np.column_stack([_floats(columns[f"gyro_{axis}"]) for axis in compensator.axes])
     corrected = compensator.compensate_output(
-        raw, columns["temperature_c"], {name: columns[name] for name in compensator.needs}
+        raw, _floats(columns["temperature_c"]), {name: _floats(columns[name]) for name in compensator.needs}
     )
     for index, axis in enumerate(compensator.axes):
         columns[f"rate_{axis}_dps"] = corrected.rate_dps[:, index]
@@ -43,4 +45,8 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
         pq.write_table(table, target)
     else:
         pacsv.write_csv(table, target)
-    return {"rows": len(raw), "outside": int(corrected.outside.sum()), "file": str(target)}
+    return CompensationResponse(rows=len(raw), outside=int(corrected.outside.sum()), file=str(target))
+
+
+def _floats(column: Column) -> Array:
+    return np.asarray(column, dtype=np.float64)

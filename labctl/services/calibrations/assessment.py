@@ -68,9 +68,13 @@ def _of_verdict(criticism: CriticismResponse | None) -> Iterator[Objection]:
         return
     error = criticism.error
     figures = ", ".join(
-        f"{name} {error[key]:.4g} deg/s"
-        for name, key in (("RMS error", "rms_dps"), ("held-out", "heldout_rms_dps"), ("noise floor", "noise_floor_dps"))
-        if error.get(key) is not None
+        f"{name} {figure:.4g} deg/s"
+        for name, figure in (
+            ("RMS error", error["rms_dps"]),
+            ("held-out", error["heldout_rms_dps"]),
+            ("noise floor", error["noise_floor_dps"]),
+        )
+        if figure is not None
     )
     version = f"{criticism.serial} --version {criticism.version}"
     do = f"find out what is missing: labctl criticise {version}"

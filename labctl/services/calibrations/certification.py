@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from datetime import datetime, timedelta
-from typing import Literal
+from typing import Literal, cast
 
 from labctl.acting_user import actor
 from labctl.errors import BadInput, CertificationRefused
+from labctl.json_types.calibrations import JudgementDetail
 from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
 from labctl.services.schemas.certification import (
     AssessmentResponse,
@@ -58,7 +59,7 @@ def certify(store: Store, serial: str, version: int, request: CertifyRequest, at
         raise CertificationRefused(refusal(known))
     judgement = Judgement(
         known.verdict, known.verdict_recording, at if known.verdict else None, bool(known.objections),
-        known.model_dump(mode="json", include=set(KEPT)),
+        cast(JudgementDetail, known.model_dump(mode="json", include=set(KEPT))),
     )  # fmt: skip
     due = at + timedelta(days=request.due_days) if request.due_days else None
     return _set_in_force(store, serial, version, "certify", request, at, due, judgement)

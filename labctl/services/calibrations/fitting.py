@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
 from labctl.fitting.uncertainty import evidence_of
+from labctl.json_types.models import KeptFit
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.recordings.coverage import covered_of
-from labctl.services.recordings.inspection import inspect_stored, refuse_wrong, warning_of
+from labctl.services.recordings.inspection import as_json, inspect_stored, refuse_wrong, warning_of
 from labctl.services.recordings.loading import newest_row, points_of
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
     FitResponse,
+    ImprovedVersionResponse,
     VersionResponse,
 )
 from labctl.store import NewCalibration, Store
@@ -50,25 +51,25 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
     warnings = [*found.warnings, *map(warning_of, worse_than_raw(result.error))]
     refuse_wrong(warnings, f"fit of recording {recording} of {serial}", accepted=request.accept_warnings)
     evidence = evidence_of(source, request.model, request.effects)
-    made = {
-        "recording": recording,
-        "campaign": campaign,
-        "recipe": store.campaigns.get(campaign).recipe_name if campaign is not None else None,
-        "bench": store.campaigns.get(campaign).bench_name if campaign is not None else None,
-    }
+    run = store.campaigns.get(campaign) if campaign is not None else None
+    recipe, bench = (run.recipe_name, run.bench_name) if run is not None else (None, None)
+    made = {"recording": recording, "campaign": campaign, "recipe": recipe, "bench": bench}
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
             source.info, result, version=version, parent=None, issued_at=at, provenance=made, evidence=evidence
         )
-        answer = {"serial": serial, "version": version, **result.to_json(), **made, "hash": calibration.hash}
-        answer["warnings"] = [warning.model_dump() for warning in warnings]
+        answer: KeptFit = {
+            "serial": serial, "version": version, **result.to_json(), "recording": recording,
+            "campaign": campaign, "recipe": recipe, "bench": bench, "hash": calibration.hash,
+            "warnings": [as_json(warning) for warning in warnings],
+        }  # fmt: skip
         return NewCalibration(
             None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
         )
 
     kept = keep_next_version(store, serial, at, build)
-    return FitResponse.model_validate(dict(kept.answer))
+    return FitResponse.model_validate(kept.answer, extra="forbid")
 
 
 def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
@@ -83,14 +84,14 @@ def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
             created_at=row.created_at,
             hash=row.hash,
             certified=row.version == in_force,
-            rms_dps=_error(row.answer, "rms_dps"),
-            heldout_rms_dps=_error(row.answer, "heldout_rms_dps"),
+            rms_dps=row.answer["error"]["rms_dps"],
+            heldout_rms_dps=row.answer["error"]["heldout_rms_dps"],
         )
         for row in store.calibrations.of_unit(store.units.get(serial).serial)
     ]
 
 
-def one_version(store: Store, serial: str, version: int) -> VersionResponse:
+def one_version(store: Store, serial: str, version: int) -> VersionResponse | ImprovedVersionResponse:
     """Return a version as it was made, and whether it is in force. Raises NotFound."""
     row = store.calibrations.get(store.units.get(serial).serial, version)
     history = store.calibrations.history(serial)
@@ -100,12 +101,8 @@ def one_version(store: Store, serial: str, version: int) -> VersionResponse:
         "parent": row.parent, "recording": row.recording, "created_at": row.created_at, "hash": row.hash,
         "in_force": in_force, "due": last.due if last is not None and in_force else None, "certification": last,
     }  # fmt: skip
-    return VersionResponse.model_validate({**row.answer, **beside})
-
-
-def _error(answer: Any, key: str) -> float | None:
-    value = answer["error"][key]
-    return None if value is None else float(value)
+    kind = ImprovedVersionResponse if "improved_from" in row.answer else VersionResponse
+    return kind.model_validate({**row.answer, **beside})
 
 
 def calibration_file(store: Store, serial: str, version: int | None, format_name: str) -> CalibrationFile:

@@ -6,7 +6,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Any
 
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
@@ -18,6 +17,7 @@ from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.uncertainty import use_evidence
+from labctl.json_types.models import ChangeFigures, KeptChange, UsualRange
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
@@ -27,11 +27,11 @@ from labctl.services.criticism.measurements import Measurements, load_reduced_re
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.versions import version_of
 from labctl.services.recordings.coverage import covered_of
-from labctl.services.recordings.inspection import refuse_wrong, warning_of
+from labctl.services.recordings.inspection import as_json, refuse_wrong, warning_of
 from labctl.services.recordings.loading import newest_row
 from labctl.services.schemas.calibrations import (
-    FitResponse,
     ImproveRequest,
+    ImproveResponse,
     PreviewResponse,
 )
 from labctl.services.schemas.criticism import ResidualColumns
@@ -56,13 +56,13 @@ class _Change:
         return [*self.data_warnings, *map(warning_of, worse_than_before(self.before.error, self.after.error))]
 
     @property
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> ChangeFigures:
         """What is said of the change, whether it is kept or not."""
         technology = self.points.info.technology or ""
         return {
             **self.after.to_json(), "recording": self.recording.id, "improved_from": self.row.version,
             "before": self.before.error.to_dict(), "plausible": plausible(self.after, technology),
-            "warnings": [warning.model_dump() for warning in self.warnings],
+            "warnings": [as_json(warning) for warning in self.warnings],
         }  # fmt: skip
 
 
@@ -70,7 +70,7 @@ class _Change:
 _RECENT: RecentResults[_Change] = RecentResults(most=4)
 
 
-def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> FitResponse:
+def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetime) -> ImproveResponse:
     """Change a version's effects, fit again, keep it as the next.
 
     Raises NotFound, BadInput, NotEnoughData, DataRefused for data that are certainly wrong and for a result that is
@@ -93,14 +93,15 @@ def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewR
     def work() -> PreviewResponse:
         change = _change(store, serial, request)
         _, left_out = change.after.fitted.exported()
-        return PreviewResponse(
-            serial=serial, **change.figures, left_out=left_out, residuals=_residuals(store, change)
-        )  # fmt: skip
+        said = {"serial": serial, **change.figures, "left_out": left_out, "residuals": _residuals(store, change)}
+        return PreviewResponse.model_validate(said, extra="forbid")
 
     return cached(PreviewResponse, _question(store, row, measured, request), work)
 
 
-def _question(store: Store, row: CalibrationRecord, recording: RecordingRow, request: ImproveRequest) -> dict[str, Any]:
+def _question(
+    store: Store, row: CalibrationRecord, recording: RecordingRow, request: ImproveRequest
+) -> dict[str, object]:
     """Return all that a change depends on."""
     return {
         "serial": row.serial, "version": row.version, "hash": row.hash, "recording": recording.id,
@@ -167,7 +168,7 @@ def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
     return replace(shape, steady=True) if shape is not None else term
 
 
-def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitResponse:
+def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveResponse:
     parent, after = change.row.version, change.after
     made = {"recording": change.recording.id, "improved_from": parent}
     evidence = use_evidence(fit_data_of(change.points), changed(after.fitted.model))
@@ -176,7 +177,7 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitRespon
         calibration = build_calibration(
             change.points.info, after, version=version, parent=parent, issued_at=at, provenance=made, evidence=evidence
         )
-        answer = {
+        answer: KeptChange = {
             "serial": serial, "version": version, "parent": parent, **change.figures,
             "left_out": list(calibration.document["left_out"]), "hash": calibration.hash,
         }  # fmt: skip
@@ -184,15 +185,15 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> FitRespon
             parent, change.recording.id, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
         )
 
-    return FitResponse.model_validate(dict(keep_next_version(store, serial, at, build).answer))
+    return ImproveResponse.model_validate(keep_next_version(store, serial, at, build).answer, extra="forbid")
 
 
-def plausible(result: FitResult, technology: str) -> dict[str, dict[str, Any]]:
+def plausible(result: FitResult, technology: str) -> dict[str, UsualRange]:
     """Return effect -> the range its first coefficient usually lies in, and whether it may do so on every axis.
 
     A range is one of sizes; of an effect that has only one sign, the sign counts too.
     """
-    found: dict[str, dict[str, Any]] = {}
+    found: dict[str, UsualRange] = {}
     for term in result.fitted.model.terms:
         kind = kind_of(term)
         span = kind.ranges.get(technology)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from labctl.calibration import Calibration, read_calibration
@@ -12,6 +10,7 @@ from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording.recording import Column
 from labctl.services.schemas.calibrations import Surface, SurfaceResponse, Validity
 from labctl.store import CalibrationRecord, Store
 
@@ -46,7 +45,7 @@ def _rate_span(store: Store, row: CalibrationRecord, calibration: Calibration) -
     if np.isfinite(low) and np.isfinite(high):
         return low, high
     known = store.recordings.get(row.recording).info.get("max_rate_dps") if row.recording is not None else None
-    fastest = float(known or UNKNOWN_MAX_RATE_DPS)
+    fastest = float(known) if isinstance(known, int | float) and known else UNKNOWN_MAX_RATE_DPS
     return -fastest, fastest
 
 
@@ -73,7 +72,7 @@ def _error(fitted: FittedModel, axis: str, rates: Array, temperatures: Array, he
     """Return the error at each temperature and rate, (temperatures, rates) deg/s."""
     n = len(rates) * len(temperatures)
     rate = np.tile(rates, len(temperatures))
-    columns: dict[str, Any] = {name: np.full(n, value) for name, value in held.items()}
+    columns: dict[str, Column] = {name: np.full(n, value) for name, value in held.items()}
     columns |= {
         "temperature_c": np.repeat(temperatures, len(rates)),
         "table_rate_dps": rate,

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 
 from labctl.services.schemas.campaigns import AdviceResponse
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import NOT_SAFE
 
 RESUME = "then resume the campaign"
@@ -130,9 +131,9 @@ FAILURES: tuple[Failure, ...] = (
 OTHER = Failure("", "A step of the campaign could not be carried out.", f"Mend what the reason names, {RESUME}.")
 
 
-def advice_of(state: str, reason: str) -> AdviceResponse | None:
+def advice_of(state: CampaignState, reason: str) -> AdviceResponse | None:
     """Return the advice on a campaign by its reason; None unless it has failed."""
-    if state != "failed":
+    if state is not CampaignState.FAILED:
         return None
     unsafe = NOT_SAFE in reason
     cause = reason.partition(NOT_SAFE)[0] or reason

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
@@ -20,7 +19,8 @@ from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.campaigns.preparation import Prepared, prepare, refuse_unconfirmed
 from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
 from labctl.services.campaigns.resume import prepare_resume, with_original_simulation
-from labctl.services.campaigns.status import ENDED, answer_of, campaign_status
+from labctl.services.campaigns.status import answer_of, campaign_status
+from labctl.services.schemas.benches import BenchDescription, BenchUnit
 from labctl.services.schemas.campaigns import (
     CampaignRequest,
     CampaignResponse,
@@ -30,9 +30,9 @@ from labctl.services.schemas.campaigns import (
 )
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.store import Store
+from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.control import Control
 from procedures.contracts.errors import StalePrompt
-from procedures.contracts.journal import CampaignState
 from procedures.contracts.operator import HumanOperator
 from procedures.execution.signals import ignore_signals
 from procedures.monitoring.progress import Progress
@@ -202,7 +202,7 @@ class BenchRunner:
 
     def _running(self, campaign: int) -> CampaignJob:
         job = self._job
-        over = job is not None and job.progress is not None and job.progress.state.value in ENDED
+        over = job is not None and job.progress is not None and job.progress.state in ENDED
         if job is None or job.row.id != campaign or over:
             state = self._store.campaigns.get(campaign).state
             raise Conflict(f"campaign {campaign} does not run on bench {self._bench.name} now; it is {state}")
@@ -215,7 +215,7 @@ class BenchRunner:
 
         try:
             answer = run(self._store, prepared, job.control, seen, job.lending)
-            if answer.state == CampaignState.INTERRUPTED:
+            if answer.state is CampaignState.INTERRUPTED:
                 self._recovery.expect_resume()
         except StoreError as error:
             self._recovery.expect_end(job.row.id, str(error))
@@ -255,17 +255,17 @@ class BenchRunner:
             job.thread.join(self.safe_within_s)
         return self.status(campaign) or campaign_status(self._store, campaign)
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self) -> BenchDescription:
         """Return the bench and what it is doing."""
         job = self._job
-        return {
-            "name": self._bench.name,
-            "simulated": self._bench.is_simulated,
-            "latitude_deg": self._bench.latitude_deg,
-            "units": [{"name": g.name, "serial": g.serial, "driver": g.driver} for g in self._bench.gyros],
-            "campaign": job.row.id if job is not None else None,
-            "unconfirmed": self._store.benches.unconfirmed(self._bench.name),
-        }
+        return BenchDescription(
+            name=self._bench.name,
+            simulated=self._bench.is_simulated,
+            latitude_deg=self._bench.latitude_deg,
+            units=[BenchUnit(name=g.name, serial=g.serial, driver=g.driver) for g in self._bench.gyros],
+            campaign=job.row.id if job is not None else None,
+            unconfirmed=self._store.benches.unconfirmed(self._bench.name),
+        )
 
     @property
     def polls(self) -> tuple[int, int] | None:

@@ -6,9 +6,10 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Hashable
 from typing import Any, TypeVar, cast
 
-from labctl.services.campaigns.status import ENDED, event_answer
+from labctl.services.campaigns.status import event_answer
 from labctl.services.schemas.campaigns import CampaignResponse, EventResponse
 from labctl.store import Store
+from procedures.contracts.campaign_state import ENDED, CampaignState
 
 #: An open event stream says that it is alive after this long without an event.
 HEARTBEAT_S = 10.0
@@ -94,13 +95,13 @@ class CampaignEventStream:
             if stop is not None:
                 stop()
 
-    async def _told(self, campaign: int, after: int) -> tuple[str, list[EventResponse]]:
+    async def _told(self, campaign: int, after: int) -> tuple[CampaignState, list[EventResponse]]:
         """Return the state in the database, not that of the live picture, and the events that came before it.
 
         The last event is written before the state there ends, so that whoever sees the end has seen every event.
         """
 
-        def look() -> tuple[str, list[EventResponse]]:
+        def look() -> tuple[CampaignState, list[EventResponse]]:
             state = self._store.campaigns.state(campaign)
             return state, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
 

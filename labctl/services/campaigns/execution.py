@@ -16,11 +16,12 @@ from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
 from labctl.services.campaigns.bench_lending import BenchLending, lending_journal
 from labctl.services.campaigns.preparation import Prepared, clock_for, prepare, refuse_unconfirmed, seeded
-from labctl.services.campaigns.status import ENDED, answer_of, describe_interrupted, from_rows
+from labctl.services.campaigns.status import answer_of, describe_interrupted, from_rows
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignResponse, StartRequest
 from labctl.store import Store
 from labctl.store.connection.writer_lock import note_campaign
+from procedures.contracts.campaign_state import ENDED
 from procedures.contracts.control import Control
 from procedures.contracts.operator import Operator
 from procedures.execution.engine import Engine
@@ -60,7 +61,8 @@ def _engine(
     lending: BenchLending | None = None,
 ) -> Engine:
     row = store.campaigns.get(prepared.id)
-    serials = {str(gyro["name"]): str(gyro["serial"]) for gyro in row.bench["gyros"]}
+    gyros = BenchFile.model_validate({**row.bench, "simulation": None}).gyros
+    serials = {gyro.name: gyro.serial for gyro in gyros}
     journal = LoggedJournal(store.campaigns.journal(prepared.id), prepared.id, row.bench_name, prepared.plan, serials)
     return Engine(
         prepared.plan,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import tomli_w
 from pydantic import ValidationError
 
+from labctl.json_types import JsonObject
 from labctl.services.planning.loading import (
     recipe_document,
 )
@@ -27,7 +27,7 @@ def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
     steps = store.campaigns.steps(campaign)
     columns = timeline_columns([step.body for step in steps])
     timeline = RunColumns(
-        **columns,
+        **dict(columns),
         state=[_state(step.state) for step in steps],
         started_s=[step.started_s for step in steps],
         ended_s=[step.ended_s for step in steps],
@@ -36,12 +36,12 @@ def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
     return CampaignPlanResponse(
         campaign=campaign, recipe=row.recipe_name, text=_text(row.recipe), bench=row.bench_name, state=row.state,
         schedule_hash=row.schedule_hash, steps=len(steps),
-        datasets=sum(number is not None for number in columns["dataset"]), expected_s=row.expected_s,
+        datasets=sum(number is not None for number in columns.dataset), expected_s=row.expected_s,
         timeline=timeline,
     )  # fmt: skip
 
 
-def _text(recipe: Mapping[str, Any]) -> str:
+def _text(recipe: JsonObject) -> str:
     """Return a recipe as text; nothing where it was written by a labctl whose recipes had other keys."""
     try:
         return tomli_w.dumps(recipe_document(Recipe.model_validate(dict(recipe))))

@@ -12,11 +12,13 @@ from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
+from labctl.json_types.recordings import RawChannelJson
 from labctl.log import get_logger
-from labctl.recording import OutputUnit, RecordingInfo
+from labctl.recording import RecordingInfo
 from labctl.services.benches.confirmation import describe_bench
 from labctl.services.benches.power_failure import boot_id
 from labctl.services.planning.loading import load_recipe, with_drivers
+from labctl.services.planning.timeline import step_json
 from labctl.store import NewCampaign, NewUnit, Store
 from labctl.store.sample_codec import load_compressor
 from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator
@@ -130,7 +132,7 @@ def prepare(
             bench=bench_file.model_dump(mode="json"),
             schedule_hash=plan.schedule_hash,
             expected_s=plan.expected_s,
-            steps=[step.model_dump(mode="json") for step in plan.steps],
+            steps=[step_json(step) for step in plan.steps],
             units=units,
             boot_id=boot_id(),
             bench_clear=bench_clear,
@@ -155,18 +157,22 @@ def _rest(bench: Bench, clock: Clock) -> None:
 def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
     identity = gyro.identify()
     latitude = bench.latitude_deg
-    info = RecordingInfo(
-        serial=identity.serial,
-        model=identity.model,
-        axes=gyro.axes,
-        kind="samples",
-        started_at=clock.utc(),
-        latitude_deg=latitude,
-        sample_rate_hz=gyro.sample_rate_hz,
-        max_rate_dps=gyro.limits.max_rate_dps,
-        technology=identity.technology or None,
-        datasheet=dict(identity.datasheet),
-        output={axis: OutputUnit.model_validate(dict(unit)) for axis, unit in identity.output.items()},
+    info = RecordingInfo.model_validate(
+        {
+            "serial": identity.serial,
+            "model": identity.model,
+            "axes": gyro.axes,
+            "kind": "samples",
+            "started_at": clock.utc(),
+            "latitude_deg": latitude,
+            "sample_rate_hz": gyro.sample_rate_hz,
+            "max_rate_dps": gyro.limits.max_rate_dps,
+            "technology": identity.technology or None,
+            "datasheet": dict(identity.datasheet),
+            "output": {axis: dict(unit) for axis, unit in identity.output.items()},
+        }
     )
-    channels = tuple({"name": c.name, "unit": c.unit, "scale": c.scale, "offset": c.offset} for c in gyro.channels)
+    channels: tuple[RawChannelJson, ...] = tuple(
+        {"name": c.name, "unit": c.unit, "scale": c.scale, "offset": c.offset} for c in gyro.channels
+    )
     return NewUnit(gyro.name, info.model_dump(mode="json"), channels)

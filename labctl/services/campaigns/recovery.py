@@ -14,8 +14,9 @@ from instruments.errors import InstrumentError
 from labctl.errors import BenchBusy, LabctlError
 from labctl.log import get_logger
 from labctl.services.campaigns.resumability import retries_exhausted
-from labctl.services.campaigns.status import ENDED, from_rows, how_far
+from labctl.services.campaigns.status import from_rows, how_far
 from labctl.store import Store
+from procedures.contracts.campaign_state import ENDED
 from procedures.execution.safe_state import make_safe
 
 log = get_logger()

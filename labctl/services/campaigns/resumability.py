@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from instruments.bench_config import BenchFile
-from labctl.services.campaigns.status import ENDED
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import ResumePoint, Store
+from procedures.contracts.campaign_state import CampaignState
 
 #: A campaign that was taken up so often without finishing a step needs a person.
 MAX_RESUMES = 5
@@ -42,11 +42,11 @@ def with_resume(
 def _standing(
     store: Store, answer: CampaignResponse, bench: BenchFile | None, running: Callable[[], int | None]
 ) -> tuple[bool, str]:
-    if answer.state == "paused" and not answer.abandoned:
+    if answer.state is CampaignState.PAUSED and not answer.abandoned:
         return True, ""
-    if answer.state == "done":
+    if answer.state is CampaignState.DONE:
         return False, "it is done"
-    if answer.state not in ENDED | {"interrupted"} and not answer.abandoned:
+    if answer.active:
         return False, f"it is {answer.state}"
     if refused := _refusal(store, answer, bench, running()):
         return False, refused

@@ -26,6 +26,7 @@ from labctl.services.campaigns.preparation import (
 from labctl.services.planning.loading import load_bench, with_drivers
 from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
 from labctl.store import CampaignRow, ResumePoint, Store, TakeUp, open_store
+from procedures.contracts.campaign_state import CampaignState
 from procedures.execution.resume import Restart
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.planning.plan import Plan
@@ -77,7 +78,7 @@ def prepare_resume(
     """
     load_libraries()
     row = store.campaigns.get(campaign)
-    if row.state == "done":
+    if row.state is CampaignState.DONE:
         raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
     bench_file = _same_units(row, bench_file)
     refuse_unconfirmed(store, bench_file.name)

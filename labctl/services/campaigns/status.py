@@ -12,15 +12,14 @@ from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.campaigns.advice import advice_of
 from labctl.services.schemas.campaigns import CampaignResponse, EventResponse, OutputResponse, PromptResponse
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
+from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.control import ControlRequest
 from procedures.monitoring.progress import Progress
-
-ENDED = frozenset({"done", "aborted", "failed"})
 
 
 def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | None = None) -> CampaignResponse:
     """Return a campaign as its engine sees it, with what a person asked for and the engine has not yet done."""
-    state, prompt = progress.state.value, progress.prompt
+    state, prompt = progress.state, progress.prompt
     return CampaignResponse(
         id=row.id,
         recipe=row.recipe_name,
@@ -52,10 +51,10 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
     )
 
 
-def _open_request(request: ControlRequest, state: str) -> Literal["pause", "abort"] | None:
+def _open_request(request: ControlRequest, state: CampaignState) -> Literal["pause", "abort"] | None:
     if request.abort:
         return "abort"
-    return "pause" if request.pause and state != "paused" else None
+    return "pause" if request.pause and state is not CampaignState.PAUSED else None
 
 
 def from_rows(store: Store, row: CampaignRow) -> CampaignResponse:
@@ -81,7 +80,7 @@ def _from_summary(row: CampaignRow, seen: CampaignSummary) -> CampaignResponse:
         step=None if current is None else current.number + 1,
         steps=seen.steps,
         step_text="" if current is None else current.kind.replace("_", " "),
-        progress=1.0 if row.state == "done" else min(seen.done_s / max(row.expected_s, 1e-9), 1.0),
+        progress=1.0 if row.state is CampaignState.DONE else min(seen.done_s / max(row.expected_s, 1e-9), 1.0),
         expected_end=None if over or seen.last_at is None else seen.last_at + timedelta(seconds=seen.left_s),
         t_s=None if seen.last_t_s is None else max(there.t_s or 0.0, seen.last_t_s),
         chamber_c=there.chamber_c,
@@ -151,12 +150,13 @@ def mark_abandoned(answer: CampaignResponse, *, attended: bool) -> CampaignRespo
     """Return the status, marked as abandoned when no process runs a campaign that has not ended."""
     if answer.state in ENDED or attended:
         return answer
-    why = answer.reason if answer.state == "interrupted" else "no process runs it any more: look after the bench"
+    left_safe = answer.state is CampaignState.INTERRUPTED
+    why = answer.reason if left_safe else "no process runs it any more: look after the bench"
     reason = (
         f"{why}; `labctl campaign resume` or a service on its bench takes it up where it was, `labctl campaign abort` "
         "ends it"
     )
-    return answer.model_copy(update={"reason": reason, "abandoned": True})
+    return answer.model_copy(update={"reason": reason, "abandoned": True, "active": False})
 
 
 def event_answer(row: EventRow) -> EventResponse:

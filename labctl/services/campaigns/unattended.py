@@ -7,14 +7,12 @@ from datetime import datetime
 from labctl.errors import Conflict
 from labctl.log import get_logger
 from labctl.services.benches.lease import described, driver_of
-from labctl.services.campaigns.status import ENDED, campaign_status, outlives_its_process
+from labctl.services.campaigns.status import campaign_status, outlives_its_process
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
+from procedures.contracts.campaign_state import ENDED, UNDER_WAY, CampaignState
 
 log = get_logger()
-
-#: States in which the bench may move or be hot; an interrupted campaign had its safe state.
-UNDER_WAY = frozenset({"running", "paused", "waiting"})
 
 
 def record_action(store: Store, at: datetime, action: str, campaign: int, reason: str) -> None:
@@ -36,7 +34,7 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
         text = f"the process that ran campaign {campaign} ended before it could make the bench safe"
         store.benches.mark(row.bench_name, text, at)
         said += f". Nobody has made bench {row.bench_name} safe: look at it, then `labctl bench clear`"
-    store.campaigns.close_unfinished(campaign, said, at, "aborted")
+    store.campaigns.close_unfinished(campaign, said, at, CampaignState.ABORTED)
     log.warning("campaign.closed", campaign=campaign, bench=row.bench_name, reason=said)
     return campaign_status(store, campaign)
 

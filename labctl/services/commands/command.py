@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, Protocol, TypeVar
+from typing import Generic, Literal, Protocol, TypeVar
 
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.encoding import json_body
@@ -38,7 +38,7 @@ class Command(Generic[RequestT, ResponseT]):
     path: str
     handler: Handler[RequestT, ResponseT]
     responses: Mapping[int, type[ResponseT]]
-    encode: Callable[[ExitStack, RequestT], Mapping[str, Any]] = json_body  #: keyword arguments of an httpx request
+    encode: Callable[[ExitStack, RequestT], Mapping[str, object]] = json_body  #: keyword arguments of an httpx request
     newest: Newest | None = None
     computes: bool = False  #: takes long: a service has it done by its computation; the handler is a module's function
 

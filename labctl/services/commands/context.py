@@ -35,26 +35,26 @@ class CommandContext:
 class CampaignControl(Protocol):
     """Control over campaigns, by the process that executes the command."""
 
-    def start(self, context: CommandContext, asked: CampaignStart) -> CampaignResponse:
+    def start(self, context: CommandContext, asked: CampaignStart, /) -> CampaignResponse:
         """Start a campaign now."""
         ...
 
-    def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+    def schedule(self, context: CommandContext, asked: CampaignStart, /) -> ScheduledResponse:
         """Enter a campaign into the schedule."""
         ...
 
-    def resume(self, context: CommandContext, asked: CampaignResume) -> CampaignResponse:
+    def resume(self, context: CommandContext, asked: CampaignResume, /) -> CampaignResponse:
         """Continue a paused campaign, or resume an interrupted one."""
         ...
 
-    def pause(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+    def pause(self, context: CommandContext, asked: ToCampaign[ReasonRequest], /) -> CampaignResponse:
         """Ask a running campaign to hold after the present data set."""
         ...
 
-    def abort(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+    def abort(self, context: CommandContext, asked: ToCampaign[ReasonRequest], /) -> CampaignResponse:
         """End a campaign now, in the safe state."""
         ...
 
-    def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
+    def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest], /) -> CampaignResponse:
         """Answer the question that a campaign waits for. Raises StalePrompt for another one."""
         ...

@@ -26,7 +26,7 @@ from labctl.services.recordings import examples, transfer
 from labctl.services.schedule import queue
 from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
 from labctl.services.schemas.benches import BenchStatus, ClearRequest
-from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest
+from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.certification import CertificationResponse, CertifyRequest, RevokeRequest
 from labctl.services.schemas.recordings import (
@@ -54,7 +54,7 @@ def _fit(context: CommandContext, asked: ToUnit[FitRequest]) -> FitResponse:
     return fitting.fit_unit(context.store, asked.serial, asked.body, context.now())
 
 
-def _improve(context: CommandContext, asked: ToNewestOrVersion[ImproveRequest]) -> FitResponse:
+def _improve(context: CommandContext, asked: ToNewestOrVersion[ImproveRequest]) -> ImproveResponse:
     change = asked.body.model_copy(update={"version": asked.version})
     return revision.improve_unit(context.store, asked.serial, change, context.now())
 
@@ -143,7 +143,7 @@ IMPROVE = Command(
     method="POST",
     path=_UNIT + "/{version}/improve",
     handler=_improve,
-    responses={201: FitResponse},
+    responses={201: ImproveResponse},
     newest=Newest("version", _UNIT, "version", otherwise=1),
     computes=True,
 )

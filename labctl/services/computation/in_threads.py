@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from labctl.acting_user import acting
 from labctl.progress import reporting_to
@@ -28,7 +28,7 @@ class InThreads(Pool):
         """Return the result of some work, done in the calling thread."""
         return work(self._store, *args)
 
-    def _result_of(self, job: Job) -> Any:
+    def _result_of(self, job: Job) -> object:
         return result_here(job, self._store)
 
     def end_soon(self) -> None:
@@ -38,7 +38,7 @@ class InThreads(Pool):
         """End nothing."""
 
 
-def result_here(job: Job, store: Store) -> Any:
+def result_here(job: Job, store: Store) -> object:
     """Do a job in this thread, in the name of whoever asked for it. Raises Cancelled at a stage, when all have left."""
     with acting(job.actor), reporting_to(job.report):
         return job.call(store)

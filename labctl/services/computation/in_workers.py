@@ -14,7 +14,6 @@ from contextlib import contextmanager
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
-from typing import Any
 
 from instruments.clock import Clock
 from labctl.errors import ComputationEnded, LabctlError
@@ -70,7 +69,7 @@ class InWorkers(Pool):
         with _processes:
             forkserver.ensure_running()
 
-    def _result_of(self, job: Job) -> Any:
+    def _result_of(self, job: Job) -> object:
         if job.writes and not self._address.can_write:
             return result_here(job, self._store)
         task = Task(job.call, self._address, job.actor, self.limits)
@@ -109,7 +108,7 @@ class InWorkers(Pool):
             raise
         log.info("worker.ended", **about, took_s=round(self._clock.now_s() - begun_s, 2), outcome="done")
 
-    def _heard(self, job: Job, worker: ForkServerProcess, receiving: Connection) -> Any:
+    def _heard(self, job: Job, worker: ForkServerProcess, receiving: Connection) -> object:
         """Return what a worker sends in the end; its stages are reported on the way."""
         deadline_s = self._clock.now_s() + self.limits.deadline_s
         while True:

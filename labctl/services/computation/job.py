@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from labctl.acting_user import actor
 from labctl.log.context import request_id
@@ -20,13 +20,22 @@ T = TypeVar("T")
 class Call:
     """A function of a module, whose first parameter is a store, and the arguments after it; equal by value."""
 
-    work: Callable[..., Any]
+    work: Callable[..., object]
     args: tuple[object, ...]
     named: Mapping[str, object]
 
-    def __call__(self, store: Store) -> Any:
+    def __call__(self, store: Store) -> object:
         """Return what the function returns."""
         return self.work(store, *self.args, **self.named)
+
+
+class Client(Protocol):
+    """Who waits for a job."""
+
+    @property
+    def progress(self) -> Progress:
+        """What is told of a stage; raises Cancelled where nobody wants to hear it any more."""
+        ...
 
 
 class Job:
@@ -38,12 +47,12 @@ class Job:
         self.future: Future[Any] = Future()
         self.future.set_running_or_notify_cancel()  # nobody who waits for it can cancel it for all
         self._guard = threading.Lock()
-        self._waiting: list[Pending[Any]] = []
+        self._waiting: list[Client] = []
         self._stage = ""
         self._end: Callable[[], None] | None = None
         self.is_abandoned = False
 
-    def join(self, client: Pending[Any]) -> bool:
+    def join(self, client: Client) -> bool:
         """Let one more client wait, and tell it the stage; False where the job is ending because all have left."""
         with self._guard:
             if self.is_abandoned:
@@ -54,7 +63,7 @@ class Job:
             client.progress(stage)
         return True
 
-    def leave(self, client: Pending[Any]) -> None:
+    def leave(self, client: Client) -> None:
         """Let a client leave; the last one ends the job at once, where it can be ended."""
         with self._guard:
             if client not in self._waiting:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any
 
 from labctl.acting_user import Actor, acting
 from labctl.errors import ComputationEnded
@@ -53,7 +52,7 @@ class Outcome:
     content: bytes
     is_error: bool = False
 
-    def result(self) -> Any:
+    def result(self) -> object:
         """Return the result. Raises the error."""
         found = pickle.loads(self.content)  # noqa: S301  made by a process of this service
         if self.is_error:

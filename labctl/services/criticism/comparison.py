@@ -6,7 +6,7 @@ Nothing is fitted here: points, lines, what remains and the error per turn all c
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows
 from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.answers import ComparisonJson
 from labctl.services.criticism.model_lines import lines_over
 from labctl.services.criticism.verification import applied_errors
 from labctl.services.recordings.loading import newest_row, points_of
@@ -55,10 +56,11 @@ def compare_version(
     )  # fmt: skip
 
 
-def comparison_json(store: Store, serial: str, version: int, recording: int) -> dict[str, Any] | None:
+def comparison_json(store: Store, serial: str, version: int, recording: int) -> ComparisonJson | None:
     """Return the comparison as JSON; None where the version cannot be applied to the recording."""
     try:
-        return compare_version(store, serial, version, recording, other_unit=True).model_dump(mode="json")
+        found = compare_version(store, serial, version, recording, other_unit=True)
+        return cast(ComparisonJson, found.model_dump(mode="json"))
     except LabctlError:
         return None
 
@@ -74,13 +76,13 @@ def _columns(data: FitData, errors: Mapping[str, Array]) -> ComparisonColumns:
     rate = data.channels.table_rate_dps()
     level = rate_levels(rate)
     parts = [_axis(data, axis, errors[axis], position, level_centres(rate, level), level) for axis in errors]
-    names = ComparisonColumns.model_fields
-    return ComparisonColumns(**{name: [value for part in parts for value in part[name]] for name in names})
+    columns = {name: [value for part in parts for value in part[name]] for name in ComparisonColumns.model_fields}
+    return ComparisonColumns.model_validate(columns, extra="forbid")
 
 
 def _axis(
     data: FitData, axis: str, residual: Array, position: NDArray[np.str_], rate_level: Array, level: NDArray[np.int64]
-) -> dict[str, list[Any]]:
+) -> dict[str, list[int] | list[str] | list[float] | list[float | None]]:
     """Return the rows of one output axis."""
     channels = data.channels
     rate, own, warm = channels.table_rate_dps(), channels.rate_dps(axis), channels.temperature_c(axis)

@@ -6,13 +6,13 @@ A module of its own, because a kept answer needs none of it, and these libraries
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.inversion import NotConverged
+from labctl.json_types.criticism import Experiment
 from labctl.progress import report_stage
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.report_text import answer_of, with_warnings
@@ -50,7 +50,7 @@ def evaluate(
     )
 
 
-def _experiments(store: Store, campaign: int | None, found: Criticism) -> list[dict[str, Any]]:
+def _experiments(store: Store, campaign: int | None, found: Criticism) -> list[Experiment]:
     if not found.verdict.indistinguishable:
         return []
     report_stage("checking experiments")

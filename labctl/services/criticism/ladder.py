@@ -12,7 +12,6 @@ from labctl.store import CalibrationRecord, RecordingRow, Store
 
 #: Applying more versions than this to a recording takes long.
 QUICK_VERSIONS = 4
-ERRORS = ("raw_rms_dps", "rms_dps", "heldout_rms_dps", "noise_floor_dps")
 
 
 def ladder(store: Store, serial: str, recording: int | None = None) -> LadderResponse:
@@ -57,6 +56,7 @@ def _by_parentage(rows: Sequence[CalibrationRecord]) -> Iterator[CalibrationReco
 
 
 def _step(row: CalibrationRecord, applied_rms_dps: float | None = None) -> LadderRow:
+    error = row.answer["error"]
     return LadderRow(
         version=row.version,
         parent=row.parent,
@@ -64,7 +64,10 @@ def _step(row: CalibrationRecord, applied_rms_dps: float | None = None) -> Ladde
         model=row.model,
         effects=list(row.answer["model"]["effects"]),
         applied_rms_dps=applied_rms_dps,
-        **{key: row.answer["error"][key] for key in ERRORS},
+        raw_rms_dps=error["raw_rms_dps"],
+        rms_dps=error["rms_dps"],
+        heldout_rms_dps=error["heldout_rms_dps"],
+        noise_floor_dps=error["noise_floor_dps"],
     )
 
 

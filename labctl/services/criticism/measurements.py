@@ -55,5 +55,6 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) ->
     parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     for name, values in quantisation_of(points).items():  # decimated readings do not show their steps any more
-        columns[name] = per_reading(np.asarray(columns["dataset"]), np.asarray(points.columns["dataset"]), values)
+        numbers = np.asarray(points.columns["dataset"], dtype=np.int64)
+        columns[name] = per_reading(np.asarray(columns["dataset"], dtype=np.int64), numbers, values)
     return Recording(info, columns, points.environment)

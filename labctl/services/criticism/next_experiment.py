@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import tomli_w
@@ -19,6 +18,7 @@ from labctl.fitting.criticism import (
     separation_power,
 )
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.json_types.criticism import Experiment
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, recipe_document
 from labctl.services.simulation.visibility import planned_schedule
 from labctl.store import Store
@@ -32,7 +32,7 @@ PAIRS, SHOWN = 6, 4
 MOST_CHI2 = 40.0
 
 
-def experiments_for(store: Store, campaign: int | None, found: Criticism) -> list[dict[str, Any]]:
+def experiments_for(store: Store, campaign: int | None, found: Criticism) -> list[Experiment]:
     """Return changed recipes that would separate what a verdict could not distinguish, best first.
 
     `campaign` is the recording's, if it has one. First come the recipes that separate the leader from most rivals,
@@ -58,9 +58,9 @@ def experiments_for(store: Store, campaign: int | None, found: Criticism) -> lis
 
 
 def _experiment(
-    text: str, changes: Mapping[str, Any], recipe: Recipe, bench: BenchFile, signal: LeadingSignal, rivals: list[str],
-    model: ErrorModel, floor_dps: Mapping[str, float],
-) -> dict[str, Any] | None:  # fmt: skip
+    text: str, changes: Mapping[str, object], recipe: Recipe, bench: BenchFile, signal: LeadingSignal,
+    rivals: list[str], model: ErrorModel, floor_dps: Mapping[str, float],
+) -> Experiment | None:  # fmt: skip
     """Return a changed recipe with what it separates; None where it cannot be run on the bench or separates nothing."""
     try:
         changed = Recipe.model_validate({**recipe.model_dump(), **changes})
@@ -86,14 +86,17 @@ def _experiment(
     }
 
 
-def menu(recipe: Recipe) -> list[tuple[str, dict[str, Any]]]:
+def menu(recipe: Recipe) -> list[tuple[str, dict[str, object]]]:
     """Return the changes of a recipe that may separate effects, each with its description."""
     temperatures = sorted(recipe.temperatures_c)
     middle = temperatures[len(temperatures) // 2]
     few = sorted({0.0, *(s * abs(r) for r in _spread(recipe.rates_dps) for s in (1, -1))})
-    short: dict[str, Any] = {"temperatures_c": [middle], "rates_dps": few}
-    inside = {"mounting": {**recipe.mounting.model_dump(), "repower_each": False}}
-    up_and_down = {"inverted": {"temperatures_c": [middle], "rates_dps": [0.0, *few[:2], *few[-2:]]}, **inside}
+    short: dict[str, object] = {"temperatures_c": [middle], "rates_dps": few}
+    inside: dict[str, object] = {"mounting": {**recipe.mounting.model_dump(), "repower_each": False}}
+    up_and_down: dict[str, object] = {
+        "inverted": {"temperatures_c": [middle], "rates_dps": [0.0, *few[:2], *few[-2:]]},
+        **inside,
+    }
     return [
         ("each position also upside down, in one powered run, at one temperature", {**short, **up_and_down}),
         ("each position also upside down, in one powered run", up_and_down),

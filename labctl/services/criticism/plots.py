@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import json
+from typing import cast
 
+from labctl.json_types.answers import CriticismJson, LadderJson
 from labctl.services.cache import cached
 from labctl.services.criticism.comparison import comparison_json
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.criticism.ladder import ladder
-from labctl.services.schemas.criticism import PictureResponse, PicturesResponse
+from labctl.services.schemas.calibrations import LadderResponse
+from labctl.services.schemas.criticism import CriticismResponse, PictureResponse, PicturesResponse
 from labctl.store import Store
+
+
+def criticism_json(answer: CriticismResponse) -> CriticismJson:
+    """Return a criticism as plots read it."""
+    return cast(CriticismJson, answer.model_dump(mode="json"))
+
+
+def ladder_json(answer: LadderResponse) -> LadderJson:
+    """Return a ladder as plots read it."""
+    return cast(LadderJson, answer.model_dump(mode="json"))
 
 
 def pictures_unit(store: Store, serial: str, version: int | None, recording: int | None) -> list[PictureResponse]:
@@ -26,7 +39,7 @@ def pictures_unit(store: Store, serial: str, version: int | None, recording: int
                 id=picture.id, title=picture.title, how_to_read=picture.caption, effects=list(picture.effects),
                 figure=json.loads(picture.figure.to_json()),
             )
-            for picture in pictures_of(said.model_dump(mode="json"), steps.model_dump(mode="json"), compared)
+            for picture in pictures_of(criticism_json(said), ladder_json(steps), compared)
         ]  # fmt: skip
         return PicturesResponse(pictures=found)
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import chdtrc
@@ -19,6 +18,8 @@ from labctl.fitting.criticism import (
     worst_data_sets,
 )
 from labctl.fitting.effects import CATALOGUE, kind_of
+from labctl.json_types.criticism import CriticisedNoise, Experiment, LackOfFit
+from labctl.json_types.criticism import Suspect as SuspectJson
 from labctl.services.schemas.criticism import CriticismResponse
 from labctl.services.schemas.warnings import DataWarning
 
@@ -39,7 +40,7 @@ HISTORY = frozenset({"t_s", "power_s"})
 
 
 def answer_of(
-    serial: str, version: int, recording: int, found: Criticism, experiments: list[dict[str, Any]]
+    serial: str, version: int, recording: int, found: Criticism, experiments: list[Experiment]
 ) -> CriticismResponse:
     """Return the answer of a criticism."""
     verdict, base = found.verdict, found.base
@@ -64,20 +65,20 @@ def answer_of(
         named=list(verdict.named),
         depends_on=list(verdict.depends_on),
         confounded_with=list(verdict.confounded),
-        remainder=dict(verdict.remainder) if verdict.remainder is not None else None,
+        remainder=verdict.remainder,
         not_physical=list(verdict.not_physical),
         named_axes={name: list(axes) for name, axes in verdict.axes.items()},
         further=[list(group) for group in verdict.further],
-        not_testable=[dict(line) for line in found.not_testable],
+        not_testable=list(found.not_testable),
         experiments=experiments,
         worst=worst_data_sets(found.data, found.residuals) if found.comparison else [],
         maps=residual_maps(found.data, found.residuals) if found.comparison else [],
         readings_left_out=found.data.left_out,
-        views=dict(found.views),
+        views=found.views,
     )
 
 
-def _noise(found: Criticism) -> dict[str, Any]:
+def _noise(found: Criticism) -> CriticisedNoise:
     static = found.data.static.to_json() if found.data.static is not None else None
     largest = max(found.floor.axes.values(), key=lambda noise: noise.drift.drift_dps)
     known = [noise.white_dps for noise in found.floor.axes.values() if noise.white_dps is not None]
@@ -92,7 +93,7 @@ def _noise(found: Criticism) -> dict[str, Any]:
     }
 
 
-def _lack_of_fit(found: Criticism) -> dict[str, float | None]:
+def _lack_of_fit(found: Criticism) -> LackOfFit:
     """Chi2 of the whitened residual over its degrees of freedom, and its p-value."""
     if not found.residuals:
         return {"statistic": None, "p_value": None}
@@ -101,7 +102,7 @@ def _lack_of_fit(found: Criticism) -> dict[str, float | None]:
     return {"statistic": float(total / max(freedom, 1)), "p_value": float(chdtrc(max(freedom, 1), total))}
 
 
-def _suspect(suspect: Suspect, found: Criticism) -> dict[str, Any]:
+def _suspect(suspect: Suspect, found: Criticism) -> SuspectJson:
     candidate = suspect.candidate
     kind = kind_of(candidate.term) if candidate.term is not None else CATALOGUE[candidate.id]
     after = suspect.after.error if suspect.after else None
@@ -134,7 +135,7 @@ def _shape(suspect: Suspect) -> dict[str, float]:
     return dict(term.parameters) if term else {}
 
 
-def sentences(found: Criticism, experiments: Sequence[Mapping[str, Any]] = ()) -> list[str]:
+def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[str]:
     """Return the verdict in words, one sentence each, the answer first; what to do next is the first experiment."""
     verdict = found.verdict
     said = [_first(found)]

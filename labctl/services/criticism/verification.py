@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,8 +93,8 @@ def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[n
 
 def _expected_dps(row: CalibrationRecord) -> float | None:
     """Return the error that a version promises for a data set: held-out, else of its own data; None where unknown."""
-    error: Mapping[str, Any] = row.answer["error"]
-    known = [float(error[key]) for key in ("heldout_rms_dps", "rms_dps") if error.get(key) is not None]
+    error = row.answer["error"]
+    known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"]) if figure is not None]
     return max(known, default=None)
 
 

@@ -6,10 +6,9 @@ import tomllib
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 from zoneinfo import ZoneInfo
 
-from pydantic import ValidationError
+from pydantic import JsonValue, ValidationError
 
 from instruments.bench import checked_settings
 from instruments.bench_config import BenchFile, read_bench, shipped_benches
@@ -55,7 +54,7 @@ def own_text(source: str) -> str:
     return read_toml_text(Path(source))
 
 
-def recipe_document(recipe: Recipe) -> dict[str, Any]:
+def recipe_document(recipe: Recipe) -> dict[str, JsonValue]:
     """Return a recipe as a recipe file says it: what it leaves as usual is left out."""
     document = recipe.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     return {"format": "labctl-recipe/1", "name": recipe.name, **document}

@@ -16,7 +16,7 @@ from labctl.services.planning.loading import (
     load_recipe,
     plan_answer,
 )
-from labctl.services.planning.timeline import timeline_columns
+from labctl.services.planning.timeline import step_json, timeline_columns
 from labctl.services.schemas.plans import (
     PlannedResponse,
     PlanRequest,
@@ -76,5 +76,5 @@ def plan_steps(
             f"to {LONGEST_LOOK_S / 86_400:.0f}"
         )
     answer = plan_answer(plan, on, look if request.visibility else None, start)
-    columns = timeline_columns([step.model_dump(mode="json") for step in plan.steps])
-    return PlannedResponse(**answer.model_dump(), timeline=TimelineColumns(**columns))
+    columns = timeline_columns([step_json(step) for step in plan.steps])
+    return PlannedResponse(**answer.model_dump(), timeline=TimelineColumns(**dict(columns)))

@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import cast
 
+from labctl.json_types.steps import StepJson
 from labctl.services.schemas.plans import (
     TimelineColumns,
 )
+from procedures.contracts.steps import Step
 
 
-def timeline_columns(steps: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Return the steps of a plan (JSON) as columns; set point and position stay in force until the next."""
-    found: dict[str, list[Any]] = {name: [] for name in TimelineColumns.model_fields}
-    start_s, temperature_c, position = 0.0, None, None
-    for number, step in enumerate(steps, start=1):
-        temperature_c, position = step.get("temperature_c", temperature_c), step.get("position", position)
-        row = {
-            "number": number, "kind": step["kind"], "start_s": start_s, "expected_s": step["expected_s"],
-            "temperature_c": temperature_c, "rate_dps": step.get("rate_dps"), "position": position,
-            "dataset": step.get("dataset"),
-        }  # fmt: skip
-        for name, value in row.items():
-            found[name].append(value)
-        start_s += step["expected_s"]
-    return found
+def step_json(step: Step) -> StepJson:
+    """Return a step as it is written down."""
+    return cast(StepJson, step.model_dump(mode="json"))
+
+
+def timeline_columns(steps: Sequence[StepJson]) -> TimelineColumns:
+    """Return the steps of a plan as columns; set point and position stay in force until the next."""
+    start_s: list[float] = []
+    temperature_c: list[float | None] = []
+    position: list[str | None] = []
+    now_s, now_c, here = 0.0, None, None
+    for step in steps:
+        now_c, here = step.get("temperature_c", now_c), step.get("position", here)
+        start_s.append(now_s)
+        temperature_c.append(now_c)
+        position.append(here)
+        now_s += step["expected_s"]
+    return TimelineColumns(
+        number=list(range(1, len(steps) + 1)),
+        kind=[step["kind"] for step in steps],
+        start_s=start_s,
+        expected_s=[step["expected_s"] for step in steps],
+        temperature_c=temperature_c,
+        rate_dps=[step.get("rate_dps") for step in steps],
+        position=position,
+        dataset=[step.get("dataset") for step in steps],
+    )

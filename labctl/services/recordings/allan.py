@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,12 +30,16 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanRespon
 
     def work() -> AllanResponse:
         if dataset is None:
-            return AllanResponse(recording=recording, **_at_rest(store, recording, info).to_json())
+            return _response(recording, _at_rest(store, recording, info))
         columns = store.recordings.dataset(recording, dataset)
-        return AllanResponse(recording=recording, **_of_set(Recording(info, columns), dataset).to_json())
+        return _response(recording, _of_set(Recording(info, columns), dataset))
 
     question = {"recording": recording, "readings": store.recordings.fingerprint(recording), "dataset": dataset}
     return cached(AllanResponse, question, work)
+
+
+def _response(recording: int, found: StaticRecord) -> AllanResponse:
+    return AllanResponse.model_validate({"recording": recording, **found.to_json()}, extra="forbid")
 
 
 def _of_set(recording: Recording, dataset: int) -> StaticRecord:
@@ -64,7 +66,7 @@ def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
     rows = store.recordings.data_sets(recording)
     still = [row.number for row in rows if row.state == "complete" and row.n and row.table_rate_dps == 0]
     names = (*NEEDED, *(f"gyro_{axis}" for axis in info.axes))
-    parts: list[dict[str, NDArray[Any]]] = []
+    parts: list[dict[str, NDArray[np.generic]]] = []
     for number in still:
         columns = store.recordings.dataset(recording, number)
         parts.append({name: columns[name] for name in names if name in columns})

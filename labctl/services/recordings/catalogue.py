@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.recording import Recording
 from labctl.services.benches.bench_clock import has_simulated_time
-from labctl.services.schemas.recordings import ChannelColumns, DataSetsResponse, RecordingResponse
+from labctl.services.schemas.recordings import (
+    ChannelColumns,
+    DataSetsResponse,
+    RecordingAlone,
+    RecordingResponse,
+    RecordingWithPoints,
+    SamplesResponse,
+)
 from labctl.store import MeanRow, RecordingRow, Store
 
 
@@ -85,42 +92,44 @@ def _of_table(numbers: list[int], points: Recording) -> dict[str, ChannelColumns
         if name in NO_CHANNEL or name.endswith("_std") or np.asarray(values).dtype.kind not in "fiu":
             continue
         spread = points.columns.get(f"{name}_std")
-        std = nothing if spread is None else _numbers(np.asarray(spread)[order])
-        found[name] = ChannelColumns(mean=_numbers(np.asarray(values)[order]), std=std)
+        std = nothing if spread is None else _numbers(np.asarray(spread, dtype=np.float64)[order])
+        found[name] = ChannelColumns(mean=_numbers(np.asarray(values, dtype=np.float64)[order]), std=std)
     return found
 
 
-def _numbers(values: np.ndarray[Any, Any]) -> list[float | None]:
+def _numbers(values: NDArray[np.float64]) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
 
 
-def describe_recording(store: Store, recording: int, *, points: bool = True) -> dict[str, Any]:
+def describe_recording(store: Store, recording: int, *, points: bool = True) -> RecordingAlone | RecordingWithPoints:
     """Return what a recording is and, if asked for, the means of its data sets."""
     row = store.recordings.get(recording)
-    about = {
-        "id": row.id,
-        "serial": row.serial,
-        "campaign": row.campaign,
-        "kind": row.kind,
-        "info": dict(row.info),
-        "created_at": row.created_at.isoformat(),
-        "simulated_time": row.campaign is not None and has_simulated_time(store.campaigns.get(row.campaign).bench),
-        "datasets": row.datasets,
-        "readings": row.readings,
-    }
+    about = RecordingAlone(
+        id=row.id,
+        serial=row.serial,
+        campaign=row.campaign,
+        kind=row.kind,
+        info=dict(row.info),
+        created_at=row.created_at.isoformat(),
+        simulated_time=row.campaign is not None and has_simulated_time(store.campaigns.get(row.campaign).bench),
+        datasets=row.datasets,
+        readings=row.readings,
+    )
     if not points:
         return about
     columns = store.recordings.points(recording).columns
-    return {**about, "points": {name: np.asarray(values).tolist() for name, values in columns.items()}}
+    return RecordingWithPoints(
+        **dict(about), points={name: np.asarray(values).tolist() for name, values in columns.items()}
+    )
 
 
-def dataset_samples(store: Store, recording: int, dataset: int, limit: int) -> dict[str, Any]:
+def dataset_samples(store: Store, recording: int, dataset: int, limit: int) -> SamplesResponse:
     """Return the readings of one data set, at most `limit`."""
     columns = store.recordings.dataset(recording, dataset)
     n = len(next(iter(columns.values()), ()))
-    return {
-        "recording": recording,
-        "dataset": dataset,
-        "readings": n,
-        "columns": {name: np.asarray(values)[:limit].tolist() for name, values in columns.items()},
-    }
+    return SamplesResponse(
+        recording=recording,
+        dataset=dataset,
+        readings=n,
+        columns={name: np.asarray(values)[:limit].tolist() for name, values in columns.items()},
+    )

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +40,7 @@ def bins_of(readings: int) -> int:
     return min(max(LEAST_BINS, readings // READINGS_A_BIN), MOST_BINS, readings)
 
 
-def courses_of(columns: dict[str, NDArray[Any]]) -> list[str]:
+def courses_of(columns: dict[str, NDArray[np.generic]]) -> list[str]:
     """Return the names of the channels of a data set that can be drawn over time."""
     return [name for name, values in columns.items() if name not in NO_COURSE and values.dtype.kind in "fiu"]
 
@@ -93,6 +92,6 @@ def _bounds(values: Array, begins: NDArray[np.int64], width: NDArray[np.int64]) 
             np.minimum.reduceat(low, begins),
             np.maximum.reduceat(high, begins),
             np.add.reduceat(total, begins) / np.maximum(count, 1),
-            count,
+            count.astype(np.float64),
         ]
     )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import DataRefused
+from labctl.json_types.findings import FindingJson
 from labctl.recording import Recording
 from labctl.recording.sanity import Finding, Summary, findings_of, joined, steps_of, summarise
 from labctl.services.cache import cached
@@ -37,10 +36,9 @@ def _inspected(store: Store, row: RecordingRow, recording: Recording | None) -> 
 
 def _response(summary: Summary, recording: Recording) -> RecordingInspection:
     if len(summary) == 0:
-        nothing: list[Any] = []
         return RecordingInspection(
-            warnings=[], dataset=nothing, rate_low_dps=nothing, rate_high_dps=nothing, temperature_low_c=nothing,
-            temperature_high_c=nothing, position=nothing, quantisation_dps={},
+            warnings=[], dataset=[], rate_low_dps=[], rate_high_dps=[], temperature_low_c=[], temperature_high_c=[],
+            position=[], quantisation_dps={},
         )  # fmt: skip
     coarse = {axis: steps_of(summary, axis) for axis in summary.info.axes}
     return RecordingInspection(
@@ -48,8 +46,8 @@ def _response(summary: Summary, recording: Recording) -> RecordingInspection:
         dataset=summary["dataset"].tolist(),
         rate_low_dps=summary["rate_low_dps"].tolist(),
         rate_high_dps=summary["rate_high_dps"].tolist(),
-        temperature_low_c=_numbers(summary["temperature_low_c"]),
-        temperature_high_c=_numbers(summary["temperature_high_c"]),
+        temperature_low_c=_numbers(np.asarray(summary["temperature_low_c"], dtype=np.float64)),
+        temperature_high_c=_numbers(np.asarray(summary["temperature_high_c"], dtype=np.float64)),
         position=[str(position) for position in summary["position"]],
         quantisation_dps={axis: u.tolist() for axis, (step, u) in coarse.items() if step is not None},
     )
@@ -61,7 +59,16 @@ def _numbers(values: NDArray[np.float64]) -> list[float | None]:
 
 def warning_of(finding: Finding) -> DataWarning:
     """Return a finding as a response."""
-    return DataWarning.model_validate(finding.to_json())
+    return DataWarning.model_validate(finding.to_json(), extra="forbid")
+
+
+def as_json(warning: DataWarning) -> FindingJson:
+    """Return a warning as it is kept with a version."""
+    return {
+        "what": warning.what, "severity": warning.severity, "where": warning.where, "said": warning.said,
+        "value": warning.value, "unit": warning.unit, "expected": warning.expected, "do": warning.do,
+        "text": warning.text,
+    }  # fmt: skip
 
 
 INSIST = "; to do it all the same: --accept-warnings"
@@ -73,4 +80,4 @@ def refuse_wrong(warnings: list[DataWarning], what: str, *, accepted: bool, insi
     if sure and not accepted:
         more = f" (and {len(sure) - 1} more)" if len(sure) > 1 else ""
         text = f"{what} is refused: {sure[0].text}{more}{insist}"
-        raise DataRefused(text, [warning.model_dump() for warning in warnings])
+        raise DataRefused(text, [as_json(warning) for warning in warnings])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,7 @@ def points_of(store: Store, row: RecordingRow) -> Recording:
     if row.kind != "samples":
         return points
 
-    def readings(dataset: int) -> Mapping[str, NDArray[Any]]:
+    def readings(dataset: int) -> Mapping[str, NDArray[np.generic]]:
         compute(UNNAMED)
         return store.recordings.dataset(row.id, dataset)
 
@@ -39,7 +38,7 @@ def _with_steps(points: Recording, found: RecordingInspection) -> Recording:
     if not found.quantisation_dps:
         return points
     columns = dict(points.columns)
-    numbers, dataset = np.asarray(found.dataset), np.asarray(columns["dataset"])
+    numbers, dataset = np.asarray(found.dataset), np.asarray(columns["dataset"], dtype=np.int64)
     for axis, u_dps in found.quantisation_dps.items():
         unit = next((unit for name, unit in points.info.output.items() if name == axis), None)
         scale = abs(unit.scale) if unit else 1.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +105,7 @@ def _readings(store: Store, recording: int, channel: str, rows: list[DataSetRow]
     return _as_it_is(np.concatenate(times), np.concatenate(values))
 
 
-def _as_it_is(t_s: NDArray[Any], values: NDArray[Any]) -> Envelope:
+def _as_it_is(t_s: NDArray[np.generic], values: NDArray[np.generic]) -> Envelope:
     """Return an envelope whose bins are single readings."""
     numbers = np.asarray(values, dtype=np.float64)
     there = np.isfinite(numbers)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field, StringConstraints
+from pydantic import Field, JsonValue, StringConstraints
 
 from labctl.services.schemas.base import Request, ResponseModel
 
@@ -66,7 +66,7 @@ class AuditResponse(ResponseModel):
     who: str
     action: str
     subject: str
-    detail: dict[str, Any]
+    detail: dict[str, JsonValue] = Field(description="What belongs to the act; its keys depend on `action`.")
     hash: str
 
 

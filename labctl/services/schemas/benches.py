@@ -43,3 +43,46 @@ class DeviceCheck(ResponseModel):
     driver: str = Field(default="", description="Name of its driver.")
     distribution: str = Field(default="", description="Distribution that the driver came from.")
     version: str = Field(default="", description="Version of that distribution.")
+
+
+class BenchUnit(ResponseModel):
+    """A unit on a bench."""
+
+    name: str
+    serial: str
+    driver: str
+
+
+class BenchDescription(ResponseModel):
+    """A bench and what it is doing."""
+
+    name: str
+    simulated: bool
+    latitude_deg: float | None
+    units: list[BenchUnit]
+    campaign: int | None = Field(description="The campaign that runs now.")
+    unconfirmed: str = Field(description="What its last safe state could not confirm; empty when all is well.")
+    heard_s: float = Field(
+        default=0.0, description="How long ago the process that drives it was last heard of, s; 0: it is this one."
+    )
+
+
+class BenchResponse(BenchDescription):
+    """The bench of a service, and what a person is asked before a campaign starts there."""
+
+    start_questions: dict[str, str] = Field(description="Check -> question; empty for a simulated bench.")
+
+
+class ShippedBench(ResponseModel):
+    """A bench that comes with labctl, and what stands on it."""
+
+    name: str
+    text: str
+
+
+class BenchCheckResponse(ResponseModel):
+    """Whether every instrument of a bench answered."""
+
+    bench: str
+    ok: bool
+    devices: list[DeviceCheck]

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
+from labctl.json_types.models import (
+    AxisCoefficients,
+    AxisNoiseJson,
+    FitEnvironment,
+    LeftOut,
+    ReferenceJson,
+    TemperatureBasisJson,
+    TermJson,
+    UsualRange,
+)
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.certification import CertificationResponse
 from labctl.services.schemas.criticism import ResidualColumns
@@ -39,13 +49,16 @@ class ImproveRequest(Request):
 
 
 class ModelResponse(ResponseModel):
-    """Which effects a calibration is made of."""
+    """Which effects a calibration is made of; null: made by an older labctl, which did not say."""
 
     name: str
     effects: list[str]
     argument: Literal["rate", "output"] = Field(
         description="Whether the regressors see the true rate (forward law) or the gyro's output (direct law)."
     )
+    terms: list[TermJson] | None = Field(default=None, description="The effects with orders and nonlinear parameters.")
+    temperature: TemperatureBasisJson | None = Field(default=None, description="How temperature enters.")
+    reference: ReferenceJson | None = Field(default=None, description="What the terms are centred on.")
 
 
 class ErrorFigures(ResponseModel):
@@ -55,6 +68,7 @@ class ErrorFigures(ResponseModel):
     rms_dps: float | None = Field(description="After compensation, on the data of the fit.")
     heldout_rms_dps: float | None = Field(description="Each temperature predicted by a fit that has not seen it.")
     noise_floor_dps: float | None = Field(description="Root of the mean variance of a data-set mean: white and drift.")
+    noise_floor_source: str = Field(default="none", description="What the noise floor was found from.")
 
 
 class Validity(ResponseModel):
@@ -66,32 +80,57 @@ class Validity(ResponseModel):
     )
 
 
-class FitResponse(ResponseModel):
+class FittedResponse(ResponseModel):
+    """What a fit says of its model, whether it is kept as a version or not."""
+
+    serial: str
+    model: ModelResponse
+    axes: dict[str, AxisCoefficients] = Field(
+        description="axis -> coefficients with value, standard uncertainty u, and unit."
+    )
+    error: ErrorFigures
+    validity: Validity
+    warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
+    noise: dict[str, AxisNoiseJson] = Field(
+        default_factory=dict, description="axis -> white noise and drift that the data were weighted by, deg/s."
+    )
+    environment: FitEnvironment = Field(
+        default_factory=FitEnvironment, description="Which thermometer was used, how the Earth's rate was treated."
+    )
+    reference_temperature_c: float | None = Field(default=None, description="Temperature terms are centred on it.")
+    recording: int | None = Field(default=None, description="The recording that it was fitted to.")
+
+
+class FitResponse(FittedResponse):
     """A calibration version, as `labctl fit --json` and `POST .../calibrations` give it."""
 
-    serial: str
     version: int
-    model: ModelResponse
-    axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
-    error: ErrorFigures
-    validity: Validity
-    warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
+    campaign: int | None = Field(default=None, description="The campaign of the recording; null: it was imported.")
+    recipe: str | None = None
+    bench: str | None = None
+    hash: str = Field(description="SHA-256 of the calibration file.")
 
 
-class PreviewResponse(ResponseModel):
+class ChangedModel(FittedResponse):
+    """What a change of a version's effects brought."""
+
+    improved_from: int = Field(description="The version that was changed.")
+    before: ErrorFigures = Field(description="Errors of the version that was changed, fitted to the same recording.")
+    plausible: dict[str, UsualRange] = Field(description="Effect -> the usual range, and whether it is inside.")
+    left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
+
+
+class ImproveResponse(ChangedModel):
+    """The version that a change of effects made, as `labctl improve --json` and `POST .../improve` give it."""
+
+    version: int
+    parent: int
+    hash: str = Field(description="SHA-256 of the calibration file.")
+
+
+class PreviewResponse(ChangedModel):
     """What a changed model would be; nothing was kept, so it has no version of its own."""
 
-    serial: str
-    improved_from: int
-    recording: int
-    model: ModelResponse
-    axes: dict[str, Any] = Field(description="axis -> coefficients with value, standard uncertainty u, and unit.")
-    error: ErrorFigures
-    before: ErrorFigures
-    validity: Validity
-    warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
-    plausible: dict[str, dict[str, Any]] = Field(description="Effect -> the usual range, and whether it is inside.")
-    left_out: list[dict[str, Any]] = Field(description="Effects that would not leave the house with a calibration.")
     residuals: ResidualColumns = Field(description="What the changed model leaves, data set by data set.")
 
 
@@ -138,18 +177,25 @@ class CalibrationRow(ResponseModel):
     heldout_rms_dps: float | None = None
 
 
-class VersionResponse(FitResponse):
-    """A calibration version as it was made, and whether it is in force."""
+class VersionFacts(ResponseModel):
+    """When a version was made, from what, and whether it is in force."""
 
-    parent: int | None = None
-    recording: int | None = None
     created_at: datetime
-    hash: str
     in_force: bool
     due: datetime | None = Field(default=None, description="Until when it is in force as certified; null: no date.")
     certification: CertificationResponse | None = Field(
         description="The newest act on this version; null: there was none."
     )
+
+
+class VersionResponse(VersionFacts, FitResponse):
+    """A calibration version that a fit made, as it was made, and whether it is in force."""
+
+    parent: int | None = None
+
+
+class ImprovedVersionResponse(VersionFacts, ImproveResponse):
+    """A calibration version that a change of effects made, and whether it is in force."""
 
 
 class Surface(ResponseModel):
@@ -169,5 +215,5 @@ class SurfaceResponse(ResponseModel):
     version: int
     validity: Validity
     held: dict[str, float] = Field(description="Channels that the model needs besides: their means in its recording.")
-    left_out: list[dict[str, Any]] = Field(description="Effects of the fit that do not leave with the calibration.")
+    left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
     axes: dict[str, Surface]

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
+from procedures.contracts.campaign_state import ACTIVE, ENDED, CampaignState
 
 #: What a person confirms about a real bench before a campaign starts there.
 BenchCheck = Literal["chamber_clear", "table_free", "limiter_on"]
@@ -143,7 +144,7 @@ class CampaignResponse(ResponseModel):
     id: int
     recipe: str
     bench: str
-    state: str
+    state: CampaignState
     reason: str = ""
     step: int | None = Field(default=None, description="Number of the step, from 1.")
     steps: int
@@ -173,6 +174,14 @@ class CampaignResponse(ResponseModel):
         default=False, description="Its times are those of a simulated bench, which may run faster than the wall's."
     )
     advice: AdviceResponse | None = Field(default=None, description="Of a failed campaign.")
+    ended: bool = Field(
+        default_factory=lambda given: given["state"] in ENDED,
+        description="Over: nothing happens any more unless a person resumes it.",
+    )
+    active: bool = Field(
+        default_factory=lambda given: given["state"] in ACTIVE and not given["abandoned"],
+        description="A process has it in hand: planned, running, paused or waiting, and not abandoned.",
+    )
     resumable: bool | None = Field(
         default=None, description="Whether `resume` would be accepted here now; null in lists."
     )
@@ -188,5 +197,9 @@ class EventResponse(ResponseModel):
     at: datetime
     t_s: float
     kind: str
-    level: str
+    level: Literal["info", "warning", "error"]
     message: str
+    device: str | None = Field(default=None, description="The instrument or unit that it is about.")
+    value: float | None = Field(default=None, description="What was measured, in `unit`.")
+    limit: float | None = Field(default=None, description="Which limit it was held against, in `unit`.")
+    unit: str | None = None

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from pydantic import Field
 
+from labctl.json_types.models import LeftOut
 from labctl.services.schemas.base import ResponseModel
 
 
@@ -56,7 +55,7 @@ class ComparisonResponse(ResponseModel):
     fitted_to: int | None = Field(description="The recording that the version was fitted to.")
     source: str = Field(description="Which model all numbers here come from, in words.")
     held: dict[str, float] = Field(description="Other channels that the lines need: their means in this recording.")
-    left_out: list[dict[str, Any]] = Field(description="Effects of the fit that do not leave with the calibration.")
+    left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
     least_turn_rate_dps: float = Field(description="The error per turn is given from this rate on.")
     at_rest_dps: float = Field(description="Below this table rate a data set is at rest.")
     columns: ComparisonColumns

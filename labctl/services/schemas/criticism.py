@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, JsonValue
 
+from labctl.json_types.criticism import (
+    CriticisedErrors,
+    CriticisedNoise,
+    Experiment,
+    FailingRange,
+    LackOfFit,
+    NotTestable,
+    Remainder,
+    ResidualMap,
+    Suspect,
+    WorstDataSet,
+)
+from labctl.json_types.views import Views
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
@@ -46,22 +59,44 @@ class CriticismResponse(ResponseModel):
     recording: int
     verdict: Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
     text: list[str] = Field(description="The verdict in words, the answer first.")
-    error: dict[str, Any]
-    noise: dict[str, Any]
-    lack_of_fit: dict[str, float | None]
-    where: list[dict[str, Any]] = Field(description="Ranges of channels in which the residual is far from 0.")
-    suspects: list[dict[str, Any]]
+    error: CriticisedErrors
+    noise: CriticisedNoise
+    lack_of_fit: LackOfFit
+    where: list[FailingRange] = Field(description="Ranges of channels in which the residual is far from 0.")
+    suspects: list[Suspect]
     named: list[str] = Field(description="The effects that the verdict stands on.")
     depends_on: list[str] = Field(description="Channels that the residual hangs on, strongest first.")
-    not_testable: list[dict[str, Any]]
-    experiments: list[dict[str, Any]]
+    confounded_with: list[str] = Field(
+        default_factory=list, description="Channels that this schedule cannot tell from the first of `depends_on`."
+    )
+    remainder: Remainder | None = Field(default=None, description="What remains beside all that was named.")
+    not_physical: list[str] = Field(
+        default_factory=list, description="Effects that look alike in these data, at a size that the unit cannot have."
+    )
+    named_axes: dict[str, list[str]] = Field(
+        default_factory=dict, description="Effect -> the axes on which it was found."
+    )
+    further: list[list[str]] = Field(
+        default_factory=list, description="What could be tried beside an adequate model; effects that are alike in one."
+    )
+    not_testable: list[NotTestable]
+    experiments: list[Experiment]
+    worst: list[WorstDataSet] = Field(default_factory=list, description="Data sets furthest from the model.")
+    maps: list[ResidualMap] = Field(default_factory=list, description="Residual over floor in rate x temperature.")
+    readings_left_out: int = Field(default=0, description="Readings far outside their data set.")
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     applied: VerificationResponse | None = Field(
         default=None, description="The version as it is on this recording; everything else is of a refit to it."
     )
-    views: dict[str, Any] = Field(
-        default_factory=dict, description="Where and how the model fails, as numbers for pictures, by view."
+    views: Views = Field(
+        default_factory=Views, description="Where and how the model fails, as numbers for pictures, by view."
     )
+
+
+class StageResponse(ResponseModel):
+    """Of a criticism that is followed: the stage that begins."""
+
+    stage: str
 
 
 class ResidualColumns(ResponseModel):
@@ -101,7 +136,7 @@ class PictureResponse(ResponseModel):
     title: str
     how_to_read: str
     effects: list[str] = Field(description="Effects that would draw something there.")
-    figure: dict[str, Any] = Field(description="Plotly: data and layout.")
+    figure: dict[str, JsonValue] = Field(description="A figure as Plotly describes it: data and layout.")
 
 
 class PicturesResponse(ResponseModel):

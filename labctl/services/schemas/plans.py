@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field
 
 from instruments.toml_documents import shown
 from labctl.services.schemas.base import Request, ResponseModel
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import RecipeError
 from procedures.recipe.recipe import shipped_recipes
 
@@ -129,7 +130,7 @@ class CampaignPlanResponse(ResponseModel):
     recipe: str
     text: str = Field(description="The recipe as it was run, TOML; empty: by an older labctl.")
     bench: str
-    state: str
+    state: CampaignState
     schedule_hash: str
     steps: int
     datasets: int

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
 
-from pydantic import Field
+from pydantic import Field, JsonValue
 
 from instruments.bench_config import SERIAL
+from labctl.json_types.noise import AllanJson
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
+
+#: Columns of equal length; null: not known.
+Columns = dict[str, list[float | None] | list[int] | list[str] | list[bool]]
 
 
 class SimulatedRequest(Request):
@@ -69,6 +72,47 @@ class RecordingResponse(ResponseModel):
     simulated_time: bool = Field(default=False, description="`created_at` is of a simulated bench's clock.")
 
 
+class RecordingFacts(ResponseModel):
+    """What a recording is."""
+
+    id: int
+    serial: str
+    campaign: int | None
+    kind: str = Field(description="samples, points or coefficients.")
+    info: dict[str, JsonValue] = Field(description="Its `recording.toml`: unit, axes, bench, data sheet, notes.")
+    created_at: str
+    simulated_time: bool
+    datasets: int
+    readings: int
+
+
+class RecordingAlone(RecordingFacts):
+    """What a recording is, without the means of its data sets."""
+
+
+class RecordingWithPoints(RecordingFacts):
+    """What a recording is, with the means of its data sets."""
+
+    points: Columns = Field(description="Column -> one value per data set, or piece of a long one.")
+
+
+class SamplesResponse(ResponseModel):
+    """The readings of one data set."""
+
+    recording: int
+    dataset: int
+    readings: int
+    columns: Columns = Field(description="Column -> one value per reading, as many as were asked for.")
+
+
+class ExportedRecording(ResponseModel):
+    """A recording that was written to a folder."""
+
+    recording: int
+    folder: str
+    files: list[str]
+
+
 class ChannelColumns(ResponseModel):
     """A channel's figures by data set, in the channel's unit; null: none."""
 
@@ -120,6 +164,6 @@ class AllanResponse(ResponseModel):
     datasets: list[int] = Field(description="First and last data set of the stretch.")
     temperature_c: float | None
     duration_s: float | None
-    axes: dict[str, dict[str, Any]] = Field(
+    axes: dict[str, AllanJson] = Field(
         description="tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K."
     )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
+from labctl.json_types.findings import Severity
 from labctl.services.schemas.base import ResponseModel
 
 WARNINGS = "What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is."
@@ -15,7 +14,7 @@ class DataWarning(ResponseModel):
     """One thing that is wrong: what, where, its value, what was expected, and what to do."""
 
     what: str = Field(description="A word for programs: sign, unit, scale, axes, one_data_set, time_unit, worse ...")
-    severity: Literal["certain", "likely"] = Field(description="certain: a fit is refused; likely: it is only said.")
+    severity: Severity = Field(description="certain: a fit is refused; likely: it is only said.")
     where: str = Field(description="Axis, position, data sets or column.")
     said: str
     value: float | None

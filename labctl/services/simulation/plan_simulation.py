@@ -6,7 +6,6 @@ The instruments' bytes are left out, so a reading keeps the value that the unit 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +46,7 @@ class _Walk:
         self._t = 0.0
         self._power_on_s: float | None = None
         self._run, self._setpoint = 0, bench.chamber.safe_c
-        self._parts: list[dict[str, NDArray[Any]]] = []
+        self._parts: list[dict[str, NDArray[np.generic]]] = []
         self._environment: list[tuple[float, int, float, float, float]] = []
 
     def run(self) -> None:
@@ -99,7 +98,7 @@ class _Walk:
         times = first + np.arange(round(step.duration_s / self._period), dtype=np.float64) * self._period
         sample = self._unit.sample(times)
         n = len(times)
-        part: dict[str, NDArray[Any]] = {
+        part: dict[str, NDArray[np.generic]] = {
             "dataset": np.full(n, step.dataset, dtype=np.int64),
             "t_s": times,
             "position": np.full(n, step.position),
@@ -139,7 +138,7 @@ class _Walk:
         columns = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
         names = ("t_s", "run", "temperature_c", "chamber_c", "chamber_setpoint_c")
         rows = list(zip(*self._environment, strict=True))
-        environment: Mapping[str, NDArray[Any]] = {
+        environment: Mapping[str, NDArray[np.generic]] = {
             name: np.asarray(values) for name, values in zip(names, rows, strict=True)
         }
         return Recording(info, columns, environment)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 
 from labctl.store.connection.writer_lock import ServiceAddress
 
@@ -50,7 +51,7 @@ class Backend(Protocol):
         """Take note of what `before_commit` returned."""
         ...
 
-    def is_unreachable(self, error: sa.exc.DatabaseError) -> bool:
+    def is_unreachable(self, error: exc.DatabaseError) -> bool:
         """Return whether an error says that the database cannot be reached, and nothing of the statement."""
         ...
 

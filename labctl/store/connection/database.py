@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 from sqlalchemy.exc import DatabaseError
 
 from instruments.clock import Clock, WallClock
@@ -31,7 +32,7 @@ RETRY_S = 0.5
 class Writer(Protocol):
     """The process that writes, as another one reaches it."""
 
-    def run(self, name: str, args: Any, kwargs: Any) -> Any:
+    def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run the transaction of this name there; returns or raises what it did."""
         ...
 
@@ -148,8 +149,8 @@ class Database:
                     yield connection
                     commits = self._backend.before_commit(connection, synced=synced)
                     ended = True
-            except sa.exc.DatabaseError as error:
-                if isinstance(error, sa.exc.IntegrityError | sa.exc.ProgrammingError):
+            except exc.DatabaseError as error:
+                if isinstance(error, exc.IntegrityError | exc.ProgrammingError):
                     raise
                 self._backend.refuse_other()
                 if not (ended and self._backend.is_unreachable(error) and self.outlast(lambda: self._is_kept(number))):
@@ -164,7 +165,7 @@ class Database:
         except DatabaseError as error:
             raise self._trouble(error) from error
 
-    def _trouble(self, error: sa.exc.DatabaseError) -> StoreError:
+    def _trouble(self, error: exc.DatabaseError) -> StoreError:
         state = getattr(error.orig, "sqlstate", None)
         if getattr(error.orig, "sqlite_errorcode", None) == SQLITE_FULL or state == POSTGRESQL_DISK_FULL:
             cause = f"{self._shown}: the disk is full"
@@ -185,18 +186,18 @@ class Database:
         try:
             with self.outlast(self._connect_reader) as connection:
                 yield connection
-        except sa.exc.DatabaseError as error:
+        except exc.DatabaseError as error:
             raise self._unread(error) from error
 
     def _connect_reader(self) -> sa.Connection:
         try:
             return self._reader.connect()
-        except sa.exc.DatabaseError as error:
+        except exc.DatabaseError as error:
             raise self._unread(error) from error
-        except sa.exc.TimeoutError as error:
+        except exc.TimeoutError as error:
             raise StoreError(f"{self._shown}: as many connections as there may be are in use; try again") from error
 
-    def _unread(self, error: sa.exc.DatabaseError) -> StoreError:
+    def _unread(self, error: exc.DatabaseError) -> StoreError:
         text = f"{self._shown}: {error.orig}"
         return (DatabaseUnreachable if self._backend.is_unreachable(error) else StoreError)(text)
 

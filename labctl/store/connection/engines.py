@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import sqlalchemy as sa
+from sqlalchemy import event as sa_event
+from sqlalchemy import exc
 from sqlalchemy.pool import StaticPool
 
 from labctl.errors import BadInput
@@ -31,7 +33,7 @@ def sqlite_engine(location: str, *, write: bool) -> sa.Engine:
         **options,
     )
 
-    @sa.event.listens_for(engine, "connect")
+    @sa_event.listens_for(engine, "connect")
     def prepare(connection: Any, _: Any) -> None:
         connection.isolation_level = None  # transactions are begun below, never by the driver's guess
         for pragma in (
@@ -41,7 +43,7 @@ def sqlite_engine(location: str, *, write: bool) -> sa.Engine:
         ):
             connection.execute(f"PRAGMA {pragma}")
 
-    @sa.event.listens_for(engine, "begin")
+    @sa_event.listens_for(engine, "begin")
     def begin(connection: sa.Connection) -> None:
         connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN")
 
@@ -61,7 +63,7 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> 
     try:
         if sa.make_url(url).get_backend_name() == "postgresql":
             return sa.create_engine(url, pool_pre_ping=True, max_overflow=15, connect_args=arguments)
-    except (sa.exc.ArgumentError, ValueError):  # ValueError: a port that is no number
+    except (exc.ArgumentError, ValueError):  # ValueError: a port that is no number
         pass
     except ModuleNotFoundError as error:
         raise BadInput(

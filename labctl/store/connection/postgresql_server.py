@@ -10,6 +10,7 @@ PostgreSQL 15 documentation: 9.27.10 (advisory locks), 9.27.8 (pg_xact_status), 
 from __future__ import annotations
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 
 from labctl.store.connection.engines import server_engine
 from labctl.store.connection.writer_lock import ServiceAddress
@@ -71,11 +72,11 @@ class PostgresqlServer:
     def committed(self, commits: int) -> None:
         """Do nothing."""
 
-    def is_unreachable(self, error: sa.exc.DatabaseError) -> bool:
+    def is_unreachable(self, error: exc.DatabaseError) -> bool:
         """Return whether the connection is lost, or the server shuts down, starts, or is not there."""
         state = getattr(error.orig, "sqlstate", None)
         if state is None:  # said by the client library: refused, lost, timed out
-            return isinstance(error, sa.exc.OperationalError)
+            return isinstance(error, exc.OperationalError)
         return state in SERVER_AWAY or state.startswith(CONNECTION_CLASS)
 
     def was_committed(self, number: int) -> bool:

@@ -10,6 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import sqlalchemy as sa
+from sqlalchemy import event as sa_event
+from sqlalchemy import exc
 
 from labctl.errors import StoreError
 from labctl.store.connection.commit_seal import count_commit, missing, seal
@@ -67,7 +69,7 @@ class SqliteFile:
         self._make_private()
         self._identity = identity = FileIdentity(self._location)
         for event in ("connect", "close"):  # an interrupt inside a write opens the connection anew
-            sa.event.listen(engine, event, lambda *_: identity.forget_log())
+            sa_event.listen(engine, event, lambda *_: identity.forget_log())
 
     def _make_private(self) -> None:
         """Give the files of the database to their owner alone; SQLite makes its log as it finds the database."""
@@ -111,7 +113,7 @@ class SqliteFile:
         if commits:
             seal(self._location, commits)
 
-    def is_unreachable(self, error: sa.exc.DatabaseError) -> bool:  # noqa: ARG002
+    def is_unreachable(self, error: exc.DatabaseError) -> bool:  # noqa: ARG002
         """Return that every error is about the file itself."""
         return False
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+from typing import Concatenate, ParamSpec, Protocol, TypeVar, cast
 
 from labctl.store.connection.database import Database
 
@@ -40,8 +40,7 @@ def transaction(
         writer = self._database.writer
         if writer is None:
             return self._database.outlast(lambda: method(self, *args, **kwargs))
-        answer: ResultT = writer.run(name, args, kwargs)
-        return answer
+        return cast(ResultT, writer.run(name, args, kwargs))
 
     return run
 
@@ -61,7 +60,9 @@ def outlasting(
     return run
 
 
-def run_transaction(repositories: Mapping[str, object], name: str, args: Any, kwargs: Any) -> Any:
+def run_transaction(
+    repositories: Mapping[str, object], name: str, args: tuple[object, ...], kwargs: Mapping[str, object]
+) -> object:
     """Run a transaction that another process sent; `repositories` by the names of their classes.
 
     Raises KeyError for a name that is not of a transaction.

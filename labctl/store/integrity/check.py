@@ -6,11 +6,11 @@ import struct
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
+from sqlalchemy import exc
 
 from labctl.errors import BadCalibrationFile, StoreError
 from labctl.store import migrate, sample_codec
@@ -95,7 +95,7 @@ class _Check:
         self._progress(part, 0, 0)
         try:
             return check_part(connection)
-        except sa.exc.DatabaseError as error:
+        except exc.DatabaseError as error:
             self.find(part, f"cannot be read: {error.orig}")
         except (ValueError, TypeError) as error:  # the row is there, its content is of another kind
             self.find(part, f"cannot be read: {error}")
@@ -173,7 +173,7 @@ class _Check:
             self.find("readings", text)
         return valid
 
-    def _unpacked(self, place: str, block: sample_codec.Block) -> dict[str, NDArray[Any]] | None:
+    def _unpacked(self, place: str, block: sample_codec.Block) -> dict[str, NDArray[np.generic]] | None:
         try:
             columns = sample_codec.unpack(block)
         except StoreError as error:
@@ -222,5 +222,5 @@ def _of_whole_recordings(recording: sa.ColumnElement[int]) -> sa.ColumnElement[b
     return recording.not_in(sa.select(r.id).where(r.importing.is_not(None)))
 
 
-def _count(columns: dict[str, NDArray[Any]], n: int) -> int:
+def _count(columns: dict[str, NDArray[np.generic]], n: int) -> int:
     return int(np.count_nonzero(columns["valid"])) if "valid" in columns else n

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import cast
 
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
 from labctl.store.dataset_statistics import statistics
-from labctl.store.repositories.sample_blocks import join_blocks, scaled
+from labctl.store.repositories.sample_blocks import DataSetHead, join_blocks, scaled
 from labctl.store.schema import tables
 
 #: Sums differ in their last places by the order in which they are made; figures that were changed differ by more.
@@ -24,10 +24,10 @@ class MeansCheck:
         self._connection = connection
         self._kept: KeptMeans | None = None
         self._place = (0, 0)
-        self._parts: list[dict[str, NDArray[Any]]] = []
+        self._parts: list[dict[str, NDArray[np.generic]]] = []
         self._damaged = False
 
-    def take(self, recording: int, number: int, columns: dict[str, NDArray[Any]] | None) -> list[str]:
+    def take(self, recording: int, number: int, columns: dict[str, NDArray[np.generic]] | None) -> list[str]:
         """Take one block, None for a damaged one; returns what is wrong with the data set before, if that was its end.
 
         A data set with a damaged block has its own finding.
@@ -69,7 +69,7 @@ class KeptMeans:
             if mean is not None:
                 self._kept.setdefault(int(number), []).append((channel, mean, std, n))
 
-    def complaints(self, number: int, raw: Mapping[str, NDArray[Any]]) -> list[str]:
+    def complaints(self, number: int, raw: Mapping[str, NDArray[np.generic]]) -> list[str]:
         """Return what does not follow from the readings of a data set, one line a channel."""
         kept = self._kept.get(number)
         if not kept:
@@ -81,7 +81,7 @@ class KeptMeans:
         )
         if absent := sorted(sent - raw.keys()):
             return [f"its readings lack {', '.join(absent)}"]
-        columns = scaled(dict(raw), self._channels, self._heads[number]) if self._channels else raw
+        columns = scaled(dict(raw), self._channels, cast(DataSetHead, self._heads[number])) if self._channels else raw
         valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else slice(None)
         found = []
         for channel, mean, std, n in kept:

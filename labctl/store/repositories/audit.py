@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from labctl.acting_user import actor
+from labctl.json_types import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.records import AuditRow
@@ -43,7 +43,7 @@ def append(
     at: datetime,
     action: str,
     subject: str,
-    detail: Mapping[str, Any],
+    detail: JsonObject,
     *,
     who: str | None = None,
 ) -> None:
@@ -75,7 +75,7 @@ def _last_hash(connection: sa.Connection) -> str:
     return connection.scalar(sa.select(a.hash).order_by(a.id.desc()).limit(1)) or FIRST
 
 
-def _hash(previous: str, at: datetime, who: str, action: str, subject: str, detail: Mapping[str, Any]) -> str:
+def _hash(previous: str, at: datetime, who: str, action: str, subject: str, detail: JsonObject) -> str:
     body = json.dumps([previous, at.isoformat(), who, action, subject, detail], sort_keys=True, allow_nan=False)
     return hashlib.sha256(body.encode()).hexdigest()
 
@@ -138,9 +138,7 @@ class Audit:
         self._database = database
 
     @transaction
-    def record(
-        self, at: datetime, action: str, subject: str, detail: Mapping[str, Any], *, who: str | None = None
-    ) -> None:
+    def record(self, at: datetime, action: str, subject: str, detail: JsonObject, *, who: str | None = None) -> None:
         """Add a row for an act that changes nothing else in the database."""
         with self._database.writing() as connection:
             append(connection, at, action, subject, detail, who=who)

@@ -7,8 +7,11 @@ from datetime import datetime
 from typing import Any, Literal
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 
 from labctl.errors import Conflict, NotCertified, NotFound, VersionTaken
+from labctl.json_types.calibrations import JudgementDetail
+from labctl.json_types.models import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
@@ -29,7 +32,7 @@ def _in_force_query() -> sa.Select[bytes, str]:
     return _document_query().where(tables.calibrations.c.version == act)
 
 
-def _acts_query() -> sa.Select[Any]:
+def _acts_query() -> sa.Select[*tuple[Any, ...]]:
     """Return the query of a unit's acts of certifying and revoking, newest first."""
     x = tables.certifications.c
     columns = (x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at)
@@ -43,7 +46,7 @@ _ACTS = _acts_query()
 def _act(row: sa.Row[Any]) -> CertificationRow:
     known = None
     if row.override is not None:
-        detail = row.assessment or {}
+        detail: JudgementDetail = row.assessment or JudgementDetail()
         known = Judgement(row.verdict, row.verdict_recording, row.verdict_at, bool(row.override), detail)
     return CertificationRow(row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, known)
 
@@ -85,7 +88,7 @@ class NewCalibration:
     model: str
     document: bytes
     hash: str
-    answer: dict[str, Any]
+    answer: KeptAnswer
 
 
 class Calibrations:
@@ -118,7 +121,7 @@ class Calibrations:
                 detail = {"model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash}
                 act = "fit" if new.parent is None else "improve"
                 append(connection, at, act, f"{serial} version {version}", detail)
-        except sa.exc.IntegrityError as error:  # where several processes write: after the look, before the end
+        except exc.IntegrityError as error:  # where several processes write: after the look, before the end
             if self.next_version(serial) == version:
                 raise
             raise taken from error

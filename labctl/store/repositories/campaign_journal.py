@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import sqlalchemy as sa
@@ -22,23 +22,15 @@ from labctl.store.connection.transactions import outlasting
 from labctl.store.dataset_statistics import means_rows
 from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.sample_blocks import blocks_of, scaled, write_block
+from labctl.store.repositories.sample_blocks import DataSetHead, blocks_of, scaled, write_block
 from labctl.store.schema import tables
-from procedures.contracts.journal import (
-    NOT_SAFE,
-    CampaignState,
-    DataSetHeader,
-    DataSetState,
-    EnvironmentSample,
-    Event,
-)
+from procedures.contracts.campaign_state import ENDED, CampaignState
+from procedures.contracts.journal import NOT_SAFE, DataSetHeader, DataSetState, EnvironmentSample, Event
 from procedures.contracts.steps import StepResult
 from procedures.execution.signals import defer_signals
 
 #: Made once: a statement that is built anew for every second of a campaign costs more than writing it.
 _ADD_ENVIRONMENT = sa.insert(tables.environment)
-
-ENDED = frozenset({CampaignState.DONE, CampaignState.ABORTED, CampaignState.FAILED})
 
 
 class StoreJournal:
@@ -56,7 +48,7 @@ class StoreJournal:
         self._recordings = {gyro: recording for gyro, recording, _ in rows}
         self._channels = {gyro: channels for gyro, _, channels in rows}
         #: What the open data sets' blocks hold, so that closing one need not read it back.
-        self._open: dict[tuple[int, str], list[dict[str, NDArray[Any]]]] = {}
+        self._open: dict[tuple[int, str], list[dict[str, NDArray[np.generic]]]] = {}
 
     @contextmanager
     def _writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
@@ -66,7 +58,7 @@ class StoreJournal:
     @outlasting
     def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:
         """Record a change of state and why, as the campaign's state and as an event."""
-        values: dict[str, Any] = {"state": state.value, "reason": reason}
+        values: dict[str, Any] = {"state": state, "reason": reason}
         if state is CampaignState.RUNNING:
             values["started_at"] = sa.func.coalesce(
                 tables.campaigns.c.started_at, sa.bindparam("at", at, tables.Instant)
@@ -80,7 +72,7 @@ class StoreJournal:
                 sa.update(tables.campaigns).where(tables.campaigns.c.id == self._campaign).values(**values)
             )
             self._add_event(connection, Event("state", message, level), t_s, at)
-            change = {"state": state.value, "reason": reason}
+            change = {"state": state, "reason": reason}
             append(connection, at, "campaign state", f"campaign {self._campaign}", change)
 
     def step_started(self, index: int, t_s: float, at: datetime) -> None:
@@ -189,7 +181,7 @@ class StoreJournal:
 
     def _raw_of(
         self, connection: sa.Connection, gyro: str, recording: int, dataset: int
-    ) -> dict[str, NDArray[Any]] | None:
+    ) -> dict[str, NDArray[np.generic]] | None:
         """Return a data set's readings as the device sent them; None when there are none."""
         parts = self._open.get((dataset, gyro)) or blocks_of(connection, recording, dataset)
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else None
@@ -202,7 +194,7 @@ class StoreJournal:
         dataset: int,
         state: DataSetState,
         reason: str,
-        raw: dict[str, NDArray[Any]] | None,
+        raw: dict[str, NDArray[np.generic]] | None,
     ) -> None:
         d, b = tables.data_sets, tables.sample_blocks
         this = (d.c.recording_id == recording, d.c.number == dataset)
@@ -211,7 +203,9 @@ class StoreJournal:
             valid = raw["valid"] != 0
             n = int(valid.sum())
             head = connection.execute(sa.select(d).where(*this)).mappings().one()
-            means = means_rows(recording, dataset, scaled(raw, self._channels[gyro], dict(head)), valid)
+            means = means_rows(
+                recording, dataset, scaled(raw, self._channels[gyro], cast(DataSetHead, dict(head))), valid
+            )
             connection.execute(sa.insert(tables.data_set_means), means)
             connection.execute(sa.delete(b).where(b.c.recording_id == recording, b.c.number == dataset))
             write_block(connection, recording, dataset, 0, sample_codec.pack(raw, sample_codec.FINAL))
@@ -263,7 +257,7 @@ class StoreJournal:
         )
 
 
-def _columns(readings: Readings, chamber_c: float) -> dict[str, NDArray[Any]]:
+def _columns(readings: Readings, chamber_c: float) -> dict[str, NDArray[np.generic]]:
     return {
         "t_ns": np.rint(readings.t_s * 1e9).astype(np.int64),
         **readings.raw,

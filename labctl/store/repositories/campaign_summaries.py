@@ -9,6 +9,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from labctl.json_types.steps import StepJson
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 
@@ -22,7 +23,7 @@ class CurrentStep:
 
     number: int  #: from 0
     kind: str
-    body: Mapping[str, Any]
+    body: StepJson
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Literal
+from typing import Literal
 
 import sqlalchemy as sa
 
 from labctl.errors import NotFound
+from labctl.json_types import JsonObject
+from labctl.json_types.steps import StepJson
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
@@ -19,6 +21,7 @@ from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
 from labctl.store.repositories.recording_writer import new_recording
 from labctl.store.schema import tables
+from procedures.contracts.campaign_state import UNFINISHED, CampaignState
 
 #: Kind of the event that says who confirmed that the bench is clear.
 BENCH_CLEAR = "operator.bench_clear"
@@ -29,12 +32,12 @@ class NewCampaign:
     """What a campaign starts from."""
 
     recipe_name: str
-    recipe: Mapping[str, Any]
+    recipe: JsonObject
     bench_name: str
-    bench: Mapping[str, Any]
+    bench: JsonObject
     schedule_hash: str
     expected_s: float
-    steps: Sequence[Mapping[str, Any]]  #: JSON of every step, in order; `kind` and `expected_s` among the keys
+    steps: Sequence[StepJson]  #: JSON of every step, in order; `kind` and `expected_s` among the keys
     units: Sequence[NewUnit]
     boot_id: str | None = None  #: of the host that runs it
     bench_clear: str = ""  #: what a person has confirmed about the bench before the start, and who
@@ -86,7 +89,7 @@ class Campaigns:
             for unit in new.units:
                 info = RecordingInfo.model_validate(unit.info)
                 new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
-            what: dict[str, Any] = {
+            what: dict[str, object] = {
                 "recipe": new.recipe_name,
                 "bench": new.bench_name,
                 "units": [str(unit.info["serial"]) for unit in new.units],
@@ -94,7 +97,8 @@ class Campaigns:
             }
             if drivers := new.bench.get("drivers"):
                 what["drivers"] = drivers
-            if hidden := (new.bench.get("simulation") or {}).get("hidden"):
+            simulation = new.bench.get("simulation")
+            if isinstance(simulation, Mapping) and (hidden := simulation.get("hidden")):
                 what["hidden"] = hidden
             if new.bench_clear:
                 what["bench_clear"] = new.bench_clear
@@ -147,13 +151,13 @@ class Campaigns:
             recordings.setdefault(campaign, {})[serial] = recording
         return [CampaignRow(**row, recordings=recordings.get(row["id"], {})) for row in rows]
 
-    def state(self, campaign: int) -> str:
+    def state(self, campaign: int) -> CampaignState:
         """Return the state of one campaign; raises NotFound."""
         with self._database.reading() as connection:
             found = connection.scalar(sa.select(tables.campaigns.c.state).where(tables.campaigns.c.id == campaign))
         if found is None:
             raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows them")
-        return str(found)
+        return found
 
     def count_by_state(self) -> dict[str, int]:
         """Return how many campaigns there are in each state that has any."""
@@ -189,11 +193,15 @@ class Campaigns:
 
     def unfinished(self) -> list[CampaignRow]:
         """Return campaigns that a process left without an end."""
-        return self._rows(tables.campaigns.c.state.in_(("planned", "running", "paused", "waiting", "interrupted")))
+        return self._rows(tables.campaigns.c.state.in_(UNFINISHED))
 
     @transaction
     def close_unfinished(
-        self, campaign: int, reason: str, at: datetime, state: Literal["failed", "aborted"] = "failed"
+        self,
+        campaign: int,
+        reason: str,
+        at: datetime,
+        state: Literal[CampaignState.FAILED, CampaignState.ABORTED] = CampaignState.FAILED,
     ) -> None:
         """Mark a campaign that no process runs any more as over, with the reason."""
         with self._database.writing() as connection:

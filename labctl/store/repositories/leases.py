@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, fields
 from datetime import datetime
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
@@ -64,7 +65,7 @@ class Leases:
                     x.c.beat == replacing.beat,
                 )
                 return connection.execute(sa.update(x).where(*seen).values(**asdict(lease))).rowcount == 1
-        except sa.exc.IntegrityError:
+        except exc.IntegrityError:
             return False
 
     @transaction

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import sqlalchemy as sa
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labctl.store.schema import tables
 
 
-def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArray[Any]]:
+def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArray[np.generic]]:
     """Return the points of a recording's complete data sets, column by column, from rows alone."""
     d, m = tables.data_sets.c, tables.data_set_means.c
     heads = connection.execute(
@@ -23,9 +23,10 @@ def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArr
         .order_by(d.number)
     ).all()  # fmt: skip
     index = {row[0]: i for i, row in enumerate(heads)}
-    columns: dict[str, NDArray[Any]] = {"dataset": np.array([row[0] for row in heads], dtype=np.int64)}
+    columns: dict[str, NDArray[np.generic]] = {"dataset": np.array([row[0] for row in heads], dtype=np.int64)}
     begin, end = _floats(heads, 7), _floats(heads, 8)
-    columns["t_s"], columns["duration_s"] = (begin + end) / 2, end - begin
+    t_s = (begin + end) / 2
+    columns["t_s"], columns["duration_s"] = t_s, end - begin
     columns["position"] = np.array([row[1] for row in heads], dtype=np.str_)
     columns["run"] = np.array([row[2] for row in heads], dtype=np.int64)
     columns["mounting"] = np.array([row[3] for row in heads], dtype=np.int64)
@@ -33,7 +34,7 @@ def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArr
     known = {
         "table_angle_deg": _floats(heads, 5),
         "chamber_setpoint_c": _floats(heads, 6),
-        "power_s": columns["t_s"] - _floats(heads, 9),
+        "power_s": t_s - _floats(heads, 9),
     }
     columns |= {name: values for name, values in known.items() if np.isfinite(values).all()}
     columns["n"] = np.array([row[10] for row in heads], dtype=np.int64)
@@ -50,5 +51,5 @@ def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArr
     return {name: values for name, values in columns.items() if values.dtype.kind != "f" or np.isfinite(values).all()}
 
 
-def _floats(rows: Any, column: int) -> NDArray[np.float64]:
+def _floats(rows: Sequence[Sequence[object]], column: int) -> NDArray[np.float64]:
     return np.array([np.nan if row[column] is None else row[column] for row in rows], dtype=np.float64)

@@ -7,15 +7,17 @@ under the mark is seen by no reading method; what a killed process left is disca
 from __future__ import annotations
 
 import secrets
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
 import sqlalchemy as sa
+from sqlalchemy import exc
 
 from labctl.errors import Conflict
+from labctl.json_types import JsonObject
+from labctl.json_types.recordings import RawChannelJson
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
@@ -43,7 +45,7 @@ def new_recording(
     *,
     campaign: int | None = None,
     gyro: str | None = None,
-    channels: tuple[Mapping[str, Any], ...] = (),
+    channels: tuple[RawChannelJson, ...] = (),
 ) -> int:
     """Make the row of a recording, and of its unit where that is new; returns the recording's number."""
     remember_unit(connection, info.serial, info.model, info.technology, at)
@@ -83,7 +85,7 @@ class Imports:
                     connection.execute(sa.insert(tables.metadata.tables[name]), rows)
 
     @transaction
-    def finish(self, ticket: ImportTicket, at: datetime, action: str, detail: Mapping[str, Any]) -> int:
+    def finish(self, ticket: ImportTicket, at: datetime, action: str, detail: JsonObject) -> int:
         """Take the mark away and write the audit row; returns the recording's number. Raises Conflict as `add_part`."""
         r = tables.recordings
         with self._database.writing() as connection:
@@ -145,7 +147,7 @@ class Imports:
             r = tables.recordings
             serial = connection.scalar(sa.delete(r).where(r.c.id == number).returning(r.c.serial))
         # nothing but a recording brings a unit in; another import that begins now may need the row: then it stays
-        with suppress(sa.exc.IntegrityError), self._database.writing(synced=False) as connection:
+        with suppress(exc.IntegrityError), self._database.writing(synced=False) as connection:
             u = tables.units.c
             unused = ~sa.exists().where(r.c.serial == u.serial)
             connection.execute(sa.delete(tables.units).where(u.serial == serial, unused))

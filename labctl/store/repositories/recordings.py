@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from datetime import datetime
-from typing import Any
+from typing import cast
 
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
 from labctl.errors import LabctlError, NotFound
+from labctl.json_types import JsonObject
 from labctl.recording import Recording, RecordingInfo, refuse_too_many_data_sets
 from labctl.store.connection.database import Database
 from labctl.store.import_parts import WHOLE_TABLE, import_parts
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.repositories.points import points_columns
 from labctl.store.repositories.recording_writer import Imports
-from labctl.store.repositories.sample_blocks import blocks_of, channels_of, join_blocks, readings_in_units
+from labctl.store.repositories.sample_blocks import DataSetHead, blocks_of, channels_of, join_blocks, readings_in_units
 from labctl.store.schema import tables
 
 
@@ -30,7 +31,7 @@ class Recordings:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add_import(self, recording: Recording, at: datetime, simulated: Mapping[str, Any] | None = None) -> int:
+    def add_import(self, recording: Recording, at: datetime, simulated: JsonObject | None = None) -> int:
         """Take in a recording made elsewhere; returns its number. All of it is kept, or nothing. Raises BadRecording.
 
         It is no transaction, but a sequence of short ones; what takes time is done between them. `simulated` says,
@@ -144,7 +145,7 @@ class Recordings:
         with self._database.reading() as connection:
             return Recording(info, columns, _environment(connection, recording))
 
-    def iter_datasets(self, recording: int) -> Iterator[tuple[int, dict[str, NDArray[Any]]]]:
+    def iter_datasets(self, recording: int) -> Iterator[tuple[int, dict[str, NDArray[np.generic]]]]:
         """Yield (number, columns of readings) of each complete data set, in the order of measurement."""
         d = tables.data_sets.c
         with self._database.reading() as connection:
@@ -157,7 +158,7 @@ class Recordings:
             channels = channels_of(connection, recording)
         for head in rows:
             with self._database.reading() as connection:
-                columns = readings_in_units(connection, head, channels)
+                columns = readings_in_units(connection, cast(DataSetHead, dict(head)), channels)
             yield int(head["number"]), columns
 
     def data_sets(self, recording: int) -> list[DataSetRow]:
@@ -179,7 +180,7 @@ class Recordings:
         with self._database.reading() as connection:
             return [MeanRow(*row) for row in connection.execute(query.order_by(m.channel, m.number))]
 
-    def dataset(self, recording: int, number: int) -> dict[str, NDArray[Any]]:
+    def dataset(self, recording: int, number: int) -> dict[str, NDArray[np.generic]]:
         """Return the readings of one data set, column by column, in the interchange format's units."""
         with self._database.reading() as connection:
             chosen = sa.select(tables.data_sets).where(
@@ -188,7 +189,7 @@ class Recordings:
             head = connection.execute(chosen).mappings().first()
             if head is None:
                 raise NotFound(f"recording {recording} has no data set {number}")
-            return readings_in_units(connection, dict(head), channels_of(connection, recording))
+            return readings_in_units(connection, cast(DataSetHead, dict(head)), channels_of(connection, recording))
 
 
 def _whole(recording: int) -> sa.ColumnElement[bool]:
@@ -197,7 +198,7 @@ def _whole(recording: int) -> sa.ColumnElement[bool]:
     return sa.exists().where(r.id == recording, r.importing.is_(None))
 
 
-def _environment(connection: sa.Connection, recording: int) -> dict[str, NDArray[Any]] | None:
+def _environment(connection: sa.Connection, recording: int) -> dict[str, NDArray[np.generic]] | None:
     e = tables.environment.c
     names = ("t_s", "run", "temperature_c", "chamber_c", "chamber_setpoint_c")
     query = sa.select(*(e[name] for name in names)).where(e.recording_id == recording).order_by(e.id)

@@ -15,6 +15,7 @@ from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.sample_blocks import blocks_of
 from labctl.store.schema import tables
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import DataSetState
 from procedures.contracts.steps import StepResult
 
@@ -128,12 +129,19 @@ class ResumePoints:
         """
         self._close_open_data_sets(campaign)
         c, s = tables.campaigns, tables.steps
-        values: dict[str, Any] = {"state": "running", "reason": how.reason, "ended_at": None, "boot_id": how.boot_id}
+        values: dict[str, Any] = {
+            "state": CampaignState.RUNNING,
+            "reason": how.reason,
+            "ended_at": None,
+            "boot_id": how.boot_id,
+        }
         values["added_runs"] = how.added_runs
         if how.new_session:
             values["powered_on_s"] = how.t_s
         with self._database.writing() as connection:
-            taken = connection.execute(sa.update(c).where(c.c.id == campaign, c.c.state != "done").values(**values))
+            taken = connection.execute(
+                sa.update(c).where(c.c.id == campaign, c.c.state != CampaignState.DONE).values(**values)
+            )
             if taken.rowcount == 0:
                 raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
             mine = s.c.campaign_id == campaign

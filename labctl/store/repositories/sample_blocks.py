@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
+from typing_extensions import TypedDict
 
+from labctl.json_types.recordings import RawChannelJson
 from labctl.store import sample_codec
 from labctl.store.import_parts import block_row
 from labctl.store.schema import tables
@@ -30,40 +29,54 @@ def write_block(connection: sa.Connection, recording: int, number: int, seq: int
     connection.execute(_ADD_BLOCK, block_row(recording, number, seq, block))
 
 
-def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[Any]]]:
+class DataSetHead(TypedDict):
+    """The row of a data set, as far as its readings need it."""
+
+    recording_id: int
+    number: int
+    position: str
+    run: int
+    mounting: int
+    table_rate_dps: float
+    table_angle_deg: float
+    gate_from_s: float
+    power_on_s: float | None
+
+
+def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[np.generic]]]:
     """Return the unpacked blocks of a data set, in order."""
     found = connection.execute(_BLOCKS, {"recording": recording, "number": number})
     return [sample_codec.unpack(sample_codec.Block(*row)) for row in found]
 
 
-def join_blocks(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+def join_blocks(parts: list[dict[str, NDArray[np.generic]]]) -> dict[str, NDArray[np.generic]]:
     """Return blocks of the same columns as one."""
     if len(parts) == 1:
         return parts[0]
     return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else {})}
 
 
-def channels_of(connection: sa.Connection, recording: int) -> list[dict[str, Any]]:
+def channels_of(connection: sa.Connection, recording: int) -> list[RawChannelJson]:
     """Return name, unit, scale and offset of each raw channel; empty for a recording that was imported."""
     query = sa.select(tables.recordings.c.channels).where(tables.recordings.c.id == recording)
     return connection.scalar(query) or []
 
 
 def readings_in_units(
-    connection: sa.Connection, head: Mapping[str, Any], channels: list[dict[str, Any]]
-) -> dict[str, NDArray[Any]]:
+    connection: sa.Connection, head: DataSetHead, channels: list[RawChannelJson]
+) -> dict[str, NDArray[np.generic]]:
     """Return the readings of one data set: as they came in from elsewhere, or in their units from what was sent."""
     raw = join_blocks(blocks_of(connection, head["recording_id"], head["number"]))
     return scaled(raw, channels, head) if channels else raw
 
 
 def scaled(
-    raw: dict[str, NDArray[Any]], channels: list[dict[str, Any]], head: Mapping[str, Any]
-) -> dict[str, NDArray[Any]]:
+    raw: dict[str, NDArray[np.generic]], channels: list[RawChannelJson], head: DataSetHead
+) -> dict[str, NDArray[np.generic]]:
     """Return readings in their units from what the device sent, with the data set's own columns beside them."""
-    t_s = raw["t_ns"] / 1e9
+    t_s = np.asarray(raw["t_ns"], dtype=np.int64) / 1e9
     n = len(t_s)
-    columns: dict[str, NDArray[Any]] = {
+    columns: dict[str, NDArray[np.generic]] = {
         "dataset": np.full(n, head["number"], dtype=np.int64),
         "t_s": t_s,
         "position": np.full(n, head["position"]),
@@ -75,10 +88,14 @@ def scaled(
     if head["power_on_s"] is not None:
         columns["power_s"] = t_s - head["power_on_s"]
     for channel in channels:
-        columns[channel["name"]] = channel["offset"] + channel["scale"] * raw[channel["name"]]
-    per_axis = [columns[f"temperature_{a}_c"] for a in "xyz" if f"temperature_{a}_c" in columns]
+        columns[channel["name"]] = channel["offset"] + channel["scale"] * _floats(raw[channel["name"]])
+    per_axis = [_floats(columns[f"temperature_{a}_c"]) for a in "xyz" if f"temperature_{a}_c" in columns]
     if "temperature_c" not in columns and per_axis:
         columns["temperature_c"] = np.mean(per_axis, axis=0)
-    columns["chamber_c"] = raw["chamber_mc"] / 1e3
+    columns["chamber_c"] = _floats(raw["chamber_mc"]) / 1e3
     columns["valid"] = raw["valid"]
     return columns
+
+
+def _floats(values: NDArray[np.generic]) -> NDArray[np.float64]:
+    return np.asarray(values, dtype=np.float64)

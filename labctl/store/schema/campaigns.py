@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlalchemy as sa
 
-from labctl.store.schema.types import Instant, RowId, campaign_column, id_column, metadata
+from labctl.store.schema.types import Instant, RowId, StateOfCampaign, campaign_column, id_column, metadata
 
 campaigns = sa.Table(
     "campaigns",
@@ -16,7 +16,7 @@ campaigns = sa.Table(
     sa.Column("bench", sa.JSON, nullable=False),
     sa.Column("schedule_hash", sa.String(64), nullable=False),
     sa.Column("expected_s", sa.Float, nullable=False),
-    sa.Column("state", sa.String(20), nullable=False),
+    sa.Column("state", StateOfCampaign, nullable=False),
     sa.Column("reason", sa.Text, nullable=False, default=""),
     sa.Column("created_at", Instant, nullable=False),
     sa.Column("started_at", Instant),

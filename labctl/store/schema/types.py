@@ -6,10 +6,11 @@ Instants are aware UTC, kept as whole microseconds.
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
-from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Dialect
+
+from procedures.contracts.campaign_state import CampaignState
 
 metadata = sa.MetaData(
     naming_convention={
@@ -37,8 +38,21 @@ class Instant(sa.TypeDecorator[datetime]):
             raise ValueError(f"an instant needs a time zone: {value!r}")
         return (value - EPOCH) // timedelta(microseconds=1)
 
-    def process_result_value(self, value: Any, dialect: Dialect) -> datetime | None:  # noqa: ARG002
+    def process_result_value(self, value: int | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
         return None if value is None else EPOCH + timedelta(microseconds=int(value))
+
+
+class StateOfCampaign(sa.TypeDecorator[CampaignState]):
+    """The state of a campaign, kept as its word."""
+
+    impl = sa.String(20)
+    cache_ok = True
+
+    def process_bind_param(self, value: CampaignState | None, dialect: Dialect) -> str | None:  # noqa: ARG002
+        return None if value is None else CampaignState(value).value
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> CampaignState | None:  # noqa: ARG002
+        return None if value is None else CampaignState(value)
 
 
 #: Whole numbers that count rows; SQLite numbers rows by itself only in a column of type INTEGER.

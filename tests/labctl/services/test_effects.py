@@ -6,7 +6,7 @@ from labctl.services.effects import catalogue
 
 
 def test_every_effect_tells_the_unit_of_its_sizes_and_whether_it_leaves() -> None:
-    effects = {each["id"]: each for each in catalogue()["effects"]}
+    effects = {each["id"]: each for each in catalogue().effects}
     assert all(each["unit"] for each in effects.values())
     told = ["bias", "scale_factor", "bias_temperature", "run_shift", "thermometer_error"]
     assert [effects[name]["unit"] for name in told] == ["deg/s", "1", "deg/s/K", "deg/s", "K"]

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from instruments.errors import LinkError, NoReply
-from procedures.contracts.journal import CampaignState
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.operator import HumanOperator
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from procedures.contracts.journal import CampaignState
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.operator import HumanOperator
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import make_plan

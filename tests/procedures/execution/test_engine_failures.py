@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from instruments.errors import MalformedReply, NoReply, RequestRejected
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import BadData
-from procedures.contracts.journal import CampaignState
 from procedures.contracts.operator import Answer, HumanOperator
 
 STEP_KINDS = ["home", "move_chamber", "mount", "power_on", "soak", "acquire", "power_off", "safe_state"]

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from instruments.errors import NoReply, RequestRejected
+from procedures.contracts.campaign_state import NEXT, CampaignState
 from procedures.contracts.control import Control
-from procedures.contracts.journal import NEXT, CampaignState
 from procedures.execution.resume import Restart
 from tests.helpers.engine_rig import Rig
 from tests.helpers.recording_journal import RecordingJournal

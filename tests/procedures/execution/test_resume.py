@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from instruments.errors import NoReply
-from procedures.contracts.journal import CampaignState
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.operator import HumanOperator
 from procedures.execution.resume import Restart, soak_matters_after_s
 from procedures.recipe.rules import ResumeRules

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from procedures.contracts.journal import CampaignState
+from procedures.contracts.campaign_state import CampaignState
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.guards import CHECKS, Guards
 from procedures.planning.limits import BenchLimits

@@ -12,8 +12,8 @@ from instruments.bench_config import read_bench
 from instruments.clock import VirtualClock
 from instruments.errors import LinkError, NoReply
 from instruments.interfaces.table import Spin
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import TableStopped
-from procedures.contracts.journal import CampaignState
 from procedures.monitoring.table_watch import ASK_EVERY_S, TableWatch
 from tests.helpers.engine_rig import Rig
 from tests.helpers.fake_instruments import FakeTable

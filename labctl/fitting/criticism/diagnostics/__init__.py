@@ -7,7 +7,6 @@ there, as the effects themselves say.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from labctl.fitting.criticism.diagnostics.angle_spectra import angle_lines, frequency_lines, start_profile
 from labctl.fitting.criticism.diagnostics.axis import AxisView, axis_view
@@ -19,6 +18,7 @@ from labctl.fitting.criticism.diagnostics.within_dataset import within_of
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.effects import Effect
+from labctl.json_types.views import AngleSpectrum, FrequencySpectrum, StartProfile, Views
 from labctl.recording import Recording
 
 #: What there is to see beside the residual against each channel, which goes by the channel's name.
@@ -29,35 +29,41 @@ __all__ = ["VIEWS", "draws_of", "residual_maps", "views_of"]
 
 def views_of(
     comparison: Comparison, left: Mapping[str, Residuals], recording: Recording, catalogue: Mapping[str, Effect]
-) -> dict[str, Any]:
+) -> Views:
     """Return all views of a criticism: lists of records, one or more for each axis, of plain numbers without NaN."""
     axes = [axis_view(comparison, axis, residuals) for axis, residuals in left.items()]
     channels = [line for view in axes for line in channel_lines(view)]
-    found: dict[str, Any] = {
+    angle, frequency, start = _within(axes, recording)
+    return {
         "sets": data_sets(comparison.data, axes),
         "channels": channels,
         "time": [time_line(view) for view in axes],
         "frequency": [line for view in axes if (line := between_sets(view)) is not None],
         "legs": [line for view in axes for line in hysteresis_lines(view)],
-        "previous_rate": [line for view in axes if (line := previous_rate(view)) is not None],
-        "repeats": [line for view in axes if (line := repeats(view)) is not None],
-        **_within(axes, recording),
+        "previous_rate": [found for view in axes if (found := previous_rate(view)) is not None],
+        "repeats": [again for view in axes if (again := repeats(view)) is not None],
+        "angle": angle,
+        "frequency_within": frequency,
+        "time_in_set": start,
+        "draws": draws_of(catalogue, {line["channel"] for line in channels}),
     }
-    found["draws"] = draws_of(catalogue, {line["channel"] for line in channels})
-    return found
 
 
-def _within(axes: list[AxisView], recording: Recording) -> dict[str, Any]:
-    found: dict[str, Any] = {"angle": [], "frequency_within": [], "time_in_set": []}
+def _within(
+    axes: list[AxisView], recording: Recording
+) -> tuple[list[AngleSpectrum], list[FrequencySpectrum], list[StartProfile]]:
+    """Return what happens inside data sets: waves in the angle, waves in time, and the course from the beginning."""
+    angle: list[AngleSpectrum] = []
+    frequency: list[FrequencySpectrum] = []
+    start: list[StartProfile] = []
     readings = within_of(recording)
-    if readings is None:
-        return found
-    for view in axes:
-        residual = readings.axis(view.axis)
-        found["angle"] += angle_lines(readings, residual, view.axis)
-        found["frequency_within"] += frequency_lines(readings, residual, view.axis)
-        found["time_in_set"] += start_profile(readings, residual, view.axis)
-    return found
+    if readings is not None:
+        for view in axes:
+            residual = readings.axis(view.axis)
+            angle += angle_lines(readings, residual, view.axis)
+            frequency += frequency_lines(readings, residual, view.axis)
+            start += start_profile(readings, residual, view.axis)
+    return angle, frequency, start
 
 
 def draws_of(catalogue: Mapping[str, Effect], channels: set[str]) -> dict[str, list[str]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
@@ -13,6 +11,7 @@ from labctl.fitting.criticism.diagnostics.within_dataset import LEAST_READINGS, 
 from labctl.fitting.criticism.reduction import STEP_LINES
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
+from labctl.json_types.views import AngleLine, AngleSpectrum, FrequencySpectrum, StartProfile
 
 #: Waves in the angle are computed over data sets of at least this many turns ...
 TURNS = 2.0
@@ -27,7 +26,7 @@ PROFILE_POINTS = 40
 ALARM = 0.05
 
 
-def angle_lines(within: Within, residual: Residual, axis: str) -> list[dict[str, Any]]:
+def angle_lines(within: Within, residual: Residual, axis: str) -> list[AngleSpectrum]:
     """Return the mean power of waves in the table angle over white noise, by cycles per turn."""
     if within.angle is None:
         return []
@@ -71,9 +70,9 @@ def angle_lines(within: Within, residual: Residual, axis: str) -> list[dict[str,
     ]
 
 
-def _stepper(within: Within, residual: Residual, count: NDArray[np.int64]) -> list[dict[str, Any]]:
+def _stepper(within: Within, residual: Residual, count: NDArray[np.int64]) -> list[AngleLine]:
     """Return the amplitude of the lines that were taken out, RMS over the data sets that show them."""
-    found = []
+    found: list[AngleLine] = []
     for k, cycles in enumerate(STEP_LINES):
         pair = residual.lines[2 * k : 2 * k + 2]
         shown = np.any(within.basis[1 + 2 * k : 3 + 2 * k], axis=(0, 2))
@@ -89,7 +88,7 @@ def _hann(count: NDArray[np.int64], n: int) -> NDArray[np.float64]:
     return np.where(offset < count[:, None], waves, 0.0)
 
 
-def frequency_lines(within: Within, residual: Residual, axis: str) -> list[dict[str, Any]]:
+def frequency_lines(within: Within, residual: Residual, axis: str) -> list[FrequencySpectrum]:
     """Return the mean power of waves in time within data sets over white noise, by frequency."""
     count = within.there.sum(axis=1).astype(np.int64)
     usual = int(np.median(count))
@@ -116,7 +115,7 @@ def frequency_lines(within: Within, residual: Residual, axis: str) -> list[dict[
     ]
 
 
-def start_profile(within: Within, residual: Residual, axis: str) -> list[dict[str, Any]]:
+def start_profile(within: Within, residual: Residual, axis: str) -> list[StartProfile]:
     """Return the mean course within data sets: plain, and by the step in rate that came before, per deg/s of it."""
     values = (residual.dps + residual.slope[:, None] * within.basis[-1]) * residual.there
     usual = int(np.median(within.there.sum(axis=1)))
@@ -130,7 +129,7 @@ def start_profile(within: Within, residual: Residual, axis: str) -> list[dict[st
     time = np.add.reduceat((seconds * there).sum(axis=0), edges) / np.maximum(
         np.add.reduceat(there.sum(axis=0), edges), 1.0
     )
-    found: dict[str, Any] = {
+    found: StartProfile = {
         "axis": axis,
         "datasets": len(step),
         "since_s": plain_list(time),

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows, widest
+from labctl.json_types.criticism import ResidualMap
 
 
-def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[dict[str, Any]]:
+def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[ResidualMap]:
     """Return residual over floor in rate x temperature, one map per axis and position: lists of equal length.
 
     `rate_level_dps` and `temperature_level_c` are the centre of the cell that a data set is drawn in, the same in all
@@ -22,7 +22,7 @@ def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list
     position = np.asarray(data.nodes["position"]).reshape(len(data), -1)[:, 0].astype(np.str_)
     column = rate_levels(rate)
     rate_level = level_centres(rate, column)
-    found = []
+    found: list[ResidualMap] = []
     for axis, residuals in left.items():
         warm = data.at_sets(data.nodes.temperature_c(axis))
         row = temperature_rows(warm, position, column)

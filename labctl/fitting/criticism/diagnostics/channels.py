@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from labctl.fitting.criticism.diagnostics.thinning import drawn_rows
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
+from labctl.json_types.views import ChannelLine, DataSetColumns, MeanLine, PreviousRateLine, TimeLine
 
 #: Points of a running mean, and how many levels of a channel are still shown one by one.
 POINTS = 24
@@ -27,7 +27,7 @@ LEVEL_GAPS = (1e-6, 1e-4, 1e-3, 1e-2)
 LEAST_FOR_RUNS = 12
 
 
-def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> dict[str, Any]:
+def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> DataSetColumns:
     """Return the data sets one by one as columns of equal length: what was logged, and each axis' residual.
 
     `of` says how many the recording has; the columns have as many, or `MOST_DRAWN` of them (`drawn_rows`). Where no
@@ -59,21 +59,29 @@ def time_axis(view: AxisView) -> tuple[str, Array]:
     return ("t_s", view.t_s) if view.timed else ("order", np.arange(1.0, len(view) + 1))
 
 
-def channel_lines(view: AxisView) -> Iterator[dict[str, Any]]:
+def channel_lines(view: AxisView) -> Iterator[ChannelLine]:
     """Yield a running mean against each channel that varies; against the table's rate one for each position."""
     everywhere = np.ones(len(view), dtype=bool)
     for name in smooth_channels(view.data, view.axis):
         if name not in {"t_s", "table_rate_dps"}:
-            yield {"axis": view.axis, "channel": name, **running_mean(view, view.channel(name), everywhere)}
+            yield _channel_line(view, name, running_mean(view, view.channel(name), everywhere))
     position, rate = view.position(), view.channel("table_rate_dps")
     for there in np.unique(position):
         here = position == there
         if np.ptp(rate[here]) > 0:
-            line = running_mean(view, rate, here)
-            yield {"axis": view.axis, "channel": "table_rate_dps", "position": str(there), **line}
+            line = _channel_line(view, "table_rate_dps", running_mean(view, rate, here))
+            line["position"] = str(there)
+            yield line
 
 
-def running_mean(view: AxisView, values: Array, here: NDArray[np.bool_]) -> dict[str, Any]:
+def _channel_line(view: AxisView, channel: str, mean: MeanLine) -> ChannelLine:
+    return {
+        "axis": view.axis, "channel": channel, "at": mean["at"], "mean_dps": mean["mean_dps"],
+        "low_dps": mean["low_dps"], "high_dps": mean["high_dps"], "z": mean["z"],
+    }  # fmt: skip
+
+
+def running_mean(view: AxisView, values: Array, here: NDArray[np.bool_]) -> MeanLine:
     """Return the mean residual along a channel (m,), where `here`, with a band that knows of the drift.
 
     A channel of few levels has a point for each; another a running mean.
@@ -110,7 +118,7 @@ def groups_of(values: Array) -> list[NDArray[np.int64]]:
     return [order[begin : begin + width] for begin in begins]
 
 
-def previous_rate(view: AxisView) -> dict[str, Any] | None:
+def previous_rate(view: AxisView) -> PreviousRateLine | None:
     """Return the residual against the rate before; None where it is not known."""
     if "previous_rate_dps" not in view.data.nodes:
         return None
@@ -120,25 +128,32 @@ def previous_rate(view: AxisView) -> dict[str, Any] | None:
     return {"axis": view.axis, **running_mean(view, values, np.ones(len(view), dtype=bool))}
 
 
-def time_line(view: AxisView) -> dict[str, Any]:
+def time_line(view: AxisView) -> TimeLine:
     """Return the residual against time, where power came, and whether neighbours hang together.
 
     Where no time is known it is against the order of the data sets: `order` and `power_on_order` stand for `t_s` and
     `power_on_t_s`.
     """
     begins = np.flatnonzero(np.concatenate([[True], view.run[1:] != view.run[:-1]]))
-    name, along = time_axis(view)
+    _, along = time_axis(view)
     line = running_mean(view, along, np.ones(len(view), dtype=bool))
     z, p = runs_test(view.whitened)
-    return {
+    found: TimeLine = {
         "axis": view.axis,
-        **{(name if key == "at" else key): values for key, values in line.items()},
-        f"power_on_{name}": plain_list(along[begins]),
+        "mean_dps": line["mean_dps"],
+        "low_dps": line["low_dps"],
+        "high_dps": line["high_dps"],
+        "z": line["z"],
         "lag1": plain(_lag1(view.residual_dps, view.run)),
         "lag1_whitened": plain(_lag1(view.whitened, view.run)),
         "runs_z": plain(z),
         "runs_p": plain(p),
     }
+    if view.timed:
+        found["t_s"], found["power_on_t_s"] = line["at"], plain_list(along[begins])
+    else:
+        found["order"], found["power_on_order"] = line["at"], plain_list(along[begins])
+    return found
 
 
 def runs_test(values: Array) -> tuple[float, float]:

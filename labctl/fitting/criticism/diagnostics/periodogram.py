@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.diagnostics.axis import AxisView
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain_list
+from labctl.json_types.views import BetweenSets
 
 POINTS = 150
 LEAST_SETS = 16
 
 
-def between_sets(view: AxisView) -> dict[str, Any] | None:
+def between_sets(view: AxisView) -> BetweenSets | None:
     """Return the amplitude of waves in the mean residuals, and what noise alone gives on average, both in deg/s.
 
     None without times, or for few data sets.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from labctl.fitting.criticism.diagnostics.channels import groups_of
 from labctl.fitting.data.noise_floor import REPEAT_RATE, REPEAT_TEMPERATURE_C
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
+from labctl.json_types.views import LegLine, Repeats
 
 #: A temperature that went back by this much has turned.
 TURN_K = 2.0
@@ -38,7 +38,7 @@ def hysteresis_states(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[n
     return side
 
 
-def hysteresis_lines(view: AxisView) -> Iterator[dict[str, Any]]:
+def hysteresis_lines(view: AxisView) -> Iterator[LegLine]:
     """Yield the residual reached from below minus that from above at equal rate and temperature, deg/s, by channel."""
     warm, rate = view.temperature_c(), view.channel("table_rate_dps")
     side = hysteresis_states(warm, view.run)
@@ -81,7 +81,7 @@ def _matched(
     return np.array(ups, dtype=np.int64), np.array(downs, dtype=np.int64)
 
 
-def repeats(view: AxisView) -> dict[str, Any] | None:
+def repeats(view: AxisView) -> Repeats | None:
     """Return how far data sets at one rate, temperature and position scatter; None without any.
 
     The floor is what noise gives two data sets that far apart in time: drift moves neighbours alike. `apart_s` is
@@ -106,8 +106,7 @@ def repeats(view: AxisView) -> dict[str, Any] | None:
     scatter = float(np.sqrt(np.mean(difference**2) / 2))
     everything = np.arange(len(first))
     shown = everything if len(first) <= MOST_PAIRS else np.sort(np.argsort(difference)[_evenly(len(first), MOST_PAIRS)])
-    apart = {"apart_s": plain_list(np.abs(view.t_s[second] - view.t_s[first])[shown])} if view.timed else {}
-    return {
+    found: Repeats = {
         "axis": view.axis,
         "pairs": len(first),
         "scatter_dps": plain(scatter),
@@ -115,9 +114,11 @@ def repeats(view: AxisView) -> dict[str, Any] | None:
         "over_floor": plain(scatter / floor) if floor > 0 else None,
         "datasets": [[int(a), int(b)] for a, b in view.data.dataset[np.stack([first, second], axis=1)[shown]]],
         "apart_sets": np.abs(second - first)[shown].tolist(),
-        **apart,
         "difference_dps": plain_list(difference[shown]),
     }
+    if view.timed:
+        found["apart_s"] = plain_list(np.abs(view.t_s[second] - view.t_s[first])[shown])
+    return found
 
 
 def _evenly(n: int, most: int) -> NDArray[np.int64]:

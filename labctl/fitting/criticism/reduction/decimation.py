@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +14,7 @@ FASTEST_HZ = 10.0
 
 def decimated_columns(
     recording: Recording,
-) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int64], dict[str, NDArray[Any]]]:
+) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int64], dict[str, NDArray[np.generic]]]:
     """Return valid readings averaged down to `FASTEST_HZ`: numbers by column (output in deg/s), data sets, texts."""
     columns = recording.columns
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)

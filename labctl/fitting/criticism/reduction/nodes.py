@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ NODES = 12
 
 
 def nodes_of(
-    recording: Recording, numbers: Mapping[str, Array], texts: Mapping[str, NDArray[Any]], padded: Padded,
+    recording: Recording, numbers: Mapping[str, Array], texts: Mapping[str, NDArray[np.generic]], padded: Padded,
     there: NDArray[np.float64], since: NDArray[np.float64], basis: NDArray[np.float64],
 ) -> tuple[Channels, NDArray[np.float64]]:  # fmt: skip
     """Return the channels at the nodes, (m * B,), and the weights (R, m, B) that bring them to coordinates."""

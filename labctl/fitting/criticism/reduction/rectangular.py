@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +36,7 @@ def pad(dataset: NDArray[np.int64]) -> Padded:
     return Padded(there.astype(np.float64), np.where(there, starts[:, None] + offset, 0))
 
 
-def piece_labels(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
+def piece_labels(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.int64]:
     """Return labels (n,) that change with the row of the fit, and within one that is far longer than the median.
 
     A static record at one temperature is one row of the fit. In a rectangular array it would need memory, and its

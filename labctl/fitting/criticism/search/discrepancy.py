@@ -62,7 +62,7 @@ def _of_signal(
     if kind is not None and term is not None:
         rows += _moved(comparison, axis, kind, term, values)
     whole = np.concatenate(rows, axis=2) if rows else np.zeros((*signal.shape, 0))
-    return Discrepancy(whole, np.ones(whole.shape[2]))
+    return Discrepancy(whole, np.ones(whole.shape[-1]))
 
 
 def drivers(kind: Effect | None, channels: frozenset[str]) -> list[str]:

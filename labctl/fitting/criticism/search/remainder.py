@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc
@@ -16,6 +15,7 @@ from labctl.fitting.criticism.model_comparison import Comparison, compare_models
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.verdict import ENOUGH_NEXT, LEAD, channels_behind
 from labctl.fitting.effects import Effect, Term
+from labctl.json_types.criticism import Remainder
 
 #: Excess chi2 over its own scatter from which on something is said to remain.
 SIGNIFICANT = 5.0
@@ -25,7 +25,7 @@ SURELY_NOISE = 0.995
 
 def remainder_of(
     first: Comparison, final: Comparison, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]
-) -> dict[str, Any] | None:
+) -> Remainder | None:
     """Return what effects leave in the shapes that they have, at the noise beside them; None where it is noise.
 
     `share` is of the excess chi2 before, `over_floor` the means' RMS over their noise, and `depends_on` the channels

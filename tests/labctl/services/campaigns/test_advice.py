@@ -22,6 +22,7 @@ from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import limits_of, load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import BadData, SoakFailed, Unanswered
 from procedures.contracts.journal import NOT_SAFE
 from procedures.contracts.operator import HumanOperator
@@ -32,7 +33,7 @@ from tests.helpers.waiting import wait_until
 
 
 def happened(reason: str) -> str:
-    answer = advice_of("failed", reason)
+    answer = advice_of(CampaignState.FAILED, reason)
     assert answer is not None
     return answer.happened
 
@@ -77,7 +78,7 @@ def test_every_sentence_is_short_and_says_what_to_do() -> None:
 
 def test_what_labctl_did_depends_on_the_safe_state() -> None:
     safe, unsafe, left = (
-        advice_of("failed", reason)
+        advice_of(CampaignState.FAILED, reason)
         for reason in ("x", f"x. {NOT_SAFE}table to rest: it still moves", "not taken up: chamber: no answer")
     )
     assert safe is not None
@@ -85,7 +86,7 @@ def test_what_labctl_did_depends_on_the_safe_state() -> None:
     assert left is not None
     assert (safe.done, unsafe.done, left.done) == (DID_SAFE, DID_UNSAFE, DID_NOTHING)
     assert unsafe.next == LOOK
-    assert advice_of("done", "all steps done") is advice_of("aborted", "enough") is None
+    assert advice_of(CampaignState.DONE, "all steps done") is advice_of(CampaignState.ABORTED, "enough") is None
 
 
 @pytest.fixture

@@ -33,8 +33,9 @@ from labctl.services.recordings.loading import newest_row
 from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
+from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.control import Control
-from procedures.contracts.journal import NOT_SAFE, CampaignState, Event
+from procedures.contracts.journal import NOT_SAFE, Event
 from procedures.execution.signals import defer_signals
 from tests.helpers.commands import local_executor
 

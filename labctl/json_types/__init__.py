@@ -1,0 +1,18 @@
+"""JSON documents as types: what fits and criticisms say, declared once for those who make, send, draw and print it.
+
+A key that is `NotRequired` is left out, not null, where it says nothing. All numbers are finite; null: unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pydantic import JsonValue
+
+#: A document whose form is known to those who wrote it; who reads it checks it against a model.
+JsonObject = Mapping[str, object]
+
+#: The same, whose values were read from JSON.
+JsonDocument = Mapping[str, JsonValue]
+
+__all__ = ["JsonDocument", "JsonObject"]

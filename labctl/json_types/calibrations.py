@@ -1,0 +1,94 @@
+"""The calibration file, and what was known of a version when it was certified."""
+
+from __future__ import annotations
+
+from typing import NotRequired
+
+from typing_extensions import TypedDict
+
+from labctl.json_types.models import (
+    AxisNoiseJson,
+    Coefficients,
+    ErrorFiguresJson,
+    FitEnvironment,
+    FittedModelJson,
+    LeftOut,
+    ValidityJson,
+)
+
+
+class UnitJson(TypedDict):
+    """What a unit is."""
+
+    model: str
+    technology: str | None
+
+
+class SoftwareJson(TypedDict):
+    """What made a file."""
+
+    name: str
+    version: str
+
+
+class OutputUnitJson(TypedDict):
+    """How an axis's output becomes a rate in deg/s: (output - offset) / scale."""
+
+    scale: float
+    offset: float
+    unit: str
+
+
+class AxisEvidenceJson(TypedDict):
+    """What the uncertainty of one axis in use is computed from; the variances in (deg/s)^2."""
+
+    rate_dps: list[float]
+    temperature_c: list[float]
+    left_var: list[float | None]
+    white_var: list[float]
+    repeatability_dps: float | None
+    repeatability_freedom: int | None
+    repeatability_source: str
+
+
+class CalibrationJson(TypedDict):
+    """A calibration file. A file of another program is none until its hash and its parts were checked."""
+
+    schema: str
+    serial: str
+    version: int
+    parent: int | None
+    issued_at: str
+    unit: UnitJson
+    software: SoftwareJson
+    axes: list[str]
+    output: dict[str, OutputUnitJson]
+    model: FittedModelJson
+    coefficients: dict[str, Coefficients]
+    papers: dict[str, object]
+    left_out: list[LeftOut]
+    error: ErrorFiguresJson
+    noise: dict[str, AxisNoiseJson]
+    environment: FitEnvironment
+    validity: ValidityJson
+    use: NotRequired[dict[str, AxisEvidenceJson]]
+    provenance: dict[str, object]
+    how_to_use: str
+    hash: str
+
+
+class ObjectionJson(TypedDict):
+    """One thing that speaks against certifying a version."""
+
+    what: str
+    text: str
+    do: str
+
+
+class JudgementDetail(TypedDict, total=False):
+    """Beside a verdict: why there is none, its text, the version's errors, and what was overridden."""
+
+    verdict_reason: str
+    verdict_text: str
+    error: dict[str, float | None]
+    objections: list[ObjectionJson]

@@ -1,0 +1,119 @@
+"""Parts of a criticism: errors, noise, suspects, experiments, and where the model fails."""
+
+from __future__ import annotations
+
+from typing import Literal, NotRequired
+
+from pydantic import JsonValue
+from typing_extensions import TypedDict
+
+from labctl.json_types.models import Coefficient, Origin
+from labctl.json_types.noise import StaticRecordJson
+
+
+class CriticisedErrors(TypedDict):
+    """RMS errors of the model refitted, deg/s; `explained`: share of the raw excess chi2 that the model explains."""
+
+    rms_dps: float | None
+    heldout_rms_dps: float | None
+    noise_floor_dps: float | None
+    noise_floor_source: str
+    explained: float | None
+    direct_form_rms_dps: float | None
+
+
+class CriticisedNoise(TypedDict):
+    """Noise of the recording; `vs_datasheet`: the drift over what the data sheet lets expect."""
+
+    white_dps: float | None
+    drift_dps: float | None
+    drift_tau_s: float | None
+    vs_datasheet: float | None
+    static: StaticRecordJson | None
+
+
+class LackOfFit(TypedDict):
+    """Chi2 of the whitened residual over its degrees of freedom, and its p-value."""
+
+    statistic: float | None
+    p_value: float | None
+
+
+#: A range of a channel in which the mean residual is far from 0.
+FailingRange = TypedDict(
+    "FailingRange", {"axis": str, "channel": str, "from": float, "to": float, "rms_dps": float, "z": float}
+)
+
+
+class Suspect(TypedDict):
+    """An effect that may be missing: the evidence, its size, and the error with it."""
+
+    effect: str
+    probability: float
+    p_value: float
+    log_bayes_factor: float
+    share_removed: float
+    coefficients: dict[str, dict[str, Coefficient]]
+    coefficients_from: Literal["fit", "comparison"]
+    parameters: dict[str, float]
+    physical: bool
+    plausible: list[float] | None
+    rms_after_dps: float | None
+    heldout_rms_after_dps: float | None
+    alias_group: list[str]
+    origin: Origin
+    explanation: str
+    experiment: str
+
+
+class NotTestable(TypedDict):
+    """An effect that the recording cannot show, because a channel is missing or the schedule hides it."""
+
+    effect: str
+    why: Literal["channel", "schedule"]
+    needs: list[str]
+    visible: NotRequired[float]
+
+
+class Experiment(TypedDict):
+    """A changed recipe that would separate effects which the recording cannot."""
+
+    separates: list[str]
+    do: str
+    recipe: dict[str, JsonValue]
+    toml: str
+    power: float
+    hours: float
+    per_hour: float
+
+
+class Remainder(TypedDict):
+    """What remains beside all that was named: its share of the excess chi2, and what it follows."""
+
+    share: float
+    over_floor: float
+    depends_on: list[str]
+
+
+class WorstDataSet(TypedDict):
+    """A data set far from the model."""
+
+    axis: str
+    dataset: int
+    residual_dps: float
+    over_floor: float
+
+
+class ResidualMap(TypedDict):
+    """Residual over floor in rate x temperature, one axis in one position: lists of equal length."""
+
+    axis: str
+    position: str
+    dataset: list[int]
+    table_rate_dps: list[float]
+    temperature_c: list[float]
+    rate_level_dps: list[float]
+    temperature_level_c: list[float]
+    level_width_c: float
+    residual_dps: list[float]
+    over_floor: list[float]

@@ -1,0 +1,200 @@
+"""Error models, their coefficients, and what a fit says beside them."""
+
+from __future__ import annotations
+
+from typing import Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+from labctl.json_types.findings import FindingJson
+
+Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
+
+
+class TermJson(TypedDict):
+    """One effect of a model: its order and nonlinear parameters, and its expression where a user wrote it."""
+
+    effect: str
+    order: int | None
+    parameters: dict[str, float]
+    formula: NotRequired[str]
+    steady: NotRequired[bool]
+
+
+class TemperatureBasisJson(TypedDict):
+    """How temperature enters a model: not at all, or as a table with Lagrange interpolation between its nodes."""
+
+    kind: Literal["constant", "lagrange"]
+    points: NotRequired[int]
+    nodes_c: NotRequired[list[float]]
+
+
+class ReferenceJson(TypedDict):
+    """What the terms of a model are centred on."""
+
+    temperature_c: float
+
+
+class ErrorModelJson(TypedDict):
+    """A model without coefficients."""
+
+    name: str
+    argument: Literal["rate", "output"]
+    terms: list[TermJson]
+    temperature: TemperatureBasisJson
+    reference: ReferenceJson
+
+
+class AxisFitJson(TypedDict):
+    """The coefficients of one output axis: k names by m temperature functions, covariance (k*m, k*m)."""
+
+    effects: list[str]
+    names: list[str]
+    units: list[str]
+    values: list[list[float]]
+    covariance: list[list[float | None]]
+
+
+class FittedModelJson(ErrorModelJson):
+    """A model with its coefficients."""
+
+    axes: dict[str, AxisFitJson]
+
+
+class FittedModelDescription(ErrorModelJson):
+    """A model as an answer tells it, with its effects by name."""
+
+    effects: list[str]
+
+
+class Coefficient(TypedDict):
+    """One number with its standard uncertainty `u`; null where there were no more data sets than coefficients.
+
+    A root of an estimated square is `identified` or not; where it is not, `at_most` is its 95 % bound.
+    """
+
+    value: float
+    u: float | None
+    identified: NotRequired[bool]
+    at_most: NotRequired[float | None]
+    unit: str
+
+
+class CoefficientTable(TypedDict):
+    """The same at each node of a temperature table."""
+
+    value: list[float]
+    u: list[float | None]
+    identified: NotRequired[list[bool]]
+    at_most: NotRequired[list[float | None]]
+    unit: str
+
+
+Entry = Coefficient | CoefficientTable | list[float]
+#: Name -> coefficient; of a temperature table, `temperature_c` lists its nodes and every coefficient has one at each.
+Coefficients = dict[str, Entry]
+
+
+class AxisCoefficients(TypedDict):
+    """The coefficients of one output axis, by name."""
+
+    coefficients: Coefficients
+
+
+class ErrorFiguresJson(TypedDict):
+    """Input-referred RMS errors, deg/s."""
+
+    raw_rms_dps: float | None
+    rms_dps: float | None
+    heldout_rms_dps: float | None
+    noise_floor_dps: float | None
+    noise_floor_source: str
+
+
+class ValidityJson(TypedDict):
+    """Lowest and highest temperature, deg C, and true rate, deg/s; null: no limit."""
+
+    temperature_c: list[float]
+    rate_dps: list[float | None]
+
+
+class AxisNoiseJson(TypedDict):
+    """The noise that weighted one axis of a fit."""
+
+    white_dps: float | None
+    drift_dps: float
+    drift_tau_s: float | None
+    per_rate: float
+    covariance_scale: float | None
+
+
+class FitEnvironment(TypedDict):
+    """Which thermometer a fit went by, and how the Earth's rate was treated."""
+
+    temperature: NotRequired[str]
+    earth_rate: NotRequired[str]
+    latitude_deg: NotRequired[float]
+    along_table_axis_dps: NotRequired[float]
+    once_per_turn_dps: NotRequired[dict[str, list[float]]]
+    once_per_turn_expected_dps: NotRequired[float]
+
+
+class FitResultJson(TypedDict):
+    """What a fit says of its model."""
+
+    model: FittedModelDescription
+    axes: dict[str, AxisCoefficients]
+    error: ErrorFiguresJson
+    validity: ValidityJson
+    noise: dict[str, AxisNoiseJson]
+    environment: FitEnvironment
+    reference_temperature_c: float
+
+
+class LeftOut(TypedDict):
+    """An effect of a fit that is not exported with its calibration, because it does not belong to the unit."""
+
+    effect: str
+    origin: Origin
+    term: str
+
+
+#: The range that an effect's first coefficient usually lies in, and whether it may do so on every axis.
+UsualRange = TypedDict("UsualRange", {"from": float, "to": float, "inside": bool})
+
+
+class ChangeFigures(FitResultJson):
+    """What is said of a change of effects, whether it is kept or not."""
+
+    recording: int
+    improved_from: int
+    before: ErrorFiguresJson
+    plausible: dict[str, UsualRange]
+    warnings: list[FindingJson]
+
+
+class KeptFit(FitResultJson):
+    """What a fit answered, as it is kept with the version that it made."""
+
+    serial: str
+    version: int
+    recording: int
+    campaign: int | None
+    recipe: str | None
+    bench: str | None
+    hash: str
+    warnings: list[FindingJson]
+
+
+class KeptChange(ChangeFigures):
+    """What a change of effects answered, as it is kept with the version that it made."""
+
+    serial: str
+    version: int
+    parent: int
+    left_out: list[LeftOut]
+    hash: str
+
+
+#: Of a version that labctl 0.1 kept, keys may be missing that came later.
+KeptAnswer = KeptFit | KeptChange

@@ -1,0 +1,57 @@
+"""No public function, method, field or alias says Any, but for those below, each with its reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.annotations import public_signatures_with_any
+from tests.helpers.source_files import SourceFile, sources
+
+PASSED_ON = "settings of a library's constructor, passed on as they are; the library leaves them without types"
+PICKLED = "any data that can be pickled: both ends are one installation, and the name of the call says what it is"
+#: Module -> what says Any there, and why.
+ALLOWED = {
+    "instruments/simulators/links/modbus_clients.py": (
+        {"SimulatedTcpClient.__init__", "SimulatedRtuClient.__init__"},
+        PASSED_ON,
+    ),
+    "instruments/simulators/links/serial_port.py": ({"SimulatedSerialPort.__init__"}, PASSED_ON),
+    "labctl/processes/calls.py": ({"Call.args", "Call.kwargs", "Answer.value", "Caller.call"}, PICKLED),
+    "labctl/processes/children.py": ({"line_to_parent"}, PICKLED),
+    "labctl/services/commands/registry.py": ({"COMMANDS"}, "commands of different requests and responses in a row"),
+}
+
+
+def test_no_public_signature_says_any() -> None:
+    runtime = [file for file in sources() if file.is_runtime and "versions" not in file.parts]
+    found = {file.name: set(public_signatures_with_any(file)) for file in runtime}
+    assert {name: names for name, names in found.items() if names} == {
+        name: names for name, (names, _) in ALLOWED.items()
+    }
+
+
+@pytest.fixture
+def module(tmp_path: Path) -> SourceFile:
+    file = tmp_path / "module.py"
+    file.write_text(
+        "from typing import Any\nimport typing\n"
+        "Alias = dict[str, Any]\nfine = 1\n"
+        "def loose(a: int, *b: list[Any]) -> None: ...\n"
+        "def result() -> typing.Any: ...\n"
+        "def good(a: int) -> dict[str, int]: ...\n"
+        "def _private(a: Any) -> Any: ...\n"
+        "class Thing:\n"
+        "    field: tuple[Any, ...]\n"
+        "    _kept: Any\n"
+        "    def __init__(self, a: Any) -> None:\n"
+        "        self.kept: Any = a\n"
+        "    def method(self, a: int) -> None: ...\n",
+        encoding="utf-8",
+    )
+    return SourceFile(file)
+
+
+def test_any_is_seen_wherever_a_type_stands(module: SourceFile) -> None:
+    assert public_signatures_with_any(module) == ["Alias", "loose", "result", "Thing.field", "Thing.__init__"]
