@@ -17,15 +17,33 @@ route("/", () => import("./pages/start.js"));
 route("/start", () => import("./pages/start.js"));
 route("/bench", () => import("./pages/bench.js"));
 route("/campaigns", () => import("./pages/campaigns.js"));
-route("/campaigns/new", withPlots(() => import("./pages/campaign_new.js")));
-route("/campaigns/:id", withPlots(() => import("./pages/campaign.js")));
+route(
+  "/campaigns/new",
+  withPlots(() => import("./pages/campaign_new.js")),
+);
+route(
+  "/campaigns/:id",
+  withPlots(() => import("./pages/campaign.js")),
+);
 route("/units", () => import("./pages/units.js"));
-route("/units/:serial", withPlots(() => import("./pages/unit.js")));
-route("/explore", withPlots(() => import("./pages/explore.js")));
+route(
+  "/units/:serial",
+  withPlots(() => import("./pages/unit.js")),
+);
+route(
+  "/explore",
+  withPlots(() => import("./pages/explore.js")),
+);
 route("/recordings", () => import("./pages/recordings.js"));
-route("/recordings/:id", withPlots(() => import("./pages/recording.js")));
+route(
+  "/recordings/:id",
+  withPlots(() => import("./pages/recording.js")),
+);
 route("/effects", () => import("./pages/effects.js"));
-route("/effects/:id", withPlots(() => import("./pages/effects.js")));
+route(
+  "/effects/:id",
+  withPlots(() => import("./pages/effects.js")),
+);
 
 buildLayout();
 await start();

@@ -5,7 +5,8 @@ const histories = new Map();
 
 /** The history of a campaign; kept when the page is left, so that it continues on return. */
 export function campaignHistory(campaign) {
-  if (!histories.has(campaign)) histories.set(campaign, { t_s: [], chamber_c: [], gyro_c: [], rate_dps: [], setpoint_c: [] });
+  if (!histories.has(campaign))
+    histories.set(campaign, { t_s: [], chamber_c: [], gyro_c: [], rate_dps: [], setpoint_c: [] });
   return histories.get(campaign);
 }
 

@@ -28,7 +28,10 @@ export async function followCampaign(campaign, handlers, signal) {
   while (!signal.aborted) {
     [connection, asked] = [new AbortController(), Date.now()];
     try {
-      for await (const message of eventStream(`/api/campaigns/${campaign}/events`, { after, signal: AbortSignal.any([signal, connection.signal]) })) {
+      for await (const message of eventStream(`/api/campaigns/${campaign}/events`, {
+        after,
+        signal: AbortSignal.any([signal, connection.signal]),
+      })) {
         [heard, tries] = [Date.now(), 0];
         report(false);
         if (message.event === "progress") handlers.progress(message.data);
@@ -42,7 +45,14 @@ export async function followCampaign(campaign, handlers, signal) {
       if (FINAL_STATES.has(status.state)) break;
     } catch (error) {
       if (signal.aborted) break;
-      report(true, error instanceof Problem ? error.message : error.name === "AbortError" ? "the service says nothing" : "the connection broke");
+      report(
+        true,
+        error instanceof Problem
+          ? error.message
+          : error.name === "AbortError"
+            ? "the service says nothing"
+            : "the connection broke",
+      );
       if (error instanceof Problem && error.status < 500) break;
     }
     await new Promise((resolve) => setTimeout(resolve, RETRY_DELAYS_MS[Math.min(tries, RETRY_DELAYS_MS.length - 1)]));

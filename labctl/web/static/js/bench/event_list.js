@@ -19,7 +19,20 @@ export function eventList(most, level = "info", campaign = {}) {
     waiting = null;
     const shown = all.filter((event) => LEVELS.indexOf(event.level) >= LEVELS.indexOf(least));
     const from = shown.slice(-most).reverse();
-    setChildren(element, campaign.simulated_time && from.length ? h("li", { class: "muted small" }, `All times here are ${SIMULATED}.`) : null, from.length ? from.map((event) => eventItem(event, campaign)) : h("li", { class: "empty" }, all.length ? "Nothing of this kind has happened." : "No event has been heard yet."), shown.length > most ? h("li", { class: "muted small" }, `and ${shown.length - most} before`) : null);
+    setChildren(
+      element,
+      campaign.simulated_time && from.length
+        ? h("li", { class: "muted small" }, `All times here are ${SIMULATED}.`)
+        : null,
+      from.length
+        ? from.map((event) => eventItem(event, campaign))
+        : h(
+            "li",
+            { class: "empty" },
+            all.length ? "Nothing of this kind has happened." : "No event has been heard yet.",
+          ),
+      shown.length > most ? h("li", { class: "muted small" }, `and ${shown.length - most} before`) : null,
+    );
   }
   element.add = (event) => {
     all.push(event);
@@ -36,9 +49,32 @@ export function eventList(most, level = "info", campaign = {}) {
 
 function eventItem(event, campaign) {
   const message = event.message.replace(/ \[question [^\]]+\]$/, "");
-  const limit = !message.includes("limit") && event.value !== null && event.value !== undefined && event.limit !== null && event.limit !== undefined ? ` (${plainNumber(event.value)} ${event.unit ?? ""}, limit ${plainNumber(event.limit)} ${event.unit ?? ""})` : "";
-  return h("li", {},
-    h("time", { datetime: event.at, title: `${day(event.at)}, ${event.t_s.toFixed(1)} s of the campaign${campaign.simulated_time ? `, ${SIMULATED}` : ""}` }, clock(event.at)),
+  const limit =
+    !message.includes("limit") &&
+    event.value !== null &&
+    event.value !== undefined &&
+    event.limit !== null &&
+    event.limit !== undefined
+      ? ` (${plainNumber(event.value)} ${event.unit ?? ""}, limit ${plainNumber(event.limit)} ${event.unit ?? ""})`
+      : "";
+  return h(
+    "li",
+    {},
+    h(
+      "time",
+      {
+        datetime: event.at,
+        title: `${day(event.at)}, ${event.t_s.toFixed(1)} s of the campaign${campaign.simulated_time ? `, ${SIMULATED}` : ""}`,
+      },
+      clock(event.at),
+    ),
     chip(event.level, KINDS[event.level] ?? ""),
-    h("span", {}, event.device && !message.startsWith(event.device) ? h("strong", {}, `${event.device}: `) : null, message, limit));
+    h(
+      "span",
+      {},
+      event.device && !message.startsWith(event.device) ? h("strong", {}, `${event.device}: `) : null,
+      message,
+      limit,
+    ),
+  );
 }

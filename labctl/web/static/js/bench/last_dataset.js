@@ -15,18 +15,53 @@ export function lastDataset(timeline, signal) {
   const place = h("div", {}, h("p", { class: "muted" }, "The first data set has not been measured yet."));
   let columns = null;
   let [shown, next, busy, unit] = [null, 0, false, null];
-  const picture = figure("Gyro output of the last data set", `As recorded; of a long data set the first ${MAX_READINGS} readings.`, () => {
-    const axes = Object.keys(columns ?? {}).filter((name) => name.startsWith("gyro_"));
-    const t = (columns?.t_s ?? []).map((value) => value - columns.t_s[0]);
-    const thirds = axes.length > 1 ? axes.length : 1;
-    return {
-      data: axes.map((name, k) => ({ type: "scatter", mode: "lines", name: `axis ${name.slice(5)}`, x: t, y: columns[name], yaxis: k ? `y${k + 1}` : "y", line: { width: 0.8, color: axisColour(name.slice(5)) }, hovertemplate: "%{y:.6~g} after %{x:.4~f} s<extra></extra>" })),
-      layout: {
-        showlegend: false, margin: { l: 62, r: 12, t: 8, b: 42 }, xaxis: { title: { text: "time in the data set, s" }, anchor: thirds > 1 ? `y${thirds}` : "y" },
-        ...Object.fromEntries(axes.map((name, k) => [k ? `yaxis${k + 1}` : "yaxis", { title: { text: `${name.slice(5)}, ${columns.unit}` }, domain: [1 - (k + 1) / thirds + (k + 1 < thirds ? 0.04 : 0), 1 - k / thirds - (k ? 0.04 : 0)] }])),
-      },
-    };
-  }, { height: "21rem", csv: () => [["t_s", ...Object.keys(columns).filter((name) => name.startsWith("gyro_"))], ...columns.t_s.map((t, k) => [t, ...Object.keys(columns).filter((name) => name.startsWith("gyro_")).map((name) => columns[name][k])])] });
+  const picture = figure(
+    "Gyro output of the last data set",
+    `As recorded; of a long data set the first ${MAX_READINGS} readings.`,
+    () => {
+      const axes = Object.keys(columns ?? {}).filter((name) => name.startsWith("gyro_"));
+      const t = (columns?.t_s ?? []).map((value) => value - columns.t_s[0]);
+      const thirds = axes.length > 1 ? axes.length : 1;
+      return {
+        data: axes.map((name, k) => ({
+          type: "scatter",
+          mode: "lines",
+          name: `axis ${name.slice(5)}`,
+          x: t,
+          y: columns[name],
+          yaxis: k ? `y${k + 1}` : "y",
+          line: { width: 0.8, color: axisColour(name.slice(5)) },
+          hovertemplate: "%{y:.6~g} after %{x:.4~f} s<extra></extra>",
+        })),
+        layout: {
+          showlegend: false,
+          margin: { l: 62, r: 12, t: 8, b: 42 },
+          xaxis: { title: { text: "time in the data set, s" }, anchor: thirds > 1 ? `y${thirds}` : "y" },
+          ...Object.fromEntries(
+            axes.map((name, k) => [
+              k ? `yaxis${k + 1}` : "yaxis",
+              {
+                title: { text: `${name.slice(5)}, ${columns.unit}` },
+                domain: [1 - (k + 1) / thirds + (k + 1 < thirds ? 0.04 : 0), 1 - k / thirds - (k ? 0.04 : 0)],
+              },
+            ]),
+          ),
+        },
+      };
+    },
+    {
+      height: "21rem",
+      csv: () => [
+        ["t_s", ...Object.keys(columns).filter((name) => name.startsWith("gyro_"))],
+        ...columns.t_s.map((t, k) => [
+          t,
+          ...Object.keys(columns)
+            .filter((name) => name.startsWith("gyro_"))
+            .map((name) => columns[name][k]),
+        ]),
+      ],
+    },
+  );
 
   async function onStatus(status) {
     const until = (status.step ?? 1) - (status.state === "done" ? 0 : 1);
@@ -35,11 +70,18 @@ export function lastDataset(timeline, signal) {
     if (busy || !recording || dataset === null || dataset === shown || Date.now() < next) return;
     [busy, next] = [true, Date.now() + MIN_INTERVAL_MS];
     try {
-      const found = await get(`/api/recordings/${recording}/samples`, { query: { dataset, limit: MAX_READINGS }, signal });
+      const found = await get(`/api/recordings/${recording}/samples`, {
+        query: { dataset, limit: MAX_READINGS },
+        signal,
+      });
       unit ??= await outputUnit(recording, found.columns, signal);
       columns = { ...found.columns, unit };
       const k = timeline.dataset.indexOf(dataset);
-      setChildren(about, h("a", { href: `/recordings/${recording}?dataset=${dataset}` }, `Data set ${dataset}`), `: ${plainNumber(timeline.rate_dps[k])} deg/s at ${plainNumber(timeline.temperature_c[k])} deg C, ${timeline.position[k] ?? "?"} up`);
+      setChildren(
+        about,
+        h("a", { href: `/recordings/${recording}?dataset=${dataset}` }, `Data set ${dataset}`),
+        `: ${plainNumber(timeline.rate_dps[k])} deg/s at ${plainNumber(timeline.temperature_c[k])} deg C, ${timeline.position[k] ?? "?"} up`,
+      );
       if (!picture.isConnected) setChildren(place, picture);
       picture.redraw();
       shown = dataset;

@@ -26,11 +26,29 @@ export function runningCampaign(status, plan, { signal, over }) {
   const { timeline } = plan;
   const history = campaignHistory(status.id);
   const bar = statusBar(status, plan);
-  const [connection, prompt, warningList] = [h("div", { "aria-live": "assertive" }), h("div", {}), h("div", { class: "stack", "aria-live": "polite" })];
+  const [connection, prompt, warningList] = [
+    h("div", { "aria-live": "assertive" }),
+    h("div", {}),
+    h("div", { class: "stack", "aria-live": "polite" }),
+  ];
   const dials = gauges(timeline);
-  const [historyFigure, outputCard, datasetCard, events] = [historyPlot(history), liveOutput(status.id), lastDataset(timeline, signal), eventList(MAX_EVENTS, "info", status)];
+  const [historyFigure, outputCard, datasetCard, events] = [
+    historyPlot(history),
+    liveOutput(status.id),
+    lastDataset(timeline, signal),
+    eventList(MAX_EVENTS, "info", status),
+  ];
   let [now, asked, planned] = [status, null, 0];
-  const picture = planChart(`Campaign ${status.id} plan`, () => ({ timeline: plan.timeline, now_s: now.t_s, live: true }), { height: "22rem", pick: (dataset) => Object.values(now.recordings)[0] && navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
+  const picture = planChart(
+    `Campaign ${status.id} plan`,
+    () => ({ timeline: plan.timeline, now_s: now.t_s, live: true }),
+    {
+      height: "22rem",
+      pick: (dataset) =>
+        Object.values(now.recordings)[0] &&
+        navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`),
+    },
+  );
   const setpoint = () => now.setpoint_c ?? timeline.temperature_c[Math.max((now.step ?? 1) - 1, 0)];
 
   function show(next) {
@@ -60,37 +78,103 @@ export function runningCampaign(status, plan, { signal, over }) {
     }
   }
   show(status);
-  followCampaign(status.id, {
-    progress: show,
-    event: (event) => events.add(event),
-    link: ({ stale, since, why }) => {
-      bar.classList.toggle("stale", stale);
-      setChildren(connection, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `), `What you see may no longer be so: ${why}. Trying again.`) : null);
+  followCampaign(
+    status.id,
+    {
+      progress: show,
+      event: (event) => events.add(event),
+      link: ({ stale, since, why }) => {
+        bar.classList.toggle("stale", stale);
+        setChildren(
+          connection,
+          stale
+            ? notice(
+                "bad",
+                h(
+                  "strong",
+                  {},
+                  `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `,
+                ),
+                `What you see may no longer be so: ${why}. Trying again.`,
+              )
+            : null,
+        );
+      },
     },
-  }, signal);
-  return [bar, connection, prompt, warningList, dials,
-    h("div", { class: "columns", style: "--column-min: 26rem" }, card("Rate and temperatures", historyFigure), outputCard),
+    signal,
+  );
+  return [
+    bar,
+    connection,
+    prompt,
+    warningList,
+    dials,
+    h(
+      "div",
+      { class: "columns", style: "--column-min: 26rem" },
+      card("Rate and temperatures", historyFigure),
+      outputCard,
+    ),
     cardWithHeader("Plan", linkButton(`Campaign ${status.id}`, `/campaigns/${status.id}`, "tiny"), picture),
     datasetCard,
-    cardWithHeader("Last events", linkButton("All of them", `/campaigns/${status.id}?level=info#events`, "tiny"), events)];
+    cardWithHeader(
+      "Last events",
+      linkButton("All of them", `/campaigns/${status.id}?level=info#events`, "tiny"),
+      events,
+    ),
+  ];
 }
 
 function statusBar(status, plan) {
-  const [state, text, beside, acts] = [h("span", {}), h("strong", { class: "status-bar-step" }), h("span", { class: "muted small" }), h("div", { class: "row tight" })];
+  const [state, text, beside, acts] = [
+    h("span", {}),
+    h("strong", { class: "status-bar-step" }),
+    h("span", { class: "muted small" }),
+    h("div", { class: "row tight" }),
+  ];
   const bar = h("i", {});
-  const meter = h("div", { class: "meter thick", role: "progressbar", "aria-label": "Progress of the campaign", "aria-valuemin": "0", "aria-valuemax": "100" }, bar);
+  const meter = h(
+    "div",
+    {
+      class: "meter thick",
+      role: "progressbar",
+      "aria-label": "Progress of the campaign",
+      "aria-valuemin": "0",
+      "aria-valuemax": "100",
+    },
+    bar,
+  );
   const stop = stopButton(status.id);
   let mode = null;
-  const element = h("section", { class: "card status-bar", "aria-label": "What the bench is doing" },
-    h("div", { class: "status-bar-line" }, h("div", { class: "row" }, state, text), h("div", { class: "row tight status-bar-actions" }, acts, stop)), meter, beside);
+  const element = h(
+    "section",
+    { class: "card status-bar", "aria-label": "What the bench is doing" },
+    h(
+      "div",
+      { class: "status-bar-line" },
+      h("div", { class: "row" }, state, text),
+      h("div", { class: "row tight status-bar-actions" }, acts, stop),
+    ),
+    meter,
+    beside,
+  );
   element.show = (now) => {
     setChildren(state, stateChip(now));
     text.textContent = now.step_text || "About to begin";
     bar.style.width = `${(100 * now.progress).toFixed(2)}%`;
     meter.setAttribute("aria-valuenow", String(Math.round(100 * now.progress)));
-    setChildren(beside, `Step ${now.step ?? "–"} of ${now.steps}, ${(100 * now.progress).toFixed(1)} %. `,
-      now.expected_end ? `${duration(remainingSeconds(now, plan.expected_s))} left, end ${campaignInstant(now, now.expected_end)}.` : "",
-      now.wish === "pause" ? h("strong", {}, " Pauses after this data set.") : now.wish === "abort" ? h("strong", {}, " Stops now.") : null);
+    setChildren(
+      beside,
+      `Step ${now.step ?? "–"} of ${now.steps}, ${(100 * now.progress).toFixed(1)} %. `,
+      now.expected_end
+        ? `${duration(remainingSeconds(now, plan.expected_s))} left, end ${campaignInstant(now, now.expected_end)}.`
+        : "",
+      now.wish === "pause"
+        ? h("strong", {}, " Pauses after this data set.")
+        : now.wish === "abort"
+          ? h("strong", {}, " Stops now.")
+          : null,
+    );
     const wanted = now.state === "paused" || now.wish === "pause" ? "resume" : "pause";
     if (wanted !== mode) setChildren(acts, wanted === "resume" ? resumeButton(now.id) : pauseButton(now.id));
     mode = wanted;
@@ -100,8 +184,12 @@ function statusBar(status, plan) {
 
 /** Notices for links that fail, dropped units, a pause and the last fault; empty when there are none. */
 function warnings(now) {
-  const listed = (found, text) => Object.entries(found).map(([name, why]) => notice("warn", h("strong", {}, `${name} `), `${text}: ${why}`));
-  return [...listed(now.links, "does not answer as it should"), ...listed(now.dropped, "takes no further part"),
+  const listed = (found, text) =>
+    Object.entries(found).map(([name, why]) => notice("warn", h("strong", {}, `${name} `), `${text}: ${why}`));
+  return [
+    ...listed(now.links, "does not answer as it should"),
+    ...listed(now.dropped, "takes no further part"),
     now.state === "paused" ? notice("warn", `Paused: ${now.reason || "no reason given"}.`) : null,
-    now.last_error ? notice("bad", h("strong", {}, "Last fault: "), now.last_error) : null].filter(Boolean);
+    now.last_error ? notice("bad", h("strong", {}, "Last fault: "), now.last_error) : null,
+  ].filter(Boolean);
 }

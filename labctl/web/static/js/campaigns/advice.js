@@ -7,6 +7,11 @@ import { notice } from "../core/components.js";
 export function adviceNotice(campaign) {
   const { advice } = campaign;
   if (!advice) return null;
-  return notice("bad", h("p", { class: "lead" }, advice.happened), h("p", {}, advice.done), h("p", {}, h("strong", {}, "Next: "), advice.next),
-    h("p", { class: "small" }, `Reason: ${campaign.reason}`));
+  return notice(
+    "bad",
+    h("p", { class: "lead" }, advice.happened),
+    h("p", {}, advice.done),
+    h("p", {}, h("strong", {}, "Next: "), advice.next),
+    h("p", { class: "small" }, `Reason: ${campaign.reason}`),
+  );
 }

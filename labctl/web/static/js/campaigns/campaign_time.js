@@ -9,4 +9,7 @@ export const campaignInstant = (campaign, text) => marked(campaign, instant(text
 export const campaignDuration = (campaign, seconds) => marked(campaign, duration(seconds));
 
 /** How long an ended campaign took, null for others. */
-export const durationTaken = (campaign) => (campaign.started_at && campaign.ended_at ? `took ${campaignDuration(campaign, (Date.parse(campaign.ended_at) - Date.parse(campaign.started_at)) / 1000)}` : null);
+export const durationTaken = (campaign) =>
+  campaign.started_at && campaign.ended_at
+    ? `took ${campaignDuration(campaign, (Date.parse(campaign.ended_at) - Date.parse(campaign.started_at)) / 1000)}`
+    : null;

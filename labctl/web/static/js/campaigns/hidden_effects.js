@@ -20,23 +20,45 @@ export function hiddenEffectForm(effects, asked, chosen) {
     const about = effects.find((each) => each.id === row.effect);
     const can = seen.find((each) => each.effect === row.effect);
     const unit = unitText(about?.unit);
-    const input = h("input", { type: "number", step: "any", value: row.size, placeholder: "the simulator's own", oninput: () => {
-      row.size = input.value;
-      tell();
-    } });
-    const hint = can?.visible && can.smallest_size ? `This plan shows it from ${number(can.smallest_size, 2)} ${unit || `(${sizeText(can.smallest_size, "1")})`} on.` : can ? "This plan would not show it." : null;
-    return setChildren(beside, labelledField(unit ? `Size, ${unit}` : "Size", input, hint), h("p", { class: "muted small", style: "flex: 1 1 14rem" }, about?.sentence ?? ""));
+    const input = h("input", {
+      type: "number",
+      step: "any",
+      value: row.size,
+      placeholder: "the simulator's own",
+      oninput: () => {
+        row.size = input.value;
+        tell();
+      },
+    });
+    const hint =
+      can?.visible && can.smallest_size
+        ? `This plan shows it from ${number(can.smallest_size, 2)} ${unit || `(${sizeText(can.smallest_size, "1")})`} on.`
+        : can
+          ? "This plan would not show it."
+          : null;
+    return setChildren(
+      beside,
+      labelledField(unit ? `Size, ${unit}` : "Size", input, hint),
+      h("p", { class: "muted small", style: "flex: 1 1 14rem" }, about?.sentence ?? ""),
+    );
   }
-  const pick = selectField("Effect to hide", [["", "none"], ...effects.map((each) => [each.id, idText(each.id)])], row.effect, (value) => {
-    row = { effect: value, size: usual(value) };
-    updateQuery({ hide: value });
-    show();
-    tell();
-  });
+  const pick = selectField(
+    "Effect to hide",
+    [["", "none"], ...effects.map((each) => [each.id, idText(each.id)])],
+    row.effect,
+    (value) => {
+      row = { effect: value, size: usual(value) };
+      updateQuery({ hide: value });
+      show();
+      tell();
+    },
+  );
   /** A size well above the smallest visible one. */
   function usual(effect) {
     const can = seen.find((each) => each.effect === effect);
-    return can?.visible && can.smallest_size ? String(Number((DEFAULT_SIZE_FACTOR * can.smallest_size).toPrecision(2))) : "";
+    return can?.visible && can.smallest_size
+      ? String(Number((DEFAULT_SIZE_FACTOR * can.smallest_size).toPrecision(2)))
+      : "";
   }
   const element = h("div", { class: "row", style: "align-items: start" }, pick, beside);
   element.sizes = (visibility) => {

@@ -14,13 +14,26 @@ const HOUR_S = 3600;
 /** `order()` returns the chosen {recipe, clip, hide}; `bench` is the bench of the service, or null. `look()` of the element
  * says again when the plan needs a person. */
 export function startForm(bench, order) {
-  const when = [...(bench ? [["now", "Now"], ["at", "At a time"], ["cron", "Again and again"]] : []), ["simulation", "In simulation, without a bench"]];
+  const when = [
+    ...(bench
+      ? [
+          ["now", "Now"],
+          ["at", "At a time"],
+          ["cron", "Again and again"],
+        ]
+      : []),
+    ["simulation", "In simulation, without a bench"],
+  ];
   const place = h("div", { class: "stack" });
   let chosen = when[0][0];
   const at = h("input", { type: "datetime-local" });
   const cron = h("input", { type: "text", value: "0 20 * * FRI", spellcheck: "false" });
   const zone = h("input", { type: "text", value: LOCAL_TIME_ZONE, spellcheck: "false", list: "zones" });
-  const zones = h("datalist", { id: "zones" }, (Intl.supportedValuesOf?.("timeZone") ?? []).map((value) => h("option", { value })));
+  const zones = h(
+    "datalist",
+    { id: "zones" },
+    (Intl.supportedValuesOf?.("timeZone") ?? []).map((value) => h("option", { value })),
+  );
   const priority = h("input", { type: "number", value: "0", min: "-100", max: "100", step: "1" });
   const late = h("input", { type: "number", min: "0", step: "any", placeholder: "any time" });
   const seed = h("input", { type: "number", value: "1", min: "0", step: "1" });
@@ -37,7 +50,11 @@ export function startForm(bench, order) {
     if (!bench || bench.simulated || chosen === "simulation" || (chosen === "at" && !at.value)) return;
     const { hide, ...rest } = order();
     try {
-      const answer = await post("/api/plans", { ...rest, ...timeOfStart(), ...(chosen === "now" ? {} : { time_zone: zone.value || null }) }, { signal: asked.signal });
+      const answer = await post(
+        "/api/plans",
+        { ...rest, ...timeOfStart(), ...(chosen === "now" ? {} : { time_zone: zone.value || null }) },
+        { signal: asked.signal },
+      );
       setChildren(attended, attendanceNotice(answer.attendance, propose));
     } catch (error) {
       if (error.name !== "AbortError") setChildren(attended, notice("", error.message));
@@ -62,7 +79,14 @@ export function startForm(bench, order) {
     if (chosen === "at" && !at.value) throw new Error("Say when it is to begin.");
     const clear = await askBenchClear(bench, { later: true });
     if (!clear) return;
-    const made = await post("/api/campaigns", { ...rest, ...clear, ...timeOfStart(), time_zone: zone.value || null, priority: Number(priority.value), ...(late.value === "" ? {} : { late_limit_s: Number(late.value) * HOUR_S }) });
+    const made = await post("/api/campaigns", {
+      ...rest,
+      ...clear,
+      ...timeOfStart(),
+      time_zone: zone.value || null,
+      priority: Number(priority.value),
+      ...(late.value === "" ? {} : { late_limit_s: Number(late.value) * HOUR_S }),
+    });
     toast("good", `It begins ${instant(made.due_at)}, your time.`);
     await navigate("/campaigns");
   }
@@ -72,10 +96,54 @@ export function startForm(bench, order) {
     await navigate(`/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}`);
   }
   const FORMS = {
-    now: () => [bench.unconfirmed ? notice("bad", "The bench was not confirmed safe: ", h("a", { href: "/bench" }, "look at it first"), ".") : bench.campaign ? notice("warn", `Campaign ${bench.campaign} runs on ${bench.name} now; it has to end first. A start at a time waits for it.`) : null, h("div", { class: "row" }, button(`Start on ${bench.name}`, now, { kind: "primary large" }))],
-    at: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Begin at", at), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" }))],
-    cron: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Cron line", cron, "minute hour day month weekday"), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" }))],
-    simulation: () => [h("p", { class: "muted" }, "A recording of this plan is made at once in simulation and taken in; no bench moves, no campaign is kept."), h("div", { class: "row", style: "align-items: end" }, labelledField("Seed", seed, "Same seed, same recording."), button("Simulate the recording", simulated, { kind: "primary large" }))],
+    now: () => [
+      bench.unconfirmed
+        ? notice("bad", "The bench was not confirmed safe: ", h("a", { href: "/bench" }, "look at it first"), ".")
+        : bench.campaign
+          ? notice(
+              "warn",
+              `Campaign ${bench.campaign} runs on ${bench.name} now; it has to end first. A start at a time waits for it.`,
+            )
+          : null,
+      h("div", { class: "row" }, button(`Start on ${bench.name}`, now, { kind: "primary large" })),
+    ],
+    at: () => [
+      h(
+        "div",
+        { class: "row", style: "align-items: start" },
+        labelledField("Begin at", at),
+        labelledField("Time zone", zone),
+        labelledField("Priority", priority, "Of starts that are due, the highest goes first."),
+        labelledField("May be late by, h", late, "Empty: any time, once."),
+        zones,
+      ),
+      h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" })),
+    ],
+    cron: () => [
+      h(
+        "div",
+        { class: "row", style: "align-items: start" },
+        labelledField("Cron line", cron, "minute hour day month weekday"),
+        labelledField("Time zone", zone),
+        labelledField("Priority", priority, "Of starts that are due, the highest goes first."),
+        labelledField("May be late by, h", late, "Empty: any time, once."),
+        zones,
+      ),
+      h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" })),
+    ],
+    simulation: () => [
+      h(
+        "p",
+        { class: "muted" },
+        "A recording of this plan is made at once in simulation and taken in; no bench moves, no campaign is kept.",
+      ),
+      h(
+        "div",
+        { class: "row", style: "align-items: end" },
+        labelledField("Seed", seed, "Same seed, same recording."),
+        button("Simulate the recording", simulated, { kind: "primary large" }),
+      ),
+    ],
   };
   const show = () => setChildren(place, FORMS[chosen]());
   show();
@@ -84,6 +152,12 @@ export function startForm(bench, order) {
     show();
     look();
   });
-  const element = card("Begin", bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."), h("div", {}, group), attended, place);
+  const element = card(
+    "Begin",
+    bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."),
+    h("div", {}, group),
+    attended,
+    place,
+  );
   return Object.assign(element, { id: "begin", look });
 }

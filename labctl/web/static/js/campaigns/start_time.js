@@ -9,5 +9,10 @@ export function startTime(row) {
   if (!row.due_at) return "–";
   const there = new Date(row.due_at).toLocaleString("en-GB", { ...TIME_FORMAT, timeZone: row.time_zone });
   const here = instant(row.due_at);
-  return h("span", {}, h("strong", { class: "nowrap" }, there), h("span", { class: "muted small secondary" }, row.time_zone, there === here ? null : `; ${here} where you are`));
+  return h(
+    "span",
+    {},
+    h("strong", { class: "nowrap" }, there),
+    h("span", { class: "muted small secondary" }, row.time_zone, there === here ? null : `; ${here} where you are`),
+  );
 }

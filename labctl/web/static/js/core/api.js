@@ -42,7 +42,8 @@ async function request(path, options) {
 export function withQuery(path, query = {}) {
   const search = new URLSearchParams();
   for (const [name, value] of Object.entries(query)) {
-    for (const one of Array.isArray(value) ? value : [value]) if (one !== null && one !== undefined && one !== "") search.append(name, one);
+    for (const one of Array.isArray(value) ? value : [value])
+      if (one !== null && one !== undefined && one !== "") search.append(name, one);
   }
   const text = search.toString();
   return text ? `${path}?${text}` : path;
@@ -53,7 +54,12 @@ export async function get(path, { query, signal } = {}) {
 }
 
 export async function post(path, body = {}, { signal } = {}) {
-  const options = { method: "POST", headers: headers({ "Content-Type": "application/json" }), body: JSON.stringify(body), signal };
+  const options = {
+    method: "POST",
+    headers: headers({ "Content-Type": "application/json" }),
+    body: JSON.stringify(body),
+    signal,
+  };
   return (await request(path, options)).json();
 }
 
@@ -87,7 +93,10 @@ export function saveBlob(blob, name) {
  * Not an EventSource, because that cannot send a key.
  */
 export async function* eventStream(path, { after, query, signal } = {}) {
-  const response = await request(withQuery(path, query), { headers: headers(after ? { "Last-Event-ID": String(after) } : {}), signal });
+  const response = await request(withQuery(path, query), {
+    headers: headers(after ? { "Last-Event-ID": String(after) } : {}),
+    signal,
+  });
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";
   try {

@@ -12,7 +12,11 @@ export function number(value, digits = 3) {
   return text.toFixed(Math.min(decimals, 8));
 }
 
-const SUPERSCRIPTS = { "-": "⁻", "+": "", ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])) };
+const SUPERSCRIPTS = {
+  "-": "⁻",
+  "+": "",
+  ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])),
+};
 function power(value, digits) {
   const [factor, exponent] = value.toExponential(digits - 1).split("e");
   return `${factor} × 10${superscript(exponent)}`;
@@ -20,7 +24,8 @@ function power(value, digits) {
 const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? sign).join("");
 
 /** A number without trailing zeros, for settings: -100, 12.5, 0.0042. */
-export const plainNumber = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "–");
+export const plainNumber = (value, digits = 4) =>
+  Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "–";
 export const withUnit = (value, unit, digits) => (Number.isFinite(value) ? `${number(value, digits)} ${unit}` : "–");
 export const count = (value) => (Number.isFinite(value) ? value.toLocaleString("en-GB") : "–");
 export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)} %` : "–");
@@ -43,14 +48,16 @@ export function duration(seconds) {
 const DAY = { weekday: "short", day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };
 /** An instant in the time zone of the browser. */
 export const instant = (text) => (text ? new Date(text).toLocaleString("en-GB", DAY) : "–");
-export const day = (text) => (text ? new Date(text).toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" }) : "–");
+export const day = (text) =>
+  text ? new Date(text).toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" }) : "–";
 export const clock = (text) => (text ? new Date(text).toLocaleTimeString("en-GB") : "–");
 
 /** An id as text: scale_factor_asymmetry -> scale factor asymmetry. */
 export const idText = (id) => String(id).replaceAll("_", " ");
 
 /** A unit as text: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none. */
-export const unitText = (unit) => (unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => superscript(power)));
+export const unitText = (unit) =>
+  unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => superscript(power));
 
 /** A size with its unit; a plain number is a share of the rate, or of the full effect: 14 ppm, 2.7 %. */
 export function sizeText(value, unit, digits = 2) {
@@ -62,7 +69,11 @@ export function sizeText(value, unit, digits = 2) {
 /** A result and its expanded uncertainty as texts of the same place, with their common suffix: power of ten and unit. */
 export function resultTexts(value, expanded, unit) {
   const [factor, own] = unit !== "1" ? [1, unitText(unit)] : Math.abs(value) >= 0.01 ? [100, "%"] : [1e6, "ppm"];
-  const { value: middle, u: half, exponent } = roundedToUncertainty(value * factor, expanded === null ? null : expanded * factor);
+  const {
+    value: middle,
+    u: half,
+    exponent,
+  } = roundedToUncertainty(value * factor, expanded === null ? null : expanded * factor);
   return { middle, half, power: exponent ? `× 10${superscript(exponent)}` : "", suffix: own };
 }
 

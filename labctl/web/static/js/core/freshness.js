@@ -51,12 +51,24 @@ const clockText = (instant) => instant.toLocaleTimeString("en-GB");
 
 function words(found) {
   if (found === "first") return ["Asking the service …"];
-  if (found === "paused") return [`Paused while this tab is hidden: the service was last heard ${heardAt ? `at ${clockText(heardAt)}` : "never"}.`];
+  if (found === "paused")
+    return [
+      `Paused while this tab is hidden: the service was last heard ${heardAt ? `at ${clockText(heardAt)}` : "never"}.`,
+    ];
   const service = heard === null ? "The service was not heard." : `Service last heard ${ago(elapsed())}.`;
-  if (found === "yes") return [h("strong", {}, "Stale. "), `${service} What is shown may no longer be so${heardAt ? `; it is of ${clockText(heardAt)}` : ""}.`];
-  if (found === "trouble") return [h("strong", {}, "Stale. "), `The service answers, but not with what this page shows: ${trouble}`];
+  if (found === "yes")
+    return [
+      h("strong", {}, "Stale. "),
+      `${service} What is shown may no longer be so${heardAt ? `; it is of ${clockText(heardAt)}` : ""}.`,
+    ];
+  if (found === "trouble")
+    return [h("strong", {}, "Stale. "), `The service answers, but not with what this page shows: ${trouble}`];
   const there = benchElapsed();
-  if (found === "bench") return [h("strong", {}, "Stale. "), `Bench last heard ${ago(there)}; the service answers. What is shown of the bench may no longer be so.`];
+  if (found === "bench")
+    return [
+      h("strong", {}, "Stale. "),
+      `Bench last heard ${ago(there)}; the service answers. What is shown of the bench may no longer be so.`,
+    ];
   return [there === null ? service : `Service last heard ${ago(elapsed())}, bench ${ago(there)}.`];
 }
 
@@ -78,7 +90,8 @@ function draw() {
   const root = document.documentElement;
   if (found === "no") delete root.dataset.stale;
   else root.dataset.stale = found === "paused" ? "paused" : found === "first" ? "first" : "yes";
-  if (["yes", "bench", "trouble"].includes(found)) announcement.textContent = "Stale: what is shown may no longer be so.";
+  if (["yes", "bench", "trouble"].includes(found))
+    announcement.textContent = "Stale: what is shown may no longer be so.";
   if (found === "no" && before !== null && before !== "first") {
     announcement.textContent = "The service answers again.";
     window.dispatchEvent(new CustomEvent("labctl:fresh"));
@@ -105,4 +118,10 @@ export function freshnessLine() {
 }
 
 /** Words about the present that are only shown while the page is fresh; a stale page says instead that it is not known. */
-export const presentWords = (fresh, stale = "Not known now: the bench or the service is not heard.") => h("span", { class: "present" }, h("span", { class: "present-fresh" }, fresh), h("span", { class: "present-stale" }, stale));
+export const presentWords = (fresh, stale = "Not known now: the bench or the service is not heard.") =>
+  h(
+    "span",
+    { class: "present" },
+    h("span", { class: "present-fresh" }, fresh),
+    h("span", { class: "present-stale" }, stale),
+  );

@@ -15,7 +15,20 @@ const NAVIGATION = [
   ["/effects", "Effects", "M5 4h11a3 3 0 013 3v13H8a3 3 0 01-3-3zM5 17a3 3 0 013-3h11"],
 ];
 
-const icon = (path) => svg("svg", { viewBox: "0 0 24 24", fill: "none", stroke: "currentColor", "stroke-width": "1.8", "stroke-linecap": "round", "stroke-linejoin": "round", "aria-hidden": "true" }, svg("path", { d: path }));
+const icon = (path) =>
+  svg(
+    "svg",
+    {
+      viewBox: "0 0 24 24",
+      fill: "none",
+      stroke: "currentColor",
+      "stroke-width": "1.8",
+      "stroke-linecap": "round",
+      "stroke-linejoin": "round",
+      "aria-hidden": "true",
+    },
+    svg("path", { d: path }),
+  );
 
 export function buildLayout() {
   const links = NAVIGATION.map(([path, name, drawing]) => h("a", { href: path }, icon(drawing), name));
@@ -27,7 +40,8 @@ export function buildLayout() {
     return [themes.at(-1), keys.at(-1)];
   };
   const name = () => {
-    for (const each of themes) setChildren(each, document.documentElement.dataset.theme === "dark" ? "Light colours" : "Dark colours");
+    for (const each of themes)
+      setChildren(each, document.documentElement.dataset.theme === "dark" ? "Light colours" : "Dark colours");
     for (const each of keys) setChildren(each, accessKey() ? "Forget the key" : "Use a key");
   };
 
@@ -48,7 +62,18 @@ export function buildLayout() {
     }
     if (asking) return null;
     asking = true;
-    const given = await dialog("This service asks for a key", [{ name: "key", label: "Key", type: "password", hint: "Made by `labctl key create`; kept in this tab until it is closed." }], { text: why, confirm: "Use it" });
+    const given = await dialog(
+      "This service asks for a key",
+      [
+        {
+          name: "key",
+          label: "Key",
+          type: "password",
+          hint: "Made by `labctl key create`; kept in this tab until it is closed.",
+        },
+      ],
+      { text: why, confirm: "Use it" },
+    );
     asking = false;
     if (!given) return null;
     setAccessKey(given.key.trim());
@@ -56,20 +81,33 @@ export function buildLayout() {
     return show();
   }
 
-  window.addEventListener("labctl:key", (event) => askKey(event.detail ?? "Reading asks for a viewer's key, acting for an operator's."));
-  window.addEventListener("labctl:moved", () => links.forEach((link) => {
-    const here = location.pathname === link.pathname || location.pathname.startsWith(`${link.pathname}/`);
-    here ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current");
-  }));
+  window.addEventListener("labctl:key", (event) =>
+    askKey(event.detail ?? "Reading asks for a viewer's key, acting for an operator's."),
+  );
+  window.addEventListener("labctl:moved", () =>
+    links.forEach((link) => {
+      const here = location.pathname === link.pathname || location.pathname.startsWith(`${link.pathname}/`);
+      here ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current");
+    }),
+  );
 
   document.body.append(
     h("a", { class: "skip-link", href: "#main" }, "To the page"),
-    h("div", { class: "sidebar" },
+    h(
+      "div",
+      { class: "sidebar" },
       h("a", { class: "brand", href: "/" }, h("img", { src: "/static/mark.svg", alt: "" }), "labctl"),
       h("nav", { "aria-label": "Pages" }, links),
-      h("div", { class: "sidebar-footer" }, controls())),
-    h("div", { class: "content" }, h("header", { class: "head" }, freshnessLine()), h("main", { id: "main", tabindex: "-1" })),
+      h("div", { class: "sidebar-footer" }, controls()),
+    ),
+    h(
+      "div",
+      { class: "content" },
+      h("header", { class: "head" }, freshnessLine()),
+      h("main", { id: "main", tabindex: "-1" }),
+    ),
     h("footer", { class: "page-footer" }, controls()),
-    h("div", { class: "toasts", "aria-live": "polite" }));
+    h("div", { class: "toasts", "aria-live": "polite" }),
+  );
   name();
 }

@@ -12,7 +12,9 @@ function matchRoute(path) {
   for (const { parts: pattern, load } of routes) {
     if (pattern.length !== parts.length) continue;
     const params = {};
-    const fits = pattern.every((part, k) => (part.startsWith(":") ? ((params[part.slice(1)] = parts[k]), true) : part === parts[k]));
+    const fits = pattern.every((part, k) =>
+      part.startsWith(":") ? ((params[part.slice(1)] = parts[k]), true) : part === parts[k],
+    );
     if (fits) return { load, params };
   }
   return null;
@@ -54,7 +56,8 @@ export async function show() {
     performance.mark("labctl:page"); // for the browser's own profiler, and benchmarks
     const heading = element.querySelector("h1");
     document.title = heading ? `${heading.textContent} · labctl` : "labctl";
-    if (navigated && (document.activeElement === document.body || main.contains(document.activeElement))) main.focus({ preventScroll: true });
+    if (navigated && (document.activeElement === document.body || main.contains(document.activeElement)))
+      main.focus({ preventScroll: true });
     navigated = true;
   } catch (error) {
     if (signal.aborted || error.name === "AbortError") return;
@@ -82,11 +85,28 @@ function scrollToAnchor(hash) {
 export function start() {
   document.addEventListener("click", (event) => {
     const link = event.target.closest?.("a[href]");
-    if (!link || event.defaultPrevented || event.button || event.metaKey || event.ctrlKey || event.shiftKey || link.download || link.target) return;
+    if (
+      !link ||
+      event.defaultPrevented ||
+      event.button ||
+      event.metaKey ||
+      event.ctrlKey ||
+      event.shiftKey ||
+      link.download ||
+      link.target
+    )
+      return;
     const url = new URL(link.href);
-    if (url.origin !== location.origin || url.pathname.startsWith("/api") || url.pathname.startsWith("/static") || !matchRoute(url.pathname)) return;
+    if (
+      url.origin !== location.origin ||
+      url.pathname.startsWith("/api") ||
+      url.pathname.startsWith("/static") ||
+      !matchRoute(url.pathname)
+    )
+      return;
     event.preventDefault();
-    if (url.hash && url.pathname === location.pathname && url.search === location.search) return scrollToAnchor(url.hash);
+    if (url.hash && url.pathname === location.pathname && url.search === location.search)
+      return scrollToAnchor(url.hash);
     navigate(url.pathname + url.search + url.hash).then(() => url.hash && scrollToAnchor(url.hash));
     window.scrollTo(0, 0);
   });

@@ -15,13 +15,25 @@ export async function postFit(path, body, confirm) {
     if (!error.type?.endsWith(":data-refused")) throw error;
     const answers = await dialog("The fit is refused", [], {
       text: "The calibration would be wrong. A version that is made anyway keeps these warnings.",
-      body: against(error), confirm, kind: "danger",
+      body: against(error),
+      confirm,
+      kind: "danger",
     });
     return answers && post(path, { ...body, accept_warnings: true });
   }
 }
 
 function against({ warnings, message }) {
-  const sentences = warnings?.length ? warnings.map((each) => `${each.severity === "certain" ? "Wrong" : "Check"}: ${each.text}`) : [message];
-  return notice("bad", h("p", {}, h("strong", {}, "This speaks against it:")), h("ul", { class: "plain" }, sentences.map((each) => h("li", {}, `${each}.`))));
+  const sentences = warnings?.length
+    ? warnings.map((each) => `${each.severity === "certain" ? "Wrong" : "Check"}: ${each.text}`)
+    : [message];
+  return notice(
+    "bad",
+    h("p", {}, h("strong", {}, "This speaks against it:")),
+    h(
+      "ul",
+      { class: "plain" },
+      sentences.map((each) => h("li", {}, `${each}.`)),
+    ),
+  );
 }

@@ -5,7 +5,14 @@ import { count, plainNumber } from "../core/format.js";
 /** Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length. */
 export function datasetRows(criticism, axis) {
   const sets = criticism.views.sets;
-  return { n: sets.dataset.length, dataset: sets.dataset, position: sets.position, channels: sets.channels, residual: sets.residual_dps[axis], score: sets.over_floor[axis] };
+  return {
+    n: sets.dataset.length,
+    dataset: sets.dataset,
+    position: sets.position,
+    channels: sets.channels,
+    residual: sets.residual_dps[axis],
+    score: sets.over_floor[axis],
+  };
 }
 
 export const axisNames = (criticism) => Object.keys(criticism.views.sets?.residual_dps ?? {});
@@ -41,17 +48,32 @@ export function fromRanges(text) {
   const found = new Set();
   for (const part of (text ?? "").split(",").filter(Boolean)) {
     const [from, to = from] = part.split("-").map(Number);
-    if (Number.isFinite(from) && Number.isFinite(to) && to - from < 100_000) for (let k = from; k <= to; k += 1) found.add(k);
+    if (Number.isFinite(from) && Number.isFinite(to) && to - from < 100_000)
+      for (let k = from; k <= to; k += 1) found.add(k);
   }
   return found;
 }
 
 export const UNITS = {
-  table_rate_dps: "deg/s", previous_rate_dps: "deg/s", temperature_c: "deg C", chamber_c: "deg C", t_s: "h", power_s: "h", supply_v: "V", humidity_pct: "%",
+  table_rate_dps: "deg/s",
+  previous_rate_dps: "deg/s",
+  temperature_c: "deg C",
+  chamber_c: "deg C",
+  t_s: "h",
+  power_s: "h",
+  supply_v: "V",
+  humidity_pct: "%",
 };
 const NAMES = {
-  table_rate_dps: "table rate", previous_rate_dps: "previous rate", temperature_c: "gyro temperature", chamber_c: "chamber temperature",
-  t_s: "time", power_s: "time since power-on", supply_v: "supply", humidity_pct: "humidity", order: "data sets in order",
+  table_rate_dps: "table rate",
+  previous_rate_dps: "previous rate",
+  temperature_c: "gyro temperature",
+  chamber_c: "chamber temperature",
+  t_s: "time",
+  power_s: "time since power-on",
+  supply_v: "supply",
+  humidity_pct: "humidity",
+  order: "data sets in order",
 };
 /** A channel's values in the unit that its title names: hours for times. */
 export const scaled = (name, values) => (UNITS[name] === "h" ? values.map((value) => value / 3600) : values);

@@ -13,21 +13,67 @@ const RAW_ERROR_RATIO = 10;
 export function ladderFigure(ladder) {
   const steps = ladder.steps;
   const x = steps.map((step) => `v${step.version}`);
-  const dwarfs = Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) > RAW_ERROR_RATIO * Math.max(...steps.map((step) => step.rms_dps ?? 0));
-  const line = (key, name, line, symbol) => ({ type: "scatter", mode: "lines+markers", name, x, y: steps.map((step) => step[key]), line, marker: { size: 9, symbol }, text: steps.map((step) => `${step.model}: ${step.effects.map(idText).join(", ")}`), hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>" });
+  const dwarfs =
+    Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) >
+    RAW_ERROR_RATIO * Math.max(...steps.map((step) => step.rms_dps ?? 0));
+  const line = (key, name, line, symbol) => ({
+    type: "scatter",
+    mode: "lines+markers",
+    name,
+    x,
+    y: steps.map((step) => step[key]),
+    line,
+    marker: { size: 9, symbol },
+    text: steps.map((step) => `${step.model}: ${step.effects.map(idText).join(", ")}`),
+    hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>",
+  });
   const draw = () => ({
     data: [
-      { ...line("raw_rms_dps", "as the unit is", { color: colour("border-strong"), dash: "dot" }, "diamond-open"), visible: dwarfs ? "legendonly" : true },
+      {
+        ...line("raw_rms_dps", "as the unit is", { color: colour("border-strong"), dash: "dot" }, "diamond-open"),
+        visible: dwarfs ? "legendonly" : true,
+      },
       line("rms_dps", "after the fit", { color: colour("accent"), width: 2.5 }, "circle"),
       line("heldout_rms_dps", "at unseen temperatures", { color: colour("warn"), width: 2.5 }, "square"),
     ],
     layout: {
-      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: "D2", tickformat: "~g" }, xaxis: { type: "category" },
-      shapes: ladder.noise_floor_dps ? [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: ladder.noise_floor_dps, y1: ladder.noise_floor_dps, line: { color: colour("good"), dash: "dash" } }] : [],
-      annotations: ladder.noise_floor_dps ? [{ xref: "paper", x: 0.01, y: Math.log10(ladder.noise_floor_dps), text: "noise floor", showarrow: false, xanchor: "left", yanchor: "bottom", font: { color: colour("good"), size: 12 } }] : [],
+      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: "D2", tickformat: "~g" },
+      xaxis: { type: "category" },
+      shapes: ladder.noise_floor_dps
+        ? [
+            {
+              type: "line",
+              xref: "paper",
+              x0: 0,
+              x1: 1,
+              y0: ladder.noise_floor_dps,
+              y1: ladder.noise_floor_dps,
+              line: { color: colour("good"), dash: "dash" },
+            },
+          ]
+        : [],
+      annotations: ladder.noise_floor_dps
+        ? [
+            {
+              xref: "paper",
+              x: 0.01,
+              y: Math.log10(ladder.noise_floor_dps),
+              text: "noise floor",
+              showarrow: false,
+              xanchor: "left",
+              yanchor: "bottom",
+              font: { color: colour("good"), size: 12 },
+            },
+          ]
+        : [],
     },
   });
-  return figure("Error ladder", `The versions fitted to recording ${ladder.recording}: each one's RMS error on that data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.`, draw, { height: "19rem" });
+  return figure(
+    "Error ladder",
+    `The versions fitted to recording ${ladder.recording}: each one's RMS error on that data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.`,
+    draw,
+    { height: "19rem" },
+  );
 }
 
 export function errorLadder(state, signal) {
@@ -42,25 +88,75 @@ export function errorLadder(state, signal) {
   });
 
   async function faded(parent) {
-    const before = await get(`${base}/calibrations/${parent}/criticism`, { query: { recording: state.recording }, signal });
+    const before = await get(`${base}/calibrations/${parent}/criticism`, {
+      query: { recording: state.recording },
+      signal,
+    });
     const pair = () => [mapsOf(before, state.axis), mapsOf(state.criticism, state.axis)];
-    const one = (k, name) => residualMap(name, null, () => ({ maps: pair()[k], limit: colourLimit(...pair()) }), { pickable: false, height: "16rem" });
+    const one = (k, name) =>
+      residualMap(name, null, () => ({ maps: pair()[k], limit: colourLimit(...pair()) }), {
+        pickable: false,
+        height: "16rem",
+      });
     const both = [one(0, `Version ${parent}`), one(1, `Version ${state.version}`)];
     state.onchange((what) => what === "axis" && both.forEach((each) => each.redraw()));
-    return h("div", { class: "columns" }, both.map((each, k) => h("div", {}, h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`), each)));
+    return h(
+      "div",
+      { class: "columns" },
+      both.map((each, k) =>
+        h(
+          "div",
+          {},
+          h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`),
+          each,
+        ),
+      ),
+    );
   }
 
   return cardWithHeader("Watch the error fall", null, place);
 }
 
 function versionTable(ladder, state) {
-  return table([
-    { title: "Version", cell: (step) => (step.version === state.version ? h("strong", {}, `${step.version}`) : h("a", { href: `/explore?unit=${encodeURIComponent(state.serial)}&version=${step.version}` }, `${step.version}`)) },
-    { title: "Model", cell: (step) => h("span", {}, modelName(step.model), h("span", { class: "muted small" }, step.parent ? ` from version ${step.parent}` : "")) },
-    { title: "Effects", cell: (step) => step.effects.map(idText).join(", ") },
-    { title: "Recording", number: true, cell: (step) => `${step.recording ?? "–"}` },
-    { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
-    { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
-    ...(ladder.others.length ? [{ title: `As it is on recording ${ladder.recording}, deg/s`, number: true, cell: (step) => number(step.applied_rms_dps ?? (step.recording === ladder.recording ? step.rms_dps : null)) }] : []),
-  ], [...ladder.steps, ...ladder.others], { label: "Versions", selected: (step) => step.version === state.version });
+  return table(
+    [
+      {
+        title: "Version",
+        cell: (step) =>
+          step.version === state.version
+            ? h("strong", {}, `${step.version}`)
+            : h(
+                "a",
+                { href: `/explore?unit=${encodeURIComponent(state.serial)}&version=${step.version}` },
+                `${step.version}`,
+              ),
+      },
+      {
+        title: "Model",
+        cell: (step) =>
+          h(
+            "span",
+            {},
+            modelName(step.model),
+            h("span", { class: "muted small" }, step.parent ? ` from version ${step.parent}` : ""),
+          ),
+      },
+      { title: "Effects", cell: (step) => step.effects.map(idText).join(", ") },
+      { title: "Recording", number: true, cell: (step) => `${step.recording ?? "–"}` },
+      { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
+      { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
+      ...(ladder.others.length
+        ? [
+            {
+              title: `As it is on recording ${ladder.recording}, deg/s`,
+              number: true,
+              cell: (step) =>
+                number(step.applied_rms_dps ?? (step.recording === ladder.recording ? step.rms_dps : null)),
+            },
+          ]
+        : []),
+    ],
+    [...ladder.steps, ...ladder.others],
+    { label: "Versions", selected: (step) => step.version === state.version },
+  );
 }

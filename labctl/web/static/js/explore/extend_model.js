@@ -4,13 +4,27 @@ import { post } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";
-import { button, fitWarnings, selectField, labelledField, cardWithHeader, notice, table, toast } from "../core/components.js";
+import {
+  button,
+  fitWarnings,
+  selectField,
+  labelledField,
+  cardWithHeader,
+  notice,
+  table,
+  toast,
+} from "../core/components.js";
 import { navigate } from "../core/router.js";
 import { postFit } from "./accept_warnings.js";
 import { selectedRows } from "./residual_map.js";
 import { shownText } from "./dataset_rows.js";
 
-const ERRORS = [["raw_rms_dps", "As the unit is"], ["rms_dps", "Left after the fit"], ["heldout_rms_dps", "At unseen temperatures"], ["noise_floor_dps", "Noise floor"]];
+const ERRORS = [
+  ["raw_rms_dps", "As the unit is"],
+  ["rms_dps", "Left after the fit"],
+  ["heldout_rms_dps", "At unseen temperatures"],
+  ["noise_floor_dps", "Noise floor"],
+];
 
 /** Return {element, put(effect)}: `put` adds an effect to the change and previews it. */
 export function extendModel(state, path, effects) {
@@ -18,16 +32,63 @@ export function extendModel(state, path, effects) {
   const has = state.calibration.model.effects;
   const chosen = h("div", { class: "row", "aria-live": "polite" });
   const result = h("div", { class: "stack" });
-  const formula = h("input", { placeholder: "wet_scale: (humidity_pct - 40) * rate_dps", oninput: () => { change.formula = formula.value.trim(); stale(); } });
-  const pick = selectField("Add an effect", [["", "choose one"], ...effects.filter((e) => !has.includes(e.id)).map((e) => [e.id, idText(e.id)])], "", (value) => { if (value) { change.add.add(value); show(); } });
-  const drop = selectField("Take one out", [["", "choose one"], ...has.map((id) => [id, idText(id)])], "", (value) => { if (value) { change.remove.add(value); show(); } });
+  const formula = h("input", {
+    placeholder: "wet_scale: (humidity_pct - 40) * rate_dps",
+    oninput: () => {
+      change.formula = formula.value.trim();
+      stale();
+    },
+  });
+  const pick = selectField(
+    "Add an effect",
+    [["", "choose one"], ...effects.filter((e) => !has.includes(e.id)).map((e) => [e.id, idText(e.id)])],
+    "",
+    (value) => {
+      if (value) {
+        change.add.add(value);
+        show();
+      }
+    },
+  );
+  const drop = selectField("Take one out", [["", "choose one"], ...has.map((id) => [id, idText(id)])], "", (value) => {
+    if (value) {
+      change.remove.add(value);
+      show();
+    }
+  });
 
-  const tag = (set, id, sign) => h("button", { type: "button", class: "chip accent", "aria-label": `leave ${idText(id)} as it is`, onclick: () => { set.delete(id); show(); } }, `${sign} ${idText(id)} ✕`);
-  const body = () => ({ add: [...change.add], remove: [...change.remove], formula: change.formula ? [change.formula] : [], recording: state.recording });
+  const tag = (set, id, sign) =>
+    h(
+      "button",
+      {
+        type: "button",
+        class: "chip accent",
+        "aria-label": `leave ${idText(id)} as it is`,
+        onclick: () => {
+          set.delete(id);
+          show();
+        },
+      },
+      `${sign} ${idText(id)} ✕`,
+    );
+  const body = () => ({
+    add: [...change.add],
+    remove: [...change.remove],
+    formula: change.formula ? [change.formula] : [],
+    recording: state.recording,
+  });
   const isEmpty = () => !change.add.size && !change.remove.size && !change.formula;
-  const stale = () => setChildren(result, isEmpty() ? h("p", { class: "muted small" }, "Choose what to change, or press Add at a suspect.") : null);
+  const stale = () =>
+    setChildren(
+      result,
+      isEmpty() ? h("p", { class: "muted small" }, "Choose what to change, or press Add at a suspect.") : null,
+    );
   const show = () => {
-    setChildren(chosen, [...change.add].map((id) => tag(change.add, id, "+")), [...change.remove].map((id) => tag(change.remove, id, "–")));
+    setChildren(
+      chosen,
+      [...change.add].map((id) => tag(change.add, id, "+")),
+      [...change.remove].map((id) => tag(change.remove, id, "–")),
+    );
     stale();
   };
 
@@ -39,17 +100,37 @@ export function extendModel(state, path, effects) {
   function shown(found) {
     const floor = found.error.noise_floor_dps;
     return [
-      table([
-        { title: "deg/s", cell: ([, title]) => title },
-        { title: `Version ${state.version}`, number: true, cell: ([key]) => number(found.before[key]) },
-        { title: "Changed", number: true, cell: ([key]) => h("strong", {}, number(found.error[key])) },
-        { title: "", cell: ([key]) => (key === "rms_dps" || key === "heldout_rms_dps" ? relativeChange(found.before[key], found.error[key]) : null) },
-      ], ERRORS, { label: "Errors before and after" }),
+      table(
+        [
+          { title: "deg/s", cell: ([, title]) => title },
+          { title: `Version ${state.version}`, number: true, cell: ([key]) => number(found.before[key]) },
+          { title: "Changed", number: true, cell: ([key]) => h("strong", {}, number(found.error[key])) },
+          {
+            title: "",
+            cell: ([key]) =>
+              key === "rms_dps" || key === "heldout_rms_dps"
+                ? relativeChange(found.before[key], found.error[key])
+                : null,
+          },
+        ],
+        ERRORS,
+        { label: "Errors before and after" },
+      ),
       fitWarnings(found),
       residualFigure(state, found, floor),
       plausibility(state, found, change),
-      found.left_out.length ? notice("", `Fitted, but not exported with the calibration: ${found.left_out.map((line) => `${idText(line.effect)} (${line.origin ?? "bench"})`).join(", ")}.`) : null,
-      h("div", { class: "row" }, button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }), h("span", { class: "muted small" }, "Versions are never changed; this one stays as it is.")),
+      found.left_out.length
+        ? notice(
+            "",
+            `Fitted, but not exported with the calibration: ${found.left_out.map((line) => `${idText(line.effect)} (${line.origin ?? "bench"})`).join(", ")}.`,
+          )
+        : null,
+      h(
+        "div",
+        { class: "row" },
+        button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }),
+        h("span", { class: "muted small" }, "Versions are never changed; this one stays as it is."),
+      ),
     ];
   }
 
@@ -57,20 +138,45 @@ export function extendModel(state, path, effects) {
     const made = await postFit(`${path}/improve`, body(), "Make version anyway");
     if (!made) return;
     toast("good", `Version ${made.version} of ${state.serial} is made.`);
-    await navigate(`/explore?unit=${encodeURIComponent(state.serial)}&version=${made.version}&recording=${state.recording}&axis=${state.axis}#watch`);
+    await navigate(
+      `/explore?unit=${encodeURIComponent(state.serial)}&version=${made.version}&recording=${state.recording}&axis=${state.axis}#watch`,
+    );
   }
 
   show();
-  const element = cardWithHeader("Add it", null,
-    h("div", { class: "columns", style: "--column-min: 14rem" }, pick, drop, labelledField("A formula of your own", formula, "name: expression over channels")),
-    chosen, h("div", { class: "row" }, button("Preview", preview, { kind: "primary" })), result);
-  return { element, put: async (effect) => { change.add.add(effect); show(); element.scrollIntoView({ behavior: "smooth", block: "start" }); await preview(); } };
+  const element = cardWithHeader(
+    "Add it",
+    null,
+    h(
+      "div",
+      { class: "columns", style: "--column-min: 14rem" },
+      pick,
+      drop,
+      labelledField("A formula of your own", formula, "name: expression over channels"),
+    ),
+    chosen,
+    h("div", { class: "row" }, button("Preview", preview, { kind: "primary" })),
+    result,
+  );
+  return {
+    element,
+    put: async (effect) => {
+      change.add.add(effect);
+      show();
+      element.scrollIntoView({ behavior: "smooth", block: "start" });
+      await preview();
+    },
+  };
 }
 
 function relativeChange(before, after) {
   if (!before || !after) return null;
   const share = after / before - 1;
-  return h("span", { class: share < -0.02 ? "good-text" : share > 0.02 ? "bad-text" : "muted" }, `${share < 0 ? "–" : "+"}${Math.abs(Math.round(100 * share))} %`);
+  return h(
+    "span",
+    { class: share < -0.02 ? "good-text" : share > 0.02 ? "bad-text" : "muted" },
+    `${share < 0 ? "–" : "+"}${Math.abs(Math.round(100 * share))} %`,
+  );
 }
 
 /** The values of an axis in the order of the criticism's data sets. */
@@ -84,11 +190,36 @@ function residualFigure(state, found, floor) {
     const rows = selectedRows(state);
     const x = rows.channels.table_rate_dps;
     const after = inDatasetOrder(state, found.residuals, "residual_dps");
-    const dots = (y, name, marker) => ({ type: "scatter", mode: "markers", name, x, y, marker, customdata: rows.dataset, hovertemplate: `data set %{customdata}<br>%{x:.5g} deg/s: %{y:.3g} deg/s<extra>${name}</extra>` });
-    const line = (y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: colour("border-strong"), dash: "dash", width: 1 } });
+    const dots = (y, name, marker) => ({
+      type: "scatter",
+      mode: "markers",
+      name,
+      x,
+      y,
+      marker,
+      customdata: rows.dataset,
+      hovertemplate: `data set %{customdata}<br>%{x:.5g} deg/s: %{y:.3g} deg/s<extra>${name}</extra>`,
+    });
+    const line = (y) => ({
+      type: "line",
+      xref: "paper",
+      x0: 0,
+      x1: 1,
+      y0: y,
+      y1: y,
+      line: { color: colour("border-strong"), dash: "dash", width: 1 },
+    });
     return {
-      data: [dots(rows.residual, "before", { size: 5, color: colour("border-strong"), symbol: "circle-open" }), dots(after, "after", { size: 6, color: axisColour(state.axis) })],
-      layout: { title: shownText(state.criticism) ? { text: shownText(state.criticism), font: { size: 11 } } : undefined, xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: "residual, deg/s" } }, shapes: floor ? [line(2 * floor), line(-2 * floor)] : [] },
+      data: [
+        dots(rows.residual, "before", { size: 5, color: colour("border-strong"), symbol: "circle-open" }),
+        dots(after, "after", { size: 6, color: axisColour(state.axis) }),
+      ],
+      layout: {
+        title: shownText(state.criticism) ? { text: shownText(state.criticism), font: { size: 11 } } : undefined,
+        xaxis: { title: { text: "table rate, deg/s" } },
+        yaxis: { title: { text: "residual, deg/s" } },
+        shapes: floor ? [line(2 * floor), line(-2 * floor)] : [],
+      },
     };
   };
   return figure("Residual before and after", "Dashed: two noise floors.", draw, { height: "18rem" });
@@ -99,6 +230,21 @@ function plausibility(state, found, change) {
   const added = [...change.add].map((id) => id.split(":")[0]);
   if (!own || !added.length) return null;
   const ranges = added.map((id) => [id, found.plausible[id]]).filter(([, range]) => range);
-  return ranges.length ? h("ul", { class: "plain" }, ranges.map(([id, range]) =>
-    h("li", {}, `${idText(id)}: `, range.inside ? h("span", { class: "good-text" }, "of a usual size") : h("span", { class: "bad-text" }, "larger than is usual"), h("span", { class: "muted" }, ` (${number(range.from, 2)} to ${number(range.to, 2)})`)))) : null;
+  return ranges.length
+    ? h(
+        "ul",
+        { class: "plain" },
+        ranges.map(([id, range]) =>
+          h(
+            "li",
+            {},
+            `${idText(id)}: `,
+            range.inside
+              ? h("span", { class: "good-text" }, "of a usual size")
+              : h("span", { class: "bad-text" }, "larger than is usual"),
+            h("span", { class: "muted" }, ` (${number(range.from, 2)} to ${number(range.to, 2)})`),
+          ),
+        ),
+      )
+    : null;
 }

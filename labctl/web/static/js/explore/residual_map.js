@@ -17,7 +17,9 @@ export const mapsOf = (criticism, axis) => criticism.maps.filter((map) => map.ax
 
 /** End of the colour scale: the largest residual over floor of several lists of maps, clipped to LIMITS. */
 export function colourLimit(...all) {
-  const largest = all.flat().reduce((most, map) => map.over_floor.reduce((m, score) => Math.max(m, Math.abs(score)), most), 0);
+  const largest = all
+    .flat()
+    .reduce((most, map) => map.over_floor.reduce((m, score) => Math.max(m, Math.abs(score)), most), 0);
   return Math.min(Math.max(largest, LIMITS[0]), LIMITS[1]);
 }
 
@@ -34,7 +36,9 @@ function mapCells(map) {
   const found = new Map();
   map.dataset.forEach((set, k) => {
     const [rate, warm] = [map.rate_level_dps[k], map.temperature_level_c[k]];
-    const cell = found.get(`${rate} ${warm}`) ?? found.set(`${rate} ${warm}`, { rate, warm, sum: 0, sets: [] }).get(`${rate} ${warm}`);
+    const cell =
+      found.get(`${rate} ${warm}`) ??
+      found.set(`${rate} ${warm}`, { rate, warm, sum: 0, sets: [] }).get(`${rate} ${warm}`);
     cell.sum += map.over_floor[k];
     cell.sets.push(set);
   });
@@ -43,7 +47,8 @@ function mapCells(map) {
 }
 
 const isDim = (cell) => Math.abs(cell.mean) * Math.sqrt(cell.sets.length) < DIMMED_BELOW;
-const cellText = (cell, position) => `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.warm)} deg C, ${position} up<br>${number(cell.mean, 2)} floors<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
+const cellText = (cell, position) =>
+  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.warm)} deg C, ${position} up<br>${number(cell.mean, 2)} floors<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
 
 /** Cells as a grid, with a faded layer over those within the noise. */
 function gridTraces({ rates, warm, cells }, position, shared) {
@@ -62,8 +67,27 @@ function gridTraces({ rates, warm, cells }, position, shared) {
   const heat = { type: "heatmap", ...shared, x: labels[0], y: labels[1], xgap: 1, ygap: 1 };
   return {
     traces: [
-      { ...heat, z, customdata: sets, text: texts, hovertemplate: "%{text}<extra></extra>", coloraxis: "coloraxis", name: `${position} up` },
-      { ...heat, z: dim, colorscale: [[0, shade], [1, shade]], opacity: 0.6, showscale: false, hoverinfo: "skip", name: "within noise" },
+      {
+        ...heat,
+        z,
+        customdata: sets,
+        text: texts,
+        hovertemplate: "%{text}<extra></extra>",
+        coloraxis: "coloraxis",
+        name: `${position} up`,
+      },
+      {
+        ...heat,
+        z: dim,
+        colorscale: [
+          [0, shade],
+          [1, shade],
+        ],
+        opacity: 0.6,
+        showscale: false,
+        hoverinfo: "skip",
+        name: "within noise",
+      },
     ],
     x: { type: "category", categoryorder: "array", categoryarray: labels[0] },
     y: { type: "category", categoryorder: "array", categoryarray: labels[1] },
@@ -74,11 +98,29 @@ function gridTraces({ rates, warm, cells }, position, shared) {
 function scatteredTraces({ cells }, position, shared) {
   for (const cell of cells) Object.assign(cell, { x: cell.rate, y: cell.warm });
   return {
-    traces: [{
-      type: "scatter", mode: "markers", ...shared, name: `${position} up`, showlegend: false, x: cells.map((cell) => cell.x), y: cells.map((cell) => cell.y), customdata: cells.map((cell) => cell.sets), text: cells.map((cell) => cellText(cell, position)), hovertemplate: "%{text}<extra></extra>",
-      marker: { symbol: "square", size: 9, color: cells.map((cell) => cell.mean), coloraxis: "coloraxis", opacity: cells.map((cell) => (isDim(cell) ? 0.35 : 1)) },
-    }],
-    x: {}, y: {},
+    traces: [
+      {
+        type: "scatter",
+        mode: "markers",
+        ...shared,
+        name: `${position} up`,
+        showlegend: false,
+        x: cells.map((cell) => cell.x),
+        y: cells.map((cell) => cell.y),
+        customdata: cells.map((cell) => cell.sets),
+        text: cells.map((cell) => cellText(cell, position)),
+        hovertemplate: "%{text}<extra></extra>",
+        marker: {
+          symbol: "square",
+          size: 9,
+          color: cells.map((cell) => cell.mean),
+          coloraxis: "coloraxis",
+          opacity: cells.map((cell) => (isDim(cell) ? 0.35 : 1)),
+        },
+      },
+    ],
+    x: {},
+    y: {},
   };
 }
 
@@ -89,12 +131,26 @@ function positionPanel(map, id, pick) {
   const filled = found.cells.length >= LEAST_FILLED * found.rates.length * found.warm.length;
   const { traces, x, y } = (filled ? gridTraces : scatteredTraces)(found, map.position, shared);
   const mark = (which, marker, name) => ({
-    type: "scatter", mode: "markers", name, ...shared, showlegend: false, marker,
-    x: which.map((cell) => cell.x), y: which.map((cell) => cell.y), customdata: which.map((cell) => cell.sets), hoverinfo: "skip", selected: { marker: { opacity: marker.opacity ?? 1 } }, unselected: { marker: { opacity: marker.opacity ?? 1 } },
+    type: "scatter",
+    mode: "markers",
+    name,
+    ...shared,
+    showlegend: false,
+    marker,
+    x: which.map((cell) => cell.x),
+    y: which.map((cell) => cell.y),
+    customdata: which.map((cell) => cell.sets),
+    hoverinfo: "skip",
+    selected: { marker: { opacity: marker.opacity ?? 1 } },
+    unselected: { marker: { opacity: marker.opacity ?? 1 } },
   });
   const picked = found.cells.filter((cell) => cell.sets.some((set) => pick.has(set)));
   return {
-    data: [...traces, mark(found.cells, { size: 18, opacity: 0.01, symbol: "square" }, "cells"), mark(picked, { size: 13, symbol: "square-open", color: colour("text"), line: { width: 2.5 } }, "picked")],
+    data: [
+      ...traces,
+      mark(found.cells, { size: 18, opacity: 0.01, symbol: "square" }, "cells"),
+      mark(picked, { size: 13, symbol: "square-open", color: colour("text"), line: { width: 2.5 } }, "picked"),
+    ],
     x: { ...x, showgrid: false, title: { text: "table rate, deg/s" } },
     y: { ...y, showgrid: false, title: id === "" ? { text: "deg C" } : undefined },
     text: `${map.position} up: ${map.dataset.length} data sets${found.cells.length < map.dataset.length ? ` in ${found.cells.length} cells` : ""}`,
@@ -106,17 +162,39 @@ export function residualMap(name, caption, give, { pickable = true, height = "22
   const draw = () => {
     const { maps, limit, pick = new Set() } = give();
     const several = maps.length > 1;
-    const layout = { margin: { l: 52, r: 8, t: 28, b: 46 }, dragmode: pickable ? "select" : false, coloraxis: { colorscale: DIVERGING, cmin: -limit, cmax: limit, colorbar: { title: { text: "floors" }, thickness: 12, outlinewidth: 0 } } };
+    const layout = {
+      margin: { l: 52, r: 8, t: 28, b: 46 },
+      dragmode: pickable ? "select" : false,
+      coloraxis: {
+        colorscale: DIVERGING,
+        cmin: -limit,
+        cmax: limit,
+        colorbar: { title: { text: "floors" }, thickness: 12, outlinewidth: 0 },
+      },
+    };
     const below = several && window.innerWidth < 760;
     if (below) layout.height = maps.length * PANEL_PX;
-    if (several) layout.grid = below ? { rows: maps.length, columns: 1, pattern: "independent", ygap: 0.4 } : { rows: 1, columns: maps.length, pattern: "independent", xgap: 0.14 };
+    if (several)
+      layout.grid = below
+        ? { rows: maps.length, columns: 1, pattern: "independent", ygap: 0.4 }
+        : { rows: 1, columns: maps.length, pattern: "independent", xgap: 0.14 };
     layout.annotations = [];
     const data = maps.flatMap((map, k) => {
       const id = k ? String(k + 1) : "";
       const { data: traces, x, y, text } = positionPanel(map, id, pick);
       layout[`xaxis${id}`] = below && k < maps.length - 1 ? { ...x, title: undefined } : x; // one title for all panels
       layout[`yaxis${id}`] = y;
-      layout.annotations.push({ text, showarrow: false, xref: `x${id} domain`, yref: `y${id} domain`, x: 0, y: 1.02, xanchor: "left", yanchor: "bottom", font: { size: 12 } });
+      layout.annotations.push({
+        text,
+        showarrow: false,
+        xref: `x${id} domain`,
+        yref: `y${id} domain`,
+        x: 0,
+        y: 1.02,
+        xanchor: "left",
+        yanchor: "bottom",
+        font: { size: 12 },
+      });
       return traces;
     });
     return { data, layout };

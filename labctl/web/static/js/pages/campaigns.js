@@ -18,8 +18,20 @@ export async function page({ signal }) {
   const ask = () => Promise.all(["/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })));
   async function show() {
     const [campaigns, schedule] = await ask();
-    setChildren(place, schedule.length ? scheduleCard(schedule, show) : null,
-      cardWithHeader(campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`, null, campaigns.length ? campaignTable(campaigns) : emptyState(h("p", {}, "No campaign has been run yet."), h("p", {}, linkButton("Plan the first", "/campaigns/new", "primary")))));
+    setChildren(
+      place,
+      schedule.length ? scheduleCard(schedule, show) : null,
+      cardWithHeader(
+        campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`,
+        null,
+        campaigns.length
+          ? campaignTable(campaigns)
+          : emptyState(
+              h("p", {}, "No campaign has been run yet."),
+              h("p", {}, linkButton("Plan the first", "/campaigns/new", "primary")),
+            ),
+      ),
+    );
     return campaigns.some(isRunning);
   }
   let moving = await show();
@@ -34,34 +46,151 @@ export async function page({ signal }) {
   }, POLL_MS);
   signal.addEventListener("abort", () => clearInterval(looking));
   window.addEventListener("labctl:fresh", () => show().catch(() => {}), { signal });
-  return h("div", { class: "page" }, pageHeader("Campaigns", "One run of a recipe on a bench.", linkButton("Plan a campaign", "/campaigns/new", "primary")), place);
+  return h(
+    "div",
+    { class: "page" },
+    pageHeader(
+      "Campaigns",
+      "One run of a recipe on a bench.",
+      linkButton("Plan a campaign", "/campaigns/new", "primary"),
+    ),
+    place,
+  );
 }
 
 function campaignTable(rows) {
-  return table([
-    { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "muted small secondary" }, `${row.recipe} on ${row.bench}`)] },
-    { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.state !== "running" && row.reason ? h("span", { class: "muted small secondary two-lines", title: row.reason }, row.reason) : null] },
-    { title: "Progress", cell: (row) => h("div", { class: "progress-cell" }, h("div", { class: "meter", role: "img", "aria-label": percent(row.progress) }, h("i", { style: `width: ${100 * row.progress}%` })), h("span", { class: "small" }, percent(row.progress))) },
-    { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, campaignInstant(row, row.started_at)), h("span", { class: "muted small secondary nowrap" }, isRunning(row) ? `ends ${campaignInstant(row, row.expected_end)}` : durationTaken(row))] },
-    { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("div", {}, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), h("span", { class: "small secondary" }, h("a", { href: `/recordings/${recording}` }, `Recording ${recording}`)))) },
-  ], rows, { label: "Every campaign", first: "8rem" });
+  return table(
+    [
+      {
+        title: "Campaign",
+        cell: (row) => [
+          h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`),
+          h("span", { class: "muted small secondary" }, `${row.recipe} on ${row.bench}`),
+        ],
+      },
+      {
+        title: "State",
+        cell: (row) => [
+          stateChip(row),
+          row.state !== "done" && row.state !== "running" && row.reason
+            ? h("span", { class: "muted small secondary two-lines", title: row.reason }, row.reason)
+            : null,
+        ],
+      },
+      {
+        title: "Progress",
+        cell: (row) =>
+          h(
+            "div",
+            { class: "progress-cell" },
+            h(
+              "div",
+              { class: "meter", role: "img", "aria-label": percent(row.progress) },
+              h("i", { style: `width: ${100 * row.progress}%` }),
+            ),
+            h("span", { class: "small" }, percent(row.progress)),
+          ),
+      },
+      {
+        title: "Begun",
+        cell: (row) => [
+          h("span", { class: "nowrap" }, campaignInstant(row, row.started_at)),
+          h(
+            "span",
+            { class: "muted small secondary nowrap" },
+            isRunning(row) ? `ends ${campaignInstant(row, row.expected_end)}` : durationTaken(row),
+          ),
+        ],
+      },
+      {
+        title: "Units and recordings",
+        cell: (row) =>
+          Object.entries(row.recordings).map(([serial, recording]) =>
+            h(
+              "div",
+              {},
+              h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial),
+              h(
+                "span",
+                { class: "small secondary" },
+                h("a", { href: `/recordings/${recording}` }, `Recording ${recording}`),
+              ),
+            ),
+          ),
+      },
+    ],
+    rows,
+    { label: "Every campaign", first: "8rem" },
+  );
 }
 
 const OUTCOMES = { started: "good", refused: "bad", missed: "warn", claimed: "accent" };
 
 function scheduleCard(rows, again) {
-  const came = (event) => h("span", { class: "small secondary" }, chip(event.outcome, OUTCOMES[event.outcome] ?? ""), ` ${instant(event.at)} `, event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message);
-  return card("Schedule", table([
-    { title: "Begins", cell: (row) => [startTime(row), row.confirmed_by ? h("span", { class: "muted small secondary" }, `${row.confirmed_by} makes sure that the bench is clear`) : null] },
-    ...(rows.some((row) => row.attendance) ? [{ title: "Needs a person", prose: true, cell: (row) => (row.attendance ? attendanceNotice(row.attendance) : h("span", { class: "muted" }, "no")) }] : []),
-    { title: "Recipe", cell: (row) => [row.recipe, row.clip ? h("span", { class: "muted small secondary" }, "without what the bench cannot do") : null] },
-    { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
-    { title: "Priority", number: true, cell: (row) => row.priority },
-    { title: "May be late by", number: true, cell: (row) => (row.late_limit_s === null ? "any time" : duration(row.late_limit_s)) },
-    { title: "Before", cell: (row) => (row.history.length ? row.history.slice(-2).map(came) : h("span", { class: "muted" }, "–")) },
-    { title: h("span", { class: "visually-hidden" }, "Cancel"), cell: (row) => button("Cancel", async () => {
-      await remove(`/api/schedule/${row.id}`);
-      await again();
-    }, { kind: "tiny", done: "Taken out of the schedule." }) },
-  ], rows, { label: "What begins when", first: "9rem" }));
+  const came = (event) =>
+    h(
+      "span",
+      { class: "small secondary" },
+      chip(event.outcome, OUTCOMES[event.outcome] ?? ""),
+      ` ${instant(event.at)} `,
+      event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message,
+    );
+  return card(
+    "Schedule",
+    table(
+      [
+        {
+          title: "Begins",
+          cell: (row) => [
+            startTime(row),
+            row.confirmed_by
+              ? h("span", { class: "muted small secondary" }, `${row.confirmed_by} makes sure that the bench is clear`)
+              : null,
+          ],
+        },
+        ...(rows.some((row) => row.attendance)
+          ? [
+              {
+                title: "Needs a person",
+                prose: true,
+                cell: (row) =>
+                  row.attendance ? attendanceNotice(row.attendance) : h("span", { class: "muted" }, "no"),
+              },
+            ]
+          : []),
+        {
+          title: "Recipe",
+          cell: (row) => [
+            row.recipe,
+            row.clip ? h("span", { class: "muted small secondary" }, "without what the bench cannot do") : null,
+          ],
+        },
+        { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
+        { title: "Priority", number: true, cell: (row) => row.priority },
+        {
+          title: "May be late by",
+          number: true,
+          cell: (row) => (row.late_limit_s === null ? "any time" : duration(row.late_limit_s)),
+        },
+        {
+          title: "Before",
+          cell: (row) => (row.history.length ? row.history.slice(-2).map(came) : h("span", { class: "muted" }, "–")),
+        },
+        {
+          title: h("span", { class: "visually-hidden" }, "Cancel"),
+          cell: (row) =>
+            button(
+              "Cancel",
+              async () => {
+                await remove(`/api/schedule/${row.id}`);
+                await again();
+              },
+              { kind: "tiny", done: "Taken out of the schedule." },
+            ),
+        },
+      ],
+      rows,
+      { label: "What begins when", first: "9rem" },
+    ),
+  );
 }

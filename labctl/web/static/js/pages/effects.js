@@ -10,6 +10,7 @@ export async function page({ params, query, signal }) {
   catalogue ??= (await get("/api/effects", { signal })).effects;
   if (!params.id) return effectList(catalogue, query);
   const effect = catalogue.find((each) => each.id === params.id);
-  if (!effect) throw new Problem({ title: "No such effect", detail: `The catalogue has no effect ${params.id}.`, status: 404 });
+  if (!effect)
+    throw new Problem({ title: "No such effect", detail: `The catalogue has no effect ${params.id}.`, status: 404 });
   return effectDetail(effect, catalogue);
 }

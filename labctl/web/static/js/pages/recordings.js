@@ -16,11 +16,16 @@ export async function page({ query, signal }) {
   const choose = h("div", {});
   function show() {
     const units = [...new Set(rows.map((row) => row.serial))].sort();
-    setChildren(choose, units.length > 1 ? selectField("Unit", [["", "all units"], ...units.map((serial) => [serial, serial])], unit, (value) => {
-      unit = value;
-      updateQuery({ unit });
-      show();
-    }) : null);
+    setChildren(
+      choose,
+      units.length > 1
+        ? selectField("Unit", [["", "all units"], ...units.map((serial) => [serial, serial])], unit, (value) => {
+            unit = value;
+            updateQuery({ unit });
+            show();
+          })
+        : null,
+    );
     const shown = rows.filter((row) => !unit || row.serial === unit);
     setChildren(list, shown.length ? recordingTable(shown) : noRecordings());
   }
@@ -29,24 +34,73 @@ export async function page({ query, signal }) {
     rows = await get("/api/recordings", { signal });
     show();
   };
-  return h("div", { class: "page" }, pageHeader("Recordings", "All data sets of one unit in one campaign, or brought in as files."),
+  return h(
+    "div",
+    { class: "page" },
+    pageHeader("Recordings", "All data sets of one unit in one campaign, or brought in as files."),
     importForm(taken),
-    cardWithHeader(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list));
+    cardWithHeader(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list),
+  );
 }
 
 const KINDS = { samples: "every reading", points: "means", coefficients: "a published table" };
 
 function recordingTable(rows) {
-  return table([
-    { title: "Recording", cell: (row) => [h("a", { href: `/recordings/${row.id}` }, `Recording ${row.id}`), row.notes ? h("span", { class: "muted small secondary two-lines", title: row.notes }, row.notes) : null] },
-    { title: "Unit", cell: (row) => h("a", { href: `/units/${encodeURIComponent(row.serial)}`, class: "nowrap" }, row.serial) },
-    { title: "Holds", cell: (row) => chip(KINDS[row.kind] ?? row.kind) },
-    { title: "Data sets", number: true, cell: (row) => count(row.datasets) },
-    { title: "Readings", number: true, cell: (row) => (row.kind === "samples" ? count(row.readings) : "–") },
-    { title: "From", cell: (row) => (row.campaign ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`) : h("span", { class: "muted" }, "import")) },
-    { title: "Since", cell: (row) => [h("span", { class: "nowrap" }, day(row.created_at)), row.simulated_time ? h("span", { class: "muted small secondary" }, SIMULATED) : null] },
-    { title: h("span", { class: "visually-hidden" }, "Explore"), cell: (row) => h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(row.serial)}&recording=${row.id}` }, "Explore") },
-  ], rows, { label: "Recordings", first: "13rem" });
+  return table(
+    [
+      {
+        title: "Recording",
+        cell: (row) => [
+          h("a", { href: `/recordings/${row.id}` }, `Recording ${row.id}`),
+          row.notes ? h("span", { class: "muted small secondary two-lines", title: row.notes }, row.notes) : null,
+        ],
+      },
+      {
+        title: "Unit",
+        cell: (row) => h("a", { href: `/units/${encodeURIComponent(row.serial)}`, class: "nowrap" }, row.serial),
+      },
+      { title: "Holds", cell: (row) => chip(KINDS[row.kind] ?? row.kind) },
+      { title: "Data sets", number: true, cell: (row) => count(row.datasets) },
+      { title: "Readings", number: true, cell: (row) => (row.kind === "samples" ? count(row.readings) : "–") },
+      {
+        title: "From",
+        cell: (row) =>
+          row.campaign
+            ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`)
+            : h("span", { class: "muted" }, "import"),
+      },
+      {
+        title: "Since",
+        cell: (row) => [
+          h("span", { class: "nowrap" }, day(row.created_at)),
+          row.simulated_time ? h("span", { class: "muted small secondary" }, SIMULATED) : null,
+        ],
+      },
+      {
+        title: h("span", { class: "visually-hidden" }, "Explore"),
+        cell: (row) =>
+          h(
+            "a",
+            { class: "button tiny", href: `/explore?unit=${encodeURIComponent(row.serial)}&recording=${row.id}` },
+            "Explore",
+          ),
+      },
+    ],
+    rows,
+    { label: "Recordings", first: "13rem" },
+  );
 }
 
-const noRecordings = () => emptyState(h("p", {}, "There is no recording yet."), h("p", {}, "Drop one above, ", h("a", { href: "/campaigns/new" }, "run a campaign"), ", or ", h("a", { href: "/start" }, "begin with an example"), "."));
+const noRecordings = () =>
+  emptyState(
+    h("p", {}, "There is no recording yet."),
+    h(
+      "p",
+      {},
+      "Drop one above, ",
+      h("a", { href: "/campaigns/new" }, "run a campaign"),
+      ", or ",
+      h("a", { href: "/start" }, "begin with an example"),
+      ".",
+    ),
+  );

@@ -6,7 +6,11 @@ import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
 import { cardWithHeader, loadInto, notice, table, toggleGroup } from "../core/components.js";
 
-const NOISE_FIGURES = [["N", "angle random walk"], ["B", "bias instability"], ["K", "rate random walk"]];
+const NOISE_FIGURES = [
+  ["N", "angle random walk"],
+  ["B", "bias instability"],
+  ["K", "rate random walk"],
+];
 
 /** Card for the longest stretch at rest, or for the selected data set. */
 export function allan(state, signal) {
@@ -15,10 +19,23 @@ export function allan(state, signal) {
   let [own, seen] = [false, false];
   const show = () => {
     if (!seen) return; // the readings at rest are loaded only when the card is near the viewport
-    setChildren(which, state.dataset ? toggleGroup("Of what", [["rest", "longest stretch at rest"], ["set", `data set ${state.dataset}`]], own ? "set" : "rest", (value) => {
-      own = value === "set";
-      show();
-    }) : null);
+    setChildren(
+      which,
+      state.dataset
+        ? toggleGroup(
+            "Of what",
+            [
+              ["rest", "longest stretch at rest"],
+              ["set", `data set ${state.dataset}`],
+            ],
+            own ? "set" : "rest",
+            (value) => {
+              own = value === "set";
+              show();
+            },
+          )
+        : null,
+    );
     const dataset = own ? state.dataset : null;
     loadInto(place, "Working out the Allan deviation", async () => {
       try {
@@ -43,23 +60,93 @@ function allanFigure(found) {
   const where = `Data set${first === last ? ` ${first}` : `s ${first} to ${last}`}, ${duration(found.duration_s)} at ${withUnit(found.temperature_c, "deg C")}.`;
   const draw = () => ({
     data: axes.flatMap(([axis, noise]) => [
-      { type: "scatter", mode: "lines", x: [...noise.tau_s, ...[...noise.tau_s].reverse()], y: [...noise.high_dps, ...[...noise.low_dps].reverse()], fill: "toself", fillcolor: `color-mix(in srgb, ${axisColour(axis)} 18%, transparent)`, line: { width: 0 }, hoverinfo: "skip", showlegend: false, name: `${axis}, 95 %` },
-      { type: "scatter", mode: "lines", x: noise.tau_s, y: noise.model_dps, line: { color: axisColour(axis), dash: "dot", width: 1.2 }, hoverinfo: "skip", showlegend: false, name: `${axis}, fitted` },
-      { type: "scatter", mode: "lines+markers", x: noise.tau_s, y: noise.deviation_dps, line: { color: axisColour(axis), width: 2 }, marker: { size: 5 }, name: `axis ${axis}`, hovertemplate: `${axis}: %{y:.3~g} deg/s over %{x:.3~g} s<extra></extra>` },
+      {
+        type: "scatter",
+        mode: "lines",
+        x: [...noise.tau_s, ...[...noise.tau_s].reverse()],
+        y: [...noise.high_dps, ...[...noise.low_dps].reverse()],
+        fill: "toself",
+        fillcolor: `color-mix(in srgb, ${axisColour(axis)} 18%, transparent)`,
+        line: { width: 0 },
+        hoverinfo: "skip",
+        showlegend: false,
+        name: `${axis}, 95 %`,
+      },
+      {
+        type: "scatter",
+        mode: "lines",
+        x: noise.tau_s,
+        y: noise.model_dps,
+        line: { color: axisColour(axis), dash: "dot", width: 1.2 },
+        hoverinfo: "skip",
+        showlegend: false,
+        name: `${axis}, fitted`,
+      },
+      {
+        type: "scatter",
+        mode: "lines+markers",
+        x: noise.tau_s,
+        y: noise.deviation_dps,
+        line: { color: axisColour(axis), width: 2 },
+        marker: { size: 5 },
+        name: `axis ${axis}`,
+        hovertemplate: `${axis}: %{y:.3~g} deg/s over %{x:.3~g} s<extra></extra>`,
+      },
     ]),
-    layout: { xaxis: { type: "log", title: { text: "averaging time, s" } }, yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } }, margin: { l: 70, r: 12, t: 8, b: 46 } },
+    layout: {
+      xaxis: { type: "log", title: { text: "averaging time, s" } },
+      yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } },
+      margin: { l: 70, r: 12, t: 8, b: 46 },
+    },
   });
-  const csv = () => [["axis", "tau_s", "deviation_dps", "low_dps", "high_dps", "model_dps"], ...axes.flatMap(([axis, noise]) => noise.tau_s.map((tau, k) => [axis, tau, noise.deviation_dps[k], noise.low_dps[k], noise.high_dps[k], noise.model_dps[k]]))];
-  return [h("p", { class: "muted" }, where),
-    figure(`Recording ${found.recording} Allan deviation`, "Band: 95 % interval. Dotted: the fit that N, B and K come from.", draw, { height: "21rem", csv }),
-    table([
-      { title: "Figure", cell: ([id, name]) => [h("strong", {}, id), h("span", { class: "muted nowrap" }, `, ${name}`)] },
-      ...axes.map(([axis, noise]) => ({ title: `Axis ${axis}`, cell: ([id]) => noiseFigure(noise[id]) })),
-    ], NOISE_FIGURES, { label: "Figures of IEEE Std 952", first: "11rem" })];
+  const csv = () => [
+    ["axis", "tau_s", "deviation_dps", "low_dps", "high_dps", "model_dps"],
+    ...axes.flatMap(([axis, noise]) =>
+      noise.tau_s.map((tau, k) => [
+        axis,
+        tau,
+        noise.deviation_dps[k],
+        noise.low_dps[k],
+        noise.high_dps[k],
+        noise.model_dps[k],
+      ]),
+    ),
+  ];
+  return [
+    h("p", { class: "muted" }, where),
+    figure(
+      `Recording ${found.recording} Allan deviation`,
+      "Band: 95 % interval. Dotted: the fit that N, B and K come from.",
+      draw,
+      { height: "21rem", csv },
+    ),
+    table(
+      [
+        {
+          title: "Figure",
+          cell: ([id, name]) => [h("strong", {}, id), h("span", { class: "muted nowrap" }, `, ${name}`)],
+        },
+        ...axes.map(([axis, noise]) => ({ title: `Axis ${axis}`, cell: ([id]) => noiseFigure(noise[id]) })),
+      ],
+      NOISE_FIGURES,
+      { label: "Figures of IEEE Std 952", first: "11rem" },
+    ),
+  ];
 }
 
 /** A noise figure with its uncertainty, or its upper bound and the reason why it has no value. */
 function noiseFigure(noise) {
-  if (noise?.value !== null && noise?.value !== undefined) return [h("strong", { class: "nowrap" }, `${number(noise.value)} ${noise.unit}`), h("span", { class: "muted small secondary" }, `u = ${number(noise.u, 2)} ${noise.unit}`)];
-  return [h("span", { class: "muted nowrap" }, noise?.at_most ? `below ${number(noise.at_most, 2)} ${noise.unit}` : "not seen"), noise?.why ? h("span", { class: "muted small secondary" }, noise.why) : null];
+  if (noise?.value !== null && noise?.value !== undefined)
+    return [
+      h("strong", { class: "nowrap" }, `${number(noise.value)} ${noise.unit}`),
+      h("span", { class: "muted small secondary" }, `u = ${number(noise.u, 2)} ${noise.unit}`),
+    ];
+  return [
+    h(
+      "span",
+      { class: "muted nowrap" },
+      noise?.at_most ? `below ${number(noise.at_most, 2)} ${noise.unit}` : "not seen",
+    ),
+    noise?.why ? h("span", { class: "muted small secondary" }, noise.why) : null,
+  ];
 }

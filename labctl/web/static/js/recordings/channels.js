@@ -1,9 +1,24 @@
 // Name and unit of a channel from the name of its column.
 
-const UNIT_SUFFIXES = [["_dps", "deg/s"], ["_deg", "deg"], ["_c", "deg C"], ["_pct", "%"], ["_ut", "uT"], ["_g", "g"], ["_v", "V"], ["_s", "s"]];
+const UNIT_SUFFIXES = [
+  ["_dps", "deg/s"],
+  ["_deg", "deg"],
+  ["_c", "deg C"],
+  ["_pct", "%"],
+  ["_ut", "uT"],
+  ["_g", "g"],
+  ["_v", "V"],
+  ["_s", "s"],
+];
 const NAMES = {
-  table_rate_dps: "table rate", table_angle_deg: "table angle", temperature_c: "gyro temperature", chamber_c: "chamber temperature",
-  power_s: "time since power-on", supply_v: "supply", t_s: "time", humidity_pct: "humidity",
+  table_rate_dps: "table rate",
+  table_angle_deg: "table angle",
+  temperature_c: "gyro temperature",
+  chamber_c: "chamber temperature",
+  power_s: "time since power-on",
+  supply_v: "supply",
+  t_s: "time",
+  humidity_pct: "humidity",
 };
 
 const unitSuffix = (name) => UNIT_SUFFIXES.find(([end]) => name.endsWith(end));

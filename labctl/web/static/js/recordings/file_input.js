@@ -8,7 +8,11 @@ export async function droppedFiles(transfer) {
   // entries are valid only until the first await
   const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
   if (!entries.some((entry) => entry.isDirectory)) return { files: [...transfer.files], left: [] };
-  const all = (await Promise.all(entries.map((entry) => (entry.isDirectory ? inFolder(entry) : asFile(entry).then((file) => [file]))))).flat();
+  const all = (
+    await Promise.all(
+      entries.map((entry) => (entry.isDirectory ? inFolder(entry) : asFile(entry).then((file) => [file]))),
+    )
+  ).flat();
   return recordingFiles(all);
 }
 
@@ -23,7 +27,8 @@ const asFile = (entry) => new Promise((resolve, reject) => entry.file(resolve, r
 async function inFolder(folder) {
   const reader = folder.createReader();
   const files = [];
-  for (;;) { // readEntries returns at most 100 entries per call
+  for (;;) {
+    // readEntries returns at most 100 entries per call
     const entries = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
     if (!entries.length) return files;
     files.push(...(await Promise.all(entries.filter((entry) => entry.isFile).map(asFile))));

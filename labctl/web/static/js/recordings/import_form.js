@@ -15,21 +15,51 @@ const totalSize = (files) => {
 export function importForm(taken) {
   const result = h("div", { "aria-live": "polite" });
   const pick = (folder) => {
-    const input = h("input", { type: "file", multiple: true, webkitdirectory: folder, accept: folder ? null : ".toml,.csv,.parquet", "aria-label": folder ? "Folder of a recording" : "Files of a recording", class: "visually-hidden", tabindex: "-1", onchange: () => {
-      const files = [...input.files];
-      input.value = "";
-      if (files.length) take(folder ? recordingFiles(files) : { files, left: [] });
-    } });
-    return [h("button", { type: "button", class: "button", onclick: () => input.click() }, folder ? "Choose a folder" : "Choose files"), input];
+    const input = h("input", {
+      type: "file",
+      multiple: true,
+      webkitdirectory: folder,
+      accept: folder ? null : ".toml,.csv,.parquet",
+      "aria-label": folder ? "Folder of a recording" : "Files of a recording",
+      class: "visually-hidden",
+      tabindex: "-1",
+      onchange: () => {
+        const files = [...input.files];
+        input.value = "";
+        if (files.length) take(folder ? recordingFiles(files) : { files, left: [] });
+      },
+    });
+    return [
+      h(
+        "button",
+        { type: "button", class: "button", onclick: () => input.click() },
+        folder ? "Choose a folder" : "Choose files",
+      ),
+      input,
+    ];
   };
-  const zone = h("div", { class: "drop stack", ondragover: over, ondragenter: over, ondragleave: (event) => zone.contains(event.relatedTarget) || zone.classList.remove("dragover"), ondrop: async (event) => {
-    event.preventDefault();
-    zone.classList.remove("dragover");
-    take(await droppedFiles(event.dataTransfer));
-  } },
-  h("p", { class: "drop-title" }, "Drop a recording here"),
-  h("p", { class: "small" }, h("code", {}, "recording.toml"), ", its data as CSV or Parquet, and the environment file if there is one; or the folder that holds them."),
-  h("div", { class: "row", style: "justify-content: center" }, pick(false), pick(true)));
+  const zone = h(
+    "div",
+    {
+      class: "drop stack",
+      ondragover: over,
+      ondragenter: over,
+      ondragleave: (event) => zone.contains(event.relatedTarget) || zone.classList.remove("dragover"),
+      ondrop: async (event) => {
+        event.preventDefault();
+        zone.classList.remove("dragover");
+        take(await droppedFiles(event.dataTransfer));
+      },
+    },
+    h("p", { class: "drop-title" }, "Drop a recording here"),
+    h(
+      "p",
+      { class: "small" },
+      h("code", {}, "recording.toml"),
+      ", its data as CSV or Parquet, and the environment file if there is one; or the folder that holds them.",
+    ),
+    h("div", { class: "row", style: "justify-content: center" }, pick(false), pick(true)),
+  );
 
   function over(event) {
     event.preventDefault();
@@ -37,7 +67,15 @@ export function importForm(taken) {
   }
 
   async function take({ files, left }) {
-    if (!files.length) return setChildren(result, refusedNotice(new Error("None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.")));
+    if (!files.length)
+      return setChildren(
+        result,
+        refusedNotice(
+          new Error(
+            "None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.",
+          ),
+        ),
+      );
     setChildren(result, busyIndicator(`Reading ${files.map((file) => file.name).join(", ")} (${totalSize(files)})`));
     try {
       const made = await upload("/api/recordings", files);
@@ -54,12 +92,29 @@ export function importForm(taken) {
 
 function acceptedNotice(made, left) {
   const warnings = made.warnings ?? [];
-  return notice(warnings.length ? "bad" : "good", h("p", { class: "lead" }, `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`),
+  return notice(
+    warnings.length ? "bad" : "good",
+    h(
+      "p",
+      { class: "lead" },
+      `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`,
+    ),
     warnings.map((warning) => h("p", {}, `${warning.severity === "certain" ? "Wrong" : "Check"}: ${warning.text}`)),
     left.length ? h("p", { class: "small" }, `Left out of the folder: ${left.join(", ")}.`) : null,
-    h("div", { class: "row" },
-      h("a", { class: "button primary", href: `/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}` }, "Fit and explore"),
-      h("a", { class: "button", href: `/recordings/${made.recording}` }, "Look at it")));
+    h(
+      "div",
+      { class: "row" },
+      h(
+        "a",
+        {
+          class: "button primary",
+          href: `/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}`,
+        },
+        "Fit and explore",
+      ),
+      h("a", { class: "button", href: `/recordings/${made.recording}` }, "Look at it"),
+    ),
+  );
 }
 
 /** The error in large type: it names the file, column and row to correct. */

@@ -21,20 +21,34 @@ export function verdictChip(known) {
 }
 
 /** What was overridden by an act. */
-export const overridden = (act) => notice("warn", h("p", {}, h("strong", {}, "Certified against objections. "), `${act.by}: ${act.reason}`), act.objections.map((each) => h("p", { class: "small" }, each.text)));
+export const overridden = (act) =>
+  notice(
+    "warn",
+    h("p", {}, h("strong", {}, "Certified against objections. "), `${act.by}: ${act.reason}`),
+    act.objections.map((each) => h("p", { class: "small" }, each.text)),
+  );
 
 /** Ask who certifies a version and why; the verdict on it is shown, and what would have to be overridden. */
 export async function askCertification(base, version) {
   const known = await get(`${base}/calibrations/${version}/assessment`);
   const needed = known.override_needed;
   const words = `A sentence: at least ${known.least_reason_characters} characters and ${known.least_reason_words} words.`;
-  const fields = [{ name: "by", label: "Who" },
-    { name: "reason", label: "Why", hint: needed ? words : null, minlength: needed ? known.least_reason_characters : null },
-    { name: "due_days", label: "Due again in days", type: "number", value: "365", required: false }];
+  const fields = [
+    { name: "by", label: "Who" },
+    {
+      name: "reason",
+      label: "Why",
+      hint: needed ? words : null,
+      minlength: needed ? known.least_reason_characters : null,
+    },
+    { name: "due_days", label: "Due again in days", type: "number", value: "365", required: false },
+  ];
   if (needed) fields.push({ name: "override", label: "Certify it all the same", type: "checkbox" });
   const answers = await dialog(`Put version ${version} in force`, fields, {
     text: "Whoever asks for this unit's calibration gets this version from now on. It is written to the audit trail.",
-    body: assessed(known), confirm: "Certify", kind: needed ? "danger" : "primary",
+    body: assessed(known),
+    confirm: "Certify",
+    kind: needed ? "danger" : "primary",
   });
   if (!answers) return;
   const body = { by: answers.by, reason: answers.reason };
@@ -45,9 +59,18 @@ export async function askCertification(base, version) {
 }
 
 export async function askRevocation(base, version) {
-  const answers = await dialog(`Take version ${version} out of force`, [{ name: "by", label: "Who" }, { name: "reason", label: "Why" }], {
-    text: "The unit then has no calibration in force. It is written to the audit trail.", confirm: "Revoke", kind: "danger",
-  });
+  const answers = await dialog(
+    `Take version ${version} out of force`,
+    [
+      { name: "by", label: "Who" },
+      { name: "reason", label: "Why" },
+    ],
+    {
+      text: "The unit then has no calibration in force. It is written to the audit trail.",
+      confirm: "Revoke",
+      kind: "danger",
+    },
+  );
   if (!answers) return;
   await post(`${base}/calibrations/${version}/revoke`, { by: answers.by, reason: answers.reason });
   await show();
@@ -55,22 +78,57 @@ export async function askRevocation(base, version) {
 
 /** What is known of a version: verdict, errors, objections. */
 function assessed(known) {
-  return h("div", { class: "stack" },
+  return h(
+    "div",
+    { class: "stack" },
     factList([
       ["Verdict", verdictChip(known), null, known.verdict_recording ? `recording ${known.verdict_recording}` : null],
-      ["RMS error", number(known.error.rms_dps), "deg/s", known.error.raw_rms_dps === null ? null : `${number(known.error.raw_rms_dps)} without correction`],
+      [
+        "RMS error",
+        number(known.error.rms_dps),
+        "deg/s",
+        known.error.raw_rms_dps === null ? null : `${number(known.error.raw_rms_dps)} without correction`,
+      ],
       ["At unseen temperatures", number(known.error.heldout_rms_dps), "deg/s"],
     ]),
-    known.objections.some((each) => each.what === "verdict") ? null : h("p", {}, known.verdict_text || `No verdict: ${known.verdict_reason}.`),
-    known.objections.length ? notice("bad", h("p", {}, h("strong", {}, "This speaks against it:")), h("ul", { class: "plain" }, known.objections.map((each) => h("li", {}, `${each.text}. To do: ${each.do}.`)))) : null);
+    known.objections.some((each) => each.what === "verdict")
+      ? null
+      : h("p", {}, known.verdict_text || `No verdict: ${known.verdict_reason}.`),
+    known.objections.length
+      ? notice(
+          "bad",
+          h("p", {}, h("strong", {}, "This speaks against it:")),
+          h(
+            "ul",
+            { class: "plain" },
+            known.objections.map((each) => h("li", {}, `${each.text}. To do: ${each.do}.`)),
+          ),
+        )
+      : null,
+  );
 }
 
 export function certificationTable(history) {
-  return table([
-    { title: "When", cell: (act) => instant(act.at) },
-    { title: "What", cell: (act) => `${act.act} version ${act.version}` },
-    { title: "Verdict", cell: (act) => (act.override === null ? "–" : h("span", { class: "row tight", title: act.verdict_text || act.verdict_reason }, verdictChip(act), act.override ? chip("overridden", "bad") : null)) },
-    { title: "Who", cell: (act) => act.by },
-    { title: "Why", prose: true, cell: (act) => act.reason },
-  ], history, { label: "Certifications" });
+  return table(
+    [
+      { title: "When", cell: (act) => instant(act.at) },
+      { title: "What", cell: (act) => `${act.act} version ${act.version}` },
+      {
+        title: "Verdict",
+        cell: (act) =>
+          act.override === null
+            ? "–"
+            : h(
+                "span",
+                { class: "row tight", title: act.verdict_text || act.verdict_reason },
+                verdictChip(act),
+                act.override ? chip("overridden", "bad") : null,
+              ),
+      },
+      { title: "Who", cell: (act) => act.by },
+      { title: "Why", prose: true, cell: (act) => act.reason },
+    ],
+    history,
+    { label: "Certifications" },
+  );
 }

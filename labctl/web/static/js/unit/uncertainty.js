@@ -23,69 +23,118 @@ const titleOf = (part) => PARTS.find(([key]) => key === part)[1];
 export function uncertaintyInUse(base, signal) {
   const element = h("div", { class: "stack" });
   let latest = 0;
-  return { element, show: async (version) => {
-    const own = ++latest;
-    const path = `${base}/calibrations/${version.version}/uncertainty`;
-    setChildren(element, busyIndicator("Working out the uncertainty"));
-    try {
-      const place = placeOf(version.validity);
-      const answer = await get(path, { query: { ...place, grid: true }, signal });
-      if (own === latest) setChildren(element, over(answer), parts(answer, place, path, signal));
-    } catch (error) {
-      // a model that needs more than a rate and a temperature, or without data to be uncertain by
-      if (error.name !== "AbortError" && own === latest) setChildren(element, notice("warn", h("strong", {}, "Unknown: "), error.message));
-    }
-  } };
+  return {
+    element,
+    show: async (version) => {
+      const own = ++latest;
+      const path = `${base}/calibrations/${version.version}/uncertainty`;
+      setChildren(element, busyIndicator("Working out the uncertainty"));
+      try {
+        const place = placeOf(version.validity);
+        const answer = await get(path, { query: { ...place, grid: true }, signal });
+        if (own === latest) setChildren(element, over(answer), parts(answer, place, path, signal));
+      } catch (error) {
+        // a model that needs more than a rate and a temperature, or without data to be uncertain by
+        if (error.name !== "AbortError" && own === latest)
+          setChildren(element, notice("warn", h("strong", {}, "Unknown: "), error.message));
+      }
+    },
+  };
 }
 
 /** The place of the address, or the middle of the temperatures at half of the fastest rate. */
 function placeOf({ rate_dps, temperature_c }) {
   const asked = query();
   const given = (text, otherwise) => (text && Number.isFinite(Number(text)) ? Number(text) : otherwise);
-  return { rate_dps: given(asked.rate, Number(((rate_dps[1] ?? 0) / 2).toPrecision(3))), temperature_c: given(asked.temperature, Number(((temperature_c[0] + temperature_c[1]) / 2).toFixed(1))) };
+  return {
+    rate_dps: given(asked.rate, Number(((rate_dps[1] ?? 0) / 2).toPrecision(3))),
+    temperature_c: given(asked.temperature, Number(((temperature_c[0] + temperature_c[1]) / 2).toFixed(1))),
+  };
 }
 
 /** The table over what was calibrated: a row for each axis and temperature, a column for each rate. */
 function over({ grid, coverage_factor }) {
-  const rows = Object.entries(grid.axes).flatMap(([axis, lines]) => lines.map((cells, k) => ({ axis, warm: grid.temperature_c[k], cells })));
+  const rows = Object.entries(grid.axes).flatMap(([axis, lines]) =>
+    lines.map((cells, k) => ({ axis, warm: grid.temperature_c[k], cells })),
+  );
   const several = Object.keys(grid.axes).length > 1;
-  return h("div", { class: "stack" },
-    h("p", { class: "muted small" }, `How far a corrected rate may be off on a later day, after another power-on: expanded uncertainty in deg/s, k = ${coverage_factor}, about 95 %. The noise of a single reading comes on top.`),
-    table([
-      several ? { title: "Axis", cell: (row) => row.axis } : null,
-      { title: "deg C", number: true, cell: (row) => row.warm.toFixed(1) },
-      ...grid.rate_dps.map((rate, k) => ({ title: `${number(rate, 3)} deg/s`, number: true, cell: (row) => cell(row.cells[k], coverage_factor) })),
-    ].filter(Boolean), rows, { dense: true, label: "Uncertainty in use" }),
-    reasons(rows.flatMap((row) => row.cells)));
+  return h(
+    "div",
+    { class: "stack" },
+    h(
+      "p",
+      { class: "muted small" },
+      `How far a corrected rate may be off on a later day, after another power-on: expanded uncertainty in deg/s, k = ${coverage_factor}, about 95 %. The noise of a single reading comes on top.`,
+    ),
+    table(
+      [
+        several ? { title: "Axis", cell: (row) => row.axis } : null,
+        { title: "deg C", number: true, cell: (row) => row.warm.toFixed(1) },
+        ...grid.rate_dps.map((rate, k) => ({
+          title: `${number(rate, 3)} deg/s`,
+          number: true,
+          cell: (row) => cell(row.cells[k], coverage_factor),
+        })),
+      ].filter(Boolean),
+      rows,
+      { dense: true, label: "Uncertainty in use" },
+    ),
+    reasons(rows.flatMap((row) => row.cells)),
+  );
 }
 
 /** An expanded uncertainty; where it is unknown, what is known of it below. */
 function cell(one, k) {
   if (one.expanded_dps !== null) return shown(one.expanded_dps);
-  const least = one.same_run_dps === null ? null : h("div", { class: "muted small" }, `same run ${shown(k * one.same_run_dps)}`);
+  const least =
+    one.same_run_dps === null ? null : h("div", { class: "muted small" }, `same run ${shown(k * one.same_run_dps)}`);
   return [unknown(), least];
 }
 
 /** Why some of the cells are unknown, one line for each reason. */
 function reasons(cells) {
   const found = new Map();
-  for (const one of cells) for (const [part, why] of Object.entries(one.unknown)) {
-    const places = found.get(why) ?? { parts: new Set(), cells: new Set() };
-    places.parts.add(titleOf(part).toLowerCase());
-    places.cells.add(one);
-    found.set(why, places);
-  }
+  for (const one of cells)
+    for (const [part, why] of Object.entries(one.unknown)) {
+      const places = found.get(why) ?? { parts: new Set(), cells: new Set() };
+      places.parts.add(titleOf(part).toLowerCase());
+      places.cells.add(one);
+      found.set(why, places);
+    }
   if (!found.size) return null;
   const where = (n) => (n === cells.length ? "" : ` (${n} of ${cells.length} cells)`);
-  return notice("warn", h("p", {}, h("strong", {}, "Why it is unknown:")),
-    h("ul", { class: "plain" }, [...found].map(([why, { parts: names, cells: here }]) => h("li", {}, `${sentence(joined([...names]))}: ${why}${where(here.size)}.`))),
-    cells.some((one) => one.expanded_dps === null && one.same_run_dps !== null) ? h("p", { class: "small" }, "“same run”: coefficients and model alone, expanded; it holds only until the unit is switched off.") : null);
+  return notice(
+    "warn",
+    h("p", {}, h("strong", {}, "Why it is unknown:")),
+    h(
+      "ul",
+      { class: "plain" },
+      [...found].map(([why, { parts: names, cells: here }]) =>
+        h("li", {}, `${sentence(joined([...names]))}: ${why}${where(here.size)}.`),
+      ),
+    ),
+    cells.some((one) => one.expanded_dps === null && one.same_run_dps !== null)
+      ? h(
+          "p",
+          { class: "small" },
+          "“same run”: coefficients and model alone, expanded; it holds only until the unit is switched off.",
+        )
+      : null,
+  );
 }
 
 /** The parts at a place that can be chosen. */
 function parts(first, place, path, signal) {
   const result = h("div", { class: "stack", "aria-live": "polite" });
-  const input = (value) => h("input", { type: "number", step: "any", required: true, value: String(value), style: "width: 9rem", onchange: ask });
+  const input = (value) =>
+    h("input", {
+      type: "number",
+      step: "any",
+      required: true,
+      value: String(value),
+      style: "width: 9rem",
+      onchange: ask,
+    });
   const [rate, warm] = [input(place.rate_dps), input(place.temperature_c)];
   let latest = 0;
   async function ask() {
@@ -100,32 +149,66 @@ function parts(first, place, path, signal) {
     }
   }
   setChildren(result, atPlace(first));
-  return h("div", { class: "stack" }, h("h3", {}, "What it is made of"),
-    h("div", { class: "row" }, labelledField("Rate, deg/s", rate), labelledField("Temperature, deg C", warm)), result);
+  return h(
+    "div",
+    { class: "stack" },
+    h("h3", {}, "What it is made of"),
+    h("div", { class: "row" }, labelledField("Rate, deg/s", rate), labelledField("Temperature, deg C", warm)),
+    result,
+  );
 }
 
 function atPlace(answer) {
   const axes = Object.entries(answer.axes);
-  const figure = (value, strong) => (value === null ? unknown() : strong ? h("strong", {}, shown(value)) : shown(value));
+  const figure = (value, strong) =>
+    value === null ? unknown() : strong ? h("strong", {}, shown(value)) : shown(value);
   const k = answer.coverage_factor;
   const rows = [
-    ...PARTS.map(([part, title, source]) => ({ title, of: (one) => figure(one[`${part}_dps`]), from: (one) => one.unknown[part] ?? source(one) })),
+    ...PARTS.map(([part, title, source]) => ({
+      title,
+      of: (one) => figure(one[`${part}_dps`]),
+      from: (one) => one.unknown[part] ?? source(one),
+    })),
     { title: "Combined", of: (one) => figure(one.combined_dps), from: becauseOf },
     { title: `Expanded, k = ${k}`, of: (one) => figure(one.expanded_dps, true), from: becauseOf },
     axes.some(([, one]) => one.expanded_dps === null && one.same_run_dps !== null)
-      ? { title: `Same run, expanded, k = ${k}`, of: (one) => figure(one.same_run_dps === null ? null : k * one.same_run_dps), from: () => "coefficients and model alone, without another power-on" } : null,
+      ? {
+          title: `Same run, expanded, k = ${k}`,
+          of: (one) => figure(one.same_run_dps === null ? null : k * one.same_run_dps),
+          from: () => "coefficients and model alone, without another power-on",
+        }
+      : null,
   ].filter(Boolean);
-  return h("div", { class: "stack" },
-    answer.inside ? null : h("p", {}, chip("outside", "warn"), " This rate or temperature was not calibrated: the figures are extrapolated."),
-    table([
-      { title: "Standard uncertainty, deg/s", cell: (row) => row.title },
-      ...axes.map(([axis, one]) => ({ title: `Axis ${axis}`, number: true, cell: (row) => row.of(one) })),
-      { title: "From", prose: true, cell: (row) => byAxis(axes, row.from) },
-    ], rows, { label: "Parts of the uncertainty" }));
+  return h(
+    "div",
+    { class: "stack" },
+    answer.inside
+      ? null
+      : h(
+          "p",
+          {},
+          chip("outside", "warn"),
+          " This rate or temperature was not calibrated: the figures are extrapolated.",
+        ),
+    table(
+      [
+        { title: "Standard uncertainty, deg/s", cell: (row) => row.title },
+        ...axes.map(([axis, one]) => ({ title: `Axis ${axis}`, number: true, cell: (row) => row.of(one) })),
+        { title: "From", prose: true, cell: (row) => byAxis(axes, row.from) },
+      ],
+      rows,
+      { label: "Parts of the uncertainty" },
+    ),
+  );
 }
 
 /** What an unknown sum lacks. */
-const becauseOf = (one) => (one.combined_dps === null ? `unknown, as ${joined(Object.keys(one.unknown))} ${Object.keys(one.unknown).length > 1 ? "are" : "is"}` : one.repeatability_source === "between runs" ? "all parts, wider for few power-ons" : "all parts");
+const becauseOf = (one) =>
+  one.combined_dps === null
+    ? `unknown, as ${joined(Object.keys(one.unknown))} ${Object.keys(one.unknown).length > 1 ? "are" : "is"}`
+    : one.repeatability_source === "between runs"
+      ? "all parts, wider for few power-ons"
+      : "all parts";
 
 /** A text of each axis, once where all say the same. */
 function byAxis(axes, text) {

@@ -19,11 +19,13 @@ export function ownRows(comparison, axis) {
 }
 
 /** The lines of an output axis in the positions of some rows. */
-export const linesOf = (lines, axis, positions) => lines.filter((each) => each.axis === axis && positions.includes(each.position));
+export const linesOf = (lines, axis, positions) =>
+  lines.filter((each) => each.axis === axis && positions.includes(each.position));
 
 /** Lines over the table rate as lines over the rate about the axis, and back: [x, y] of one line. */
 export const alongRate = ({ at, position }, y) => [at.map((rate) => sign(position) * rate), y];
 export const positionsOf = (rows) => [...new Set(rows.position)];
 export const signOf = sign;
-export const rms = (values) => Math.sqrt(values.reduce((sum, value) => sum + value * value, 0) / Math.max(values.length, 1));
+export const rms = (values) =>
+  Math.sqrt(values.reduce((sum, value) => sum + value * value, 0) / Math.max(values.length, 1));
 export const span = (values) => [Math.min(...values), Math.max(...values)];
