@@ -8,7 +8,10 @@ from pydantic import BaseModel, ConfigDict
 class ResponseModel(BaseModel):
     """A response of the services: the same JSON on the command line and over HTTP. Keys may be added, none renamed."""
 
-    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="null")
+    # every answer has every key, so its schema requires those with a default too
+    model_config = ConfigDict(
+        extra="allow", frozen=True, ser_json_inf_nan="null", json_schema_serialization_defaults_required=True
+    )
 
 
 class Request(BaseModel):

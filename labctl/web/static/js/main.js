@@ -4,10 +4,15 @@ import { loadPlotly } from "./core/figure.js";
 import { route, start } from "./core/router.js";
 import { buildLayout } from "./core/layout.js";
 
+/** @import { Route } from "./core/routes.js" */
+
 /** Preload Plotly; a figure loads it again where that failed, and reports the error. */
 const preloadPlotly = () => loadPlotly().catch(() => {});
 
-/** A page with plots: Plotly loads in parallel with the module and its requests. */
+/**
+ * A page with plots: Plotly loads in parallel with the module and its requests.
+ * @param {Route["load"]} load
+ */
 const withPlots = (load) => () => {
   preloadPlotly();
   return load();

@@ -2,9 +2,13 @@
 
 import { get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
-import { button, dialog, toast } from "../core/components.js";
+import { button, toast } from "../core/components.js";
+import { dialog } from "../core/dialog.js";
 import { navigate } from "../core/router.js";
 import { canResume } from "../campaigns/states.js";
+
+/** @import { Bench, Campaign, Check, Prompt } from "../../../types/api.js" */
+/** @import { Field } from "../../../types/pages.js" */
 
 const OPERATOR_NAME_KEY = "labctl.who";
 const operatorNameField = () => ({
@@ -13,16 +17,22 @@ const operatorNameField = () => ({
   value: localStorage.getItem(OPERATOR_NAME_KEY) ?? "",
 });
 
+/**
+ * @param {string} title
+ * @param {readonly Field[]} fields
+ * @param {Parameters<typeof dialog>[2]} options
+ */
 async function askOperator(title, fields, options) {
   const answers = await dialog(title, fields, options);
   if (answers?.by) localStorage.setItem(OPERATOR_NAME_KEY, answers.by);
   return answers;
 }
 
-const postAction = (id, name, body) => post(`/api/campaigns/${id}/${name}`, body);
-
-/** Safe stop: the campaign ends now, table at rest, chamber at its safe set point. */
-export const stopButton = (id) =>
+/**
+ * Safe stop: the campaign ends now, table at rest, chamber at its safe set point.
+ * @param {number} campaign
+ */
+export const stopButton = (campaign) =>
   Object.assign(
     button(
       "Safe stop",
@@ -40,7 +50,10 @@ export const stopButton = (id) =>
           },
         );
         if (!answers) return;
-        const answer = await postAction(id, "abort", answers);
+        const answer = await post("/api/campaigns/{campaign}/abort", {
+          path: { campaign },
+          body: { by: answers.by, reason: answers.reason },
+        });
         const unsafe = (await get("/api/benches")).find((bench) => bench.unconfirmed);
         if (answer.state !== "aborted") toast("bad", `The campaign is ${answer.state}: ${answer.reason}`);
         else if (unsafe) toast("bad", `Stopped, but the safe state was not confirmed: ${unsafe.unconfirmed}`);
@@ -51,19 +64,25 @@ export const stopButton = (id) =>
     { title: "End the campaign now, in the safe state" },
   );
 
-export const pauseButton = (id) =>
+/** @param {number} campaign */
+export const pauseButton = (campaign) =>
   button("Pause", async () => {
     const answers = await askOperator(
       "Pause after the present data set?",
       [operatorNameField(), { name: "reason", label: "Why" }],
       { confirm: "Pause" },
     );
-    if (answers) await postAction(id, "pause", answers);
+    if (!answers) return;
+    const body = { by: answers.by, reason: answers.reason };
+    await post("/api/campaigns/{campaign}/pause", { path: { campaign }, body });
   });
 
 /**
  * Ask who confirms that a real bench is clear; with `later` that it will be when the campaign begins. Returns the keys of
  * the request, nothing for a simulated bench, and null when the dialog was cancelled.
+ * @param {Pick<Bench, "name" | "start_questions">} bench
+ * @param {{ later?: boolean }} [options]
+ * @returns {Promise<{ confirmed_by?: string, checks?: Check[] } | null>}
  */
 export async function askBenchClear(bench, { later = false } = {}) {
   const questions = Object.entries(bench.start_questions ?? {});
@@ -78,12 +97,15 @@ export async function askBenchClear(bench, { later = false } = {}) {
       confirm: later ? "I make sure of it" : "Start now",
     },
   );
-  return (
-    answers && { confirmed_by: answers.by, checks: questions.map(([name]) => name).filter((name) => answers[name]) }
-  );
+  if (!answers) return null;
+  const ticked = questions.map(([name]) => name).filter((name) => answers[name]);
+  return { confirmed_by: answers.by, checks: /** @type {Check[]} */ (ticked) };
 }
 
-/** The button that resumes an ended or interrupted campaign, and beside it why it may not, or what speaks against it. */
+/**
+ * The button that resumes an ended or interrupted campaign, and beside it why it may not, or what speaks against it.
+ * @param {Campaign} campaign
+ */
 export function resumeControl(campaign) {
   if (!canResume(campaign)) return [];
   const { resumable, resume_reason: reason } = campaign;
@@ -98,8 +120,12 @@ export function resumeControl(campaign) {
   ];
 }
 
-/** Continue a paused campaign, or with `whole` resume one that had ended or was interrupted. */
-export const resumeButton = (id, { whole = false, kind = "primary" } = {}) =>
+/**
+ * Continue a paused campaign, or with `whole` resume one that had ended or was interrupted.
+ * @param {number} campaign
+ * @param {{ whole?: boolean, kind?: string }} [options]
+ */
+export const resumeButton = (campaign, { whole = false, kind = "primary" } = {}) =>
   button(
     whole ? "Resume where it was" : "Go on",
     async () => {
@@ -114,15 +140,20 @@ export const resumeButton = (id, { whole = false, kind = "primary" } = {}) =>
         },
       );
       if (!answers) return;
-      await postAction(id, "resume", { by: answers.by, reason: answers.reason });
-      toast("good", whole ? `Campaign ${id} is taken up.` : "It goes on.");
+      const body = { by: answers.by, reason: answers.reason };
+      await post("/api/campaigns/{campaign}/resume", { path: { campaign }, body });
+      toast("good", whole ? `Campaign ${campaign} is taken up.` : "It goes on.");
       if (whole) await navigate("/bench");
     },
     { kind },
   );
 
-/** Buttons that answer the open prompt: done, or cannot be done. */
-export const answerButtons = (id, prompt) => [
+/**
+ * Buttons that answer the open prompt: done, or cannot be done.
+ * @param {number} campaign
+ * @param {Prompt} prompt
+ */
+export const answerButtons = (campaign, prompt) => [
   button(
     "Done",
     async () => {
@@ -130,7 +161,9 @@ export const answerButtons = (id, prompt) => [
         text: prompt.text,
         confirm: "It is done",
       });
-      if (answers) await postAction(id, "confirm", { prompt: prompt.id, by: answers.by, confirmed: true });
+      if (!answers) return;
+      const body = { prompt: prompt.id, by: answers.by, confirmed: true };
+      await post("/api/campaigns/{campaign}/confirm", { path: { campaign }, body });
     },
     { kind: "primary" },
   ),
@@ -140,12 +173,17 @@ export const answerButtons = (id, prompt) => [
       confirm: "It cannot be done",
       kind: "danger",
     });
-    if (answers)
-      await postAction(id, "confirm", { prompt: prompt.id, by: answers.by, reason: answers.reason, confirmed: false });
+    if (!answers) return;
+    const body = { prompt: prompt.id, by: answers.by, reason: answers.reason, confirmed: false };
+    await post("/api/campaigns/{campaign}/confirm", { path: { campaign }, body });
   }),
 ];
 
-/** Confirm by inspection that a bench is safe whose safe state was not confirmed. */
+/**
+ * Confirm by inspection that a bench is safe whose safe state was not confirmed.
+ * @param {string} bench
+ * @param {() => unknown} then
+ */
 export const clearButton = (bench, then) =>
   button(
     "I have looked, it is safe",
@@ -156,11 +194,17 @@ export const clearButton = (bench, then) =>
         { confirm: "It is safe" },
       );
       if (!answers) return;
-      await post(`/api/benches/${encodeURIComponent(bench)}/clear`, answers);
+      const body = { by: answers.by, reason: answers.reason };
+      await post("/api/benches/{bench}/clear", { path: { bench }, body });
       toast("good", `Bench ${bench} may be used again.`);
       then();
     },
     { kind: "primary" },
   );
 
+/**
+ * @param {string} text
+ * @param {string} href
+ * @param {string} [kind]
+ */
 export const linkButton = (text, href, kind = "") => h("a", { class: `button ${kind}`, href }, text);

@@ -1,20 +1,26 @@
 // History plot: temperatures above, table rate below.
 
 import { colour, figure } from "../core/figure.js";
+import { timeUnit } from "../core/time_unit.js";
+
+/** @import { Columns } from "./campaign_history.js" */
 
 const MIN_INTERVAL_MS = 1000;
-const UNITS = [
-  [10_800, "h", 3600],
-  [600, "min", 60],
-  [0, "s", 1],
-];
+const HOURS_FROM_S = 10_800;
 
+/** @param {Columns} history */
 export function historyPlot(history) {
   const draw = () => {
     const { t_s } = history;
     const long = (t_s.at(-1) ?? 0) - (t_s[0] ?? 0);
-    const [, unit, seconds] = UNITS.find(([from]) => long >= from);
-    const x = t_s.map((t) => t / seconds);
+    const unit = timeUnit(long, HOURS_FROM_S);
+    const x = t_s.map((t) => t / unit.seconds);
+    /**
+     * @param {string} name
+     * @param {readonly (number | null)[]} values
+     * @param {string} shade
+     * @param {{ unit?: string, line?: object, trace?: object }} [more]
+     */
     const line = (name, values, shade, more = {}) => ({
       type: "scatter",
       mode: "lines",
@@ -39,7 +45,7 @@ export function historyPlot(history) {
       layout: {
         margin: { l: 58, r: 12, t: 34, b: 42 },
         hovermode: "x unified",
-        xaxis: { title: { text: `time of the campaign, ${unit}` }, anchor: "y2" },
+        xaxis: { title: { text: `time of the campaign, ${unit.name}` }, anchor: "y2" },
         yaxis: { title: { text: "deg C" }, domain: [0.42, 1] },
         yaxis2: { title: { text: "deg/s" }, domain: [0, 0.34], anchor: "x" },
       },
@@ -58,9 +64,10 @@ export function historyPlot(history) {
     },
   );
   let next = 0;
+  /** @type {ReturnType<typeof setTimeout> | null} */
   let waiting = null;
   /** Redraw at most once a second: a bench in virtual time sends far more messages. */
-  element.onStatus = () => {
+  const onStatus = () => {
     if (waiting) return;
     waiting = setTimeout(
       () => {
@@ -71,5 +78,5 @@ export function historyPlot(history) {
       Math.max(0, next - Date.now()),
     );
   };
-  return element;
+  return Object.assign(element, { onStatus });
 }

@@ -7,9 +7,13 @@ import { presentWords } from "../core/freshness.js";
 import { adviceNotice } from "../campaigns/advice.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
 import { campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
-import { CHIP_KINDS, stateChip } from "../campaigns/states.js";
+import { stateKind } from "../campaigns/states.js";
+import { stateChip } from "../campaigns/state_chip.js";
 import { startTime } from "../campaigns/start_time.js";
 import { linkButton, resumeControl } from "./actions.js";
+
+/** @import { Bench, Campaign, Scheduled } from "../../../types/api.js" */
+/** @import { Child } from "../../../types/pages.js" */
 
 export function noBenchCard() {
   return card(
@@ -25,7 +29,12 @@ export function noBenchCard() {
   );
 }
 
-/** A card whose heading speaks of the present, and is another one while the page is stale. */
+/**
+ * A card whose heading speaks of the present, and is another one while the page is stale.
+ * @param {string} fresh
+ * @param {string} stale
+ * @param {...Child} children
+ */
 function presentCard(fresh, stale, ...children) {
   const id = uniqueId("present");
   return h(
@@ -36,7 +45,12 @@ function presentCard(fresh, stale, ...children) {
   );
 }
 
-/** `next` is the next entry of the schedule, `last` the newest campaign; either may be undefined. */
+/**
+ * `next` is the next entry of the schedule, `last` the newest campaign; either may be undefined.
+ * @param {Bench} bench
+ * @param {Campaign | undefined} last
+ * @param {Scheduled | undefined} next
+ */
 export function idleBench(bench, last, next) {
   return h(
     "div",
@@ -83,7 +97,7 @@ export function idleBench(bench, last, next) {
             ["Ended", last.ended_at ? campaignInstant(last, last.ended_at) : "not", "", durationTaken(last)],
             ["Progress", percent(last.progress)],
           ]),
-          adviceNotice(last) ?? (last.reason ? notice(CHIP_KINDS[last.state] ?? "warn", last.reason) : null),
+          adviceNotice(last) ?? (last.reason ? notice(stateKind(last), last.reason) : null),
           h(
             "div",
             { class: "row" },

@@ -6,21 +6,33 @@ import { axisColour, figure } from "../core/figure.js";
 import { plainNumber } from "../core/format.js";
 import { cardWithHeader } from "../core/components.js";
 
+/** @import { Campaign, SampleColumns, Timeline } from "../../../types/api.js" */
+
 const MAX_READINGS = 4000;
 const MIN_INTERVAL_MS = 3000;
 
-/** A card with `onStatus(status)`: shows each data set when it is finished. */
+/**
+ * A card with `onStatus(status)`: shows each data set when it is finished.
+ * @param {Timeline} timeline
+ * @param {AbortSignal} signal
+ */
 export function lastDataset(timeline, signal) {
   const about = h("span", { class: "muted small" });
   const place = h("div", {}, h("p", { class: "muted" }, "The first data set has not been measured yet."));
-  let columns = null;
-  let [shown, next, busy, unit] = [null, 0, false, null];
+  /** @type {SampleColumns} */
+  let columns = {};
+  /** @type {number | null} */
+  let shown = null;
+  /** @type {string | null} */
+  let unit = null;
+  let [next, busy] = [0, false];
+  const gyroColumns = () => Object.keys(columns).filter((name) => name.startsWith("gyro_"));
   const picture = figure(
     "Gyro output of the last data set",
     `As recorded; of a long data set the first ${MAX_READINGS} readings.`,
     () => {
-      const axes = Object.keys(columns ?? {}).filter((name) => name.startsWith("gyro_"));
-      const t = (columns?.t_s ?? []).map((value) => value - columns.t_s[0]);
+      const axes = gyroColumns();
+      const t = (columns.t_s ?? []).map((value) => value - columns.t_s[0]);
       const thirds = axes.length > 1 ? axes.length : 1;
       return {
         data: axes.map((name, k) => ({
@@ -41,7 +53,7 @@ export function lastDataset(timeline, signal) {
             axes.map((name, k) => [
               k ? `yaxis${k + 1}` : "yaxis",
               {
-                title: { text: `${name.slice(5)}, ${columns.unit}` },
+                title: { text: `${name.slice(5)}, ${unit}` },
                 domain: [1 - (k + 1) / thirds + (k + 1 < thirds ? 0.04 : 0), 1 - k / thirds - (k ? 0.04 : 0)],
               },
             ]),
@@ -52,17 +64,13 @@ export function lastDataset(timeline, signal) {
     {
       height: "21rem",
       csv: () => [
-        ["t_s", ...Object.keys(columns).filter((name) => name.startsWith("gyro_"))],
-        ...columns.t_s.map((t, k) => [
-          t,
-          ...Object.keys(columns)
-            .filter((name) => name.startsWith("gyro_"))
-            .map((name) => columns[name][k]),
-        ]),
+        ["t_s", ...gyroColumns()],
+        ...columns.t_s.map((t, k) => [t, ...gyroColumns().map((name) => columns[name][k])]),
       ],
     },
   );
 
+  /** @param {Campaign} status */
   async function onStatus(status) {
     const until = (status.step ?? 1) - (status.state === "done" ? 0 : 1);
     const dataset = timeline.dataset.slice(0, until).findLast((each) => each !== null) ?? null;
@@ -70,12 +78,13 @@ export function lastDataset(timeline, signal) {
     if (busy || !recording || dataset === null || dataset === shown || Date.now() < next) return;
     [busy, next] = [true, Date.now() + MIN_INTERVAL_MS];
     try {
-      const found = await get(`/api/recordings/${recording}/samples`, {
+      const found = await get("/api/recordings/{recording}/samples", {
+        path: { recording },
         query: { dataset, limit: MAX_READINGS },
         signal,
       });
       unit ??= await outputUnit(recording, found.columns, signal);
-      columns = { ...found.columns, unit };
+      columns = found.columns;
       const k = timeline.dataset.indexOf(dataset);
       setChildren(
         about,
@@ -94,9 +103,14 @@ export function lastDataset(timeline, signal) {
   return Object.assign(cardWithHeader("Last data set", about, place), { onStatus });
 }
 
-/** The unit of a gyro output, from a short trace of it. */
+/**
+ * The unit of a gyro output, from a short trace of it.
+ * @param {number} recording
+ * @param {SampleColumns} columns
+ * @param {AbortSignal} signal
+ */
 async function outputUnit(recording, columns, signal) {
   const channel = Object.keys(columns).find((name) => name.startsWith("gyro_"));
   const asked = { channel, from_s: columns.t_s[0], until_s: columns.t_s.at(-1), points: 200 };
-  return (await get(`/api/recordings/${recording}/trace`, { query: asked, signal })).unit;
+  return (await get("/api/recordings/{recording}/trace", { path: { recording }, query: asked, signal })).unit;
 }

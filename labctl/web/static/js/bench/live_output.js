@@ -5,23 +5,42 @@ import { axisColour, figure } from "../core/figure.js";
 import { mean, number } from "../core/format.js";
 import { factList, cardWithHeader } from "../core/components.js";
 
+/** @import { Campaign, Output } from "../../../types/api.js" */
+
 const MAX_POINTS = 3000;
 /** Up to this many points have markers: a line alone shows nothing of a single point. */
 const MARKER_LIMIT = 30;
 const DASHES = ["solid", "dash", "dot", "dashdot"];
+/** @typedef {Omit<Output, "t_s" | "mean"> & { t_s: number[], mean: number[] }} Course */
+/** @typedef {Map<string, Course>} Courses */
+
+/** @type {Map<number, Courses>} */
 const seriesByCampaign = new Map();
 
-/** The series of a campaign, one for each unit and axis; kept when the page is left. */
+/**
+ * The series of a campaign, one for each unit and axis; kept when the page is left.
+ * @param {number} campaign
+ * @returns {Courses}
+ */
 function campaignSeries(campaign) {
-  if (!seriesByCampaign.has(campaign)) seriesByCampaign.set(campaign, new Map());
-  return seriesByCampaign.get(campaign);
+  const found = seriesByCampaign.get(campaign) ?? new Map();
+  seriesByCampaign.set(campaign, found);
+  return found;
 }
 
+/** @param {{ channel: string }} output */
 const axisName = (output) => output.channel.slice("gyro_".length);
+/**
+ * @param {{ gyro: string, channel: string }} output
+ * @param {boolean} several
+ */
 const seriesName = (output, several) =>
   several ? `${output.gyro}, axis ${axisName(output)}` : `axis ${axisName(output)}`;
 
-/** A card with `onStatus(status)`: shows the outputs of each progress message. */
+/**
+ * A card with `onStatus(status)`: shows the outputs of each progress message.
+ * @param {number} campaign
+ */
 export function liveOutput(campaign) {
   const courses = campaignSeries(campaign);
   const figures = h(
@@ -72,8 +91,9 @@ export function liveOutput(campaign) {
     },
   );
 
+  /** @param {Campaign} status */
   function onStatus(status) {
-    const outputs = status.outputs ?? [];
+    const outputs = status.outputs;
     for (const output of outputs) appendOutput(courses, output);
     if (!outputs.length) return;
     const several = new Set(outputs.map((output) => output.gyro)).size > 1;
@@ -94,13 +114,16 @@ export function liveOutput(campaign) {
   return Object.assign(cardWithHeader("Gyro output now", null, figures, place), { onStatus });
 }
 
+/**
+ * @param {Courses} courses
+ * @param {Output} output
+ */
 function appendOutput(courses, output) {
   const key = `${output.gyro} ${output.channel}`;
-  if (!courses.has(key)) courses.set(key, { ...output, t_s: [], mean: [] });
-  const course = courses.get(key);
-  if (course.t_s.length && output.t_s <= course.t_s.at(-1)) return;
-  for (const name of ["t_s", "mean"]) {
-    course[name].push(output[name]);
-    if (course[name].length > MAX_POINTS) course[name].splice(0, course[name].length - MAX_POINTS);
-  }
+  const course = courses.get(key) ?? { ...output, t_s: [], mean: [] };
+  courses.set(key, course);
+  if (output.t_s <= (course.t_s.at(-1) ?? -Infinity)) return;
+  course.t_s.push(output.t_s);
+  course.mean.push(output.mean);
+  for (const values of [course.t_s, course.mean]) values.splice(0, values.length - MAX_POINTS);
 }

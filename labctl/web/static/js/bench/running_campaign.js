@@ -7,10 +7,11 @@ import { card, cardWithHeader, notice } from "../core/components.js";
 import { navigate } from "../core/router.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { campaignInstant } from "../campaigns/campaign_time.js";
-import { stateChip } from "../campaigns/states.js";
+import { hasEnded } from "../campaigns/states.js";
+import { stateChip } from "../campaigns/state_chip.js";
 import { linkButton, pauseButton, resumeButton, stopButton } from "./actions.js";
 import { eventList } from "./event_list.js";
-import { FINAL_STATES, followCampaign } from "./campaign_stream.js";
+import { followCampaign } from "./campaign_stream.js";
 import { gauges } from "./gauges.js";
 import { liveOutput } from "./live_output.js";
 import { campaignHistory, remainingSeconds, appendStatus } from "./campaign_history.js";
@@ -18,10 +19,17 @@ import { operatorPrompt } from "./operator_prompt.js";
 import { lastDataset } from "./last_dataset.js";
 import { historyPlot } from "./history_plot.js";
 
+/** @import { Campaign, CampaignPlan } from "../../../types/api.js" */
+
 const MAX_EVENTS = 8;
 const PLAN_REFRESH_MS = 2500;
 
-/** `over()` is called when the campaign has ended. */
+/**
+ * `over()` is called when the campaign has ended.
+ * @param {Campaign} status
+ * @param {CampaignPlan} plan
+ * @param {{ signal: AbortSignal, over: () => void }} page
+ */
 export function runningCampaign(status, plan, { signal, over }) {
   const { timeline } = plan;
   const history = campaignHistory(status.id);
@@ -38,7 +46,9 @@ export function runningCampaign(status, plan, { signal, over }) {
     lastDataset(timeline, signal),
     eventList(MAX_EVENTS, "info", status),
   ];
-  let [now, asked, planned] = [status, null, 0];
+  let [now, planned] = [status, 0];
+  /** @type {string | undefined} */
+  let asked;
   const picture = planChart(
     `Campaign ${status.id} plan`,
     () => ({ timeline: plan.timeline, now_s: now.t_s, live: true }),
@@ -51,6 +61,7 @@ export function runningCampaign(status, plan, { signal, over }) {
   );
   const setpoint = () => now.setpoint_c ?? timeline.temperature_c[Math.max((now.step ?? 1) - 1, 0)];
 
+  /** @param {Campaign} next */
   function show(next) {
     now = next;
     bar.show(now);
@@ -64,14 +75,14 @@ export function runningCampaign(status, plan, { signal, over }) {
       setChildren(prompt, now.prompt ? operatorPrompt(now.id, now.prompt) : null);
     }
     setChildren(warningList, warnings(now));
-    if (FINAL_STATES.has(now.state)) over();
+    if (hasEnded(now)) over();
     else if (Date.now() > planned) again();
   }
   /** Reload the plan for the states of its steps. */
   async function again() {
     planned = Date.now() + PLAN_REFRESH_MS;
     try {
-      plan.timeline = (await get(`/api/campaigns/${status.id}/plan`, { signal })).timeline;
+      plan.timeline = (await get("/api/campaigns/{campaign}/plan", { path: { campaign: status.id }, signal })).timeline;
       picture.redraw();
     } catch {
       // the event stream reports a silent service
@@ -125,6 +136,10 @@ export function runningCampaign(status, plan, { signal, over }) {
   ];
 }
 
+/**
+ * @param {Campaign} status
+ * @param {CampaignPlan} plan
+ */
 function statusBar(status, plan) {
   const [state, text, beside, acts] = [
     h("span", {}),
@@ -145,6 +160,7 @@ function statusBar(status, plan) {
     bar,
   );
   const stop = stopButton(status.id);
+  /** @type {string | null} */
   let mode = null;
   const element = h(
     "section",
@@ -158,7 +174,8 @@ function statusBar(status, plan) {
     meter,
     beside,
   );
-  element.show = (now) => {
+  /** @param {Campaign} now */
+  const show = (now) => {
     setChildren(state, stateChip(now));
     text.textContent = now.step_text || "About to begin";
     bar.style.width = `${(100 * now.progress).toFixed(2)}%`;
@@ -179,11 +196,18 @@ function statusBar(status, plan) {
     if (wanted !== mode) setChildren(acts, wanted === "resume" ? resumeButton(now.id) : pauseButton(now.id));
     mode = wanted;
   };
-  return element;
+  return Object.assign(element, { show });
 }
 
-/** Notices for links that fail, dropped units, a pause and the last fault; empty when there are none. */
+/**
+ * Notices for links that fail, dropped units, a pause and the last fault; empty when there are none.
+ * @param {Campaign} now
+ */
 function warnings(now) {
+  /**
+   * @param {Record<string, string>} found
+   * @param {string} text
+   */
   const listed = (found, text) =>
     Object.entries(found).map(([name, why]) => notice("warn", h("strong", {}, `${name} `), `${text}: ${why}`));
   return [

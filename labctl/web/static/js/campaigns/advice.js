@@ -3,7 +3,12 @@
 import { h } from "../core/elements.js";
 import { notice } from "../core/components.js";
 
-/** Null for a campaign that has not failed. */
+/** @import { Campaign } from "../../../types/api.js" */
+
+/**
+ * Null for a campaign that has not failed.
+ * @param {Pick<Campaign, "advice" | "reason">} campaign
+ */
 export function adviceNotice(campaign) {
   const { advice } = campaign;
   if (!advice) return null;

@@ -3,7 +3,13 @@
 import { h } from "../core/elements.js";
 import { notice } from "../core/components.js";
 
-/** `propose(attendance)` is called for the better start; without it no button is shown. Null: nobody is needed. */
+/** @import { Attendance } from "../../../types/api.js" */
+
+/**
+ * `propose(attendance)` is called for the better start; without it no button is shown. Null: nobody is needed.
+ * @param {Attendance | null} attendance
+ * @param {(attendance: Attendance) => unknown} [propose]
+ */
 export function attendanceNotice(attendance, propose) {
   if (!attendance) return null;
   const better =
@@ -22,5 +28,8 @@ export function attendanceNotice(attendance, propose) {
   );
 }
 
-/** An instant with its offset as the wall clock there shows it: 2026-03-28T07:15. */
+/**
+ * An instant with its offset as the wall clock there shows it: 2026-03-28T07:15.
+ * @param {string} text
+ */
 export const wallText = (text) => text.slice(0, 16);

@@ -2,8 +2,15 @@
 
 import { colour, figure } from "../core/figure.js";
 import { duration, plainNumber } from "../core/format.js";
+import { planSteps, positionBands, setPointCourse } from "./plan_steps.js";
 
-/** States of a data set and their colours, in the order of the legend. */
+/** @import { Timeline } from "../../../types/api.js" */
+/** @import { PlotTrace } from "../../../types/pages.js" */
+
+/**
+ * States of a data set and their colours, in the order of the legend.
+ * @type {[state: string, colour: string][]}
+ */
 const STATES = [
   ["done", "good"],
   ["running", "accent"],
@@ -15,74 +22,26 @@ const STATES = [
 /** Plans longer than this are drawn in hours, shorter ones in minutes, s. */
 const HOURS_FROM_S = 3 * 3600;
 
-/** Steps in order of time, with begin and end in units of `unit_s`: actual times where a step has run, else planned. */
-function planSteps(timeline, unit_s) {
-  return timeline.number.map((number, k) => {
-    const from = timeline.forecast_s?.[k] ?? timeline.start_s[k];
-    const over = timeline.ended_s?.[k];
-    const until =
-      Number.isFinite(over) && over >= from
-        ? over
-        : from + (timeline.state?.[k] === "skipped" ? 0 : timeline.expected_s[k]);
-    return {
-      number,
-      kind: timeline.kind[k],
-      from: from / unit_s,
-      until: until / unit_s,
-      warm: timeline.temperature_c[k],
-      rate: timeline.rate_dps[k],
-      position: timeline.position[k],
-      dataset: timeline.dataset[k],
-      state: timeline.state?.[k] ?? "to come",
-    };
-  });
-}
-
-/** The chamber set point over time: constant, or a ramp while the chamber moves. */
-function setPointCourse(steps) {
-  const [x, y] = [[], []];
-  let held = null;
-  for (const step of steps) {
-    if (step.warm === null) continue;
-    if (step.kind === "move_chamber") {
-      x.push(step.from, step.until);
-      y.push(held ?? step.warm, step.warm);
-    } else {
-      x.push(step.from, step.until);
-      y.push(step.warm, step.warm);
-    }
-    held = step.warm;
-  }
-  return { x, y };
-}
-
-function positionBands(steps) {
-  const found = [];
-  for (const step of steps) {
-    if (!step.position) continue;
-    const last = found.at(-1);
-    if (last?.position === step.position) last.until = step.until;
-    else found.push({ position: step.position, from: step.from, until: step.until });
-  }
-  return found;
-}
-
 /**
  * The chart of a plan. `give()` returns {timeline, now_s, live}: the columns of the API, the present moment in seconds of
  * the campaign (null: it does not run), and whether to show states. `pick(dataset)` is called for a clicked data set.
+ * @param {string} name
+ * @param {() => { timeline: Timeline, now_s?: number | null, live?: boolean }} give
+ * @param {{ height?: string, pick?: (dataset: number) => unknown }} [options]
  */
 export function planChart(name, give, { height = "24rem", pick } = {}) {
   const caption =
     "Above: set point of the chamber, with the data sets on it. Below: their table rates. Bands: which axis of the unit points up.";
   const draw = () => {
     const { timeline, now_s = null, live = false } = give();
-    const unit_s = timeline.start_s.at(-1) + timeline.expected_s.at(-1) > HOURS_FROM_S ? 3600 : 60;
+    const unit_s = (timeline.start_s.at(-1) ?? 0) + (timeline.expected_s.at(-1) ?? 0) > HOURS_FROM_S ? 3600 : 60;
     const steps = planSteps(timeline, unit_s);
     const sets = steps.filter((step) => step.dataset !== null);
     const narrow = window.innerWidth < 760;
     const marks = STATES.flatMap(([state, shade]) => {
       const here = sets.filter((step) => step.state === state);
       if (!here.length) return [];
+      /** @type {PlotTrace} */
       const common = {
         type: "scatter",
         mode: "markers",
@@ -124,6 +83,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
       ];
     });
     const end = steps.at(-1)?.until ?? 1;
+    /** @type {object[]} */
     const shapes = positionBands(steps).map((band) => ({
       type: "rect",
       xref: "x",
@@ -137,6 +97,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
       opacity: 0.1,
       layer: "below",
     }));
+    /** @type {object[]} */
     const words = positionBands(steps)
       .filter((band) => band.until - band.from > end / (narrow ? 12 : 30))
       .map((band) => ({
@@ -149,7 +110,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
         yanchor: "bottom",
         font: { size: 11.5, color: colour(`axis-${band.position.replace("-", "")}`) },
       }));
-    if (Number.isFinite(now_s)) {
+    if (now_s !== null) {
       shapes.push({
         type: "line",
         xref: "x",
@@ -202,8 +163,8 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
   };
   const csv = () => {
     const { timeline } = give();
-    const names = Object.keys(timeline);
-    return [names, ...timeline.number.map((_, k) => names.map((each) => timeline[each][k]))];
+    const columns = Object.entries(timeline);
+    return [columns.map(([each]) => each), ...timeline.number.map((_, k) => columns.map(([, values]) => values[k]))];
   };
   const element = figure(name, caption, draw, { height, csv });
   if (pick)

@@ -4,11 +4,22 @@ import { setChildren, uniqueId, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
 import { card, chip, labelledField } from "../core/components.js";
 
+/** @import { Recipe } from "../../../types/api.js" */
+/** @import { Child } from "../../../types/pages.js" */
+
+/** @typedef {{ name: string, text: string | null }} Choice */
+
 const TYPING_PAUSE_MS = 600;
 
-/** `choice` is {name, text}: `name` "own" means `text`. `chosen(choice)` is called on each change. */
+/**
+ * `choice` is {name, text}: `name` "own" means `text`. `chosen(choice)` is called on each change.
+ * @param {readonly Recipe[]} all
+ * @param {Choice} choice
+ * @param {(choice: Choice) => unknown} chosen
+ */
 export function recipeChoice(all, choice, chosen) {
   const group = uniqueId("recipe");
+  /** @type {HTMLTextAreaElement} */
   const text = h("textarea", {
     rows: "16",
     spellcheck: "false",
@@ -18,30 +29,39 @@ export function recipeChoice(all, choice, chosen) {
       waiting = setTimeout(() => chosen({ name: "own", text: text.value }), TYPING_PAUSE_MS);
     },
   });
-  let waiting = null;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let waiting;
   const own = h(
     "div",
     {},
     labelledField("Recipe as TOML", text, "Planned again as you type. Nothing moves before you start it."),
   );
-  const shipped = h("details", {}, h("summary", {}, "Its text"), h("pre", { class: "command" }));
+  const shippedText = h("pre", { class: "command" });
+  const shipped = h("details", {}, h("summary", {}, "Its text"), shippedText);
   const edit = h(
     "button",
     {
       type: "button",
       class: "button tiny",
       onclick: () => {
-        text.value = shipped.querySelector("pre").textContent;
+        text.value = shippedText.textContent;
         all.length && pick("own");
-        radios.get("own").checked = true;
+        for (const [name, radio] of radios) radio.checked = name === "own";
         text.focus();
       },
     },
     "Change a copy of it",
   );
   shipped.append(h("div", { class: "row", style: "margin-top: .5rem" }, edit));
+  /** @type {Map<string, HTMLInputElement>} */
   const radios = new Map();
 
+  /**
+   * @param {string} name
+   * @param {string} title
+   * @param {Child} beside
+   * @param {Child} [warning]
+   */
   function option(name, title, beside, warning) {
     const input = h("input", {
       type: "radio",
@@ -64,15 +84,17 @@ export function recipeChoice(all, choice, chosen) {
       ),
     );
   }
+  /** @param {string} name */
   function pick(name) {
     if (name === "own" && !text.value.trim()) text.value = all[0]?.text ?? "";
     show(name);
     chosen(name === "own" ? { name, text: text.value } : { name, text: null });
   }
+  /** @param {string} name */
   function show(name) {
     own.hidden = name !== "own";
     shipped.hidden = name === "own";
-    setChildren(shipped.querySelector("pre"), all.find((each) => each.name === name)?.text ?? "");
+    setChildren(shippedText, all.find((each) => each.name === name)?.text ?? "");
   }
   show(choice.name);
   return card(

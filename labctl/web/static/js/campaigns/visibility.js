@@ -4,13 +4,18 @@ import { h } from "../core/elements.js";
 import { sizeText, idText } from "../core/format.js";
 import { notice, table } from "../core/components.js";
 
+/** @import { Visibility } from "../../../types/api.js" */
+
 /** Below this share left beside the usual model, the model absorbs the effect. */
 const ABSORBED_SHARE = 0.02;
 
+/** @param {{ effect: string }} row */
 const effectLink = (row) => h("a", { href: `/effects/${row.effect}` }, idText(row.effect));
 
+/** @param {Visibility} row */
 const smallestSize = (row) => (row.smallest_size === null ? "–" : sizeText(row.smallest_size, row.unit));
 
+/** @param {readonly Visibility[]} rows */
 export function visibilityReport(rows) {
   const seen = rows.filter((row) => row.visible).sort((a, b) => b.share - a.share);
   const fitted = rows.filter((row) => !row.visible && row.why === "schedule" && row.share < ABSORBED_SHARE);

@@ -1,13 +1,24 @@
 // User interface components that several pages use.
 
-import { Problem, Unreachable } from "./api.js";
+import { isAbort, messageOf, Problem, Unreachable } from "./errors.js";
 import { setChildren, uniqueId, h } from "./elements.js";
 
-/** A card with a heading. */
+/** @import { Child, Column, Fact } from "../../../types/pages.js" */
+
+/**
+ * A card with a heading.
+ * @param {string} title
+ * @param {...Child} children
+ */
 export function card(title, ...children) {
   return h("section", { class: "card stack", "aria-label": title }, h("h2", {}, title), ...children);
 }
 
+/**
+ * @param {string} title
+ * @param {Child} beside
+ * @param {...Child} children
+ */
 export function cardWithHeader(title, beside, ...children) {
   return h(
     "section",
@@ -17,7 +28,12 @@ export function cardWithHeader(title, beside, ...children) {
   );
 }
 
-/** Header of a page: its h1, a line below, and actions at the right. */
+/**
+ * Header of a page: its h1, a line below, and actions at the right.
+ * @param {string} title
+ * @param {Child} [line]
+ * @param {...Child} acts
+ */
 export function pageHeader(title, line, ...acts) {
   return h(
     "header",
@@ -27,13 +43,16 @@ export function pageHeader(title, line, ...acts) {
   );
 }
 
-/** A description list: [name, value, unit, secondary text]. */
+/**
+ * A description list: [name, value, unit, secondary text].
+ * @param {readonly (Fact | null)[]} rows
+ */
 export function factList(rows) {
   return h(
     "dl",
     { class: "facts" },
     rows
-      .filter(Boolean)
+      .filter((row) => row !== null)
       .map(([name, value, unit, beside]) =>
         h(
           "div",
@@ -51,12 +70,27 @@ export function factList(rows) {
   );
 }
 
+/**
+ * @param {Child} text
+ * @param {string} [kind]
+ */
 export const chip = (text, kind = "") => h("span", { class: `chip ${kind}` }, text);
-/** A model's name, which may break after each part: yang2018+ scale_factor_asymmetry. */
+/**
+ * A model's name, which may break after each part: yang2018+ scale_factor_asymmetry.
+ * @param {string | null | undefined} name
+ * @returns {Child[]}
+ */
 export const modelName = (name) => (name ?? "").split(/(?<=\+)/).flatMap((part, k) => (k ? [h("wbr"), part] : [part]));
+/**
+ * @param {string} kind
+ * @param {...Child} children
+ */
 export const notice = (kind, ...children) =>
   h("div", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : "status" }, ...children);
-/** The warnings of a fit or of a change, null without any. */
+/**
+ * The warnings of a fit or of a change, null without any.
+ * @param {{ warnings?: readonly { severity: string, text: string }[] }} answer
+ */
 export const fitWarnings = (answer) =>
   answer.warnings?.length
     ? notice(
@@ -64,11 +98,20 @@ export const fitWarnings = (answer) =>
         answer.warnings.map((each) => h("p", {}, `${each.severity === "certain" ? "Wrong" : "Check"}: ${each.text}`)),
       )
     : null;
+/** @param {...Child} children */
 export const emptyState = (...children) => h("div", { class: "empty stack" }, ...children);
+/** @param {string} text */
 export const busyIndicator = (text) => h("p", { class: "busy muted", role: "status" }, text);
 
-/** A table: columns are {title, number?, prose?, cell(row)}. On a phone its rows become cards, unless they are `dense`. */
+/**
+ * A table: columns are {title, number?, prose?, cell(row)}. On a phone its rows become cards, unless they are `dense`.
+ * @template Row
+ * @param {readonly (Column<Row> | null)[]} columns
+ * @param {readonly Row[]} rows
+ * @param {{ label?: string, selected?: (row: Row) => unknown, onrow?: (row: Row) => unknown, first?: string, dense?: boolean }} [options]
+ */
 export function table(columns, rows, { label, selected, onrow, first, dense } = {}) {
+  const shown = columns.filter((column) => column !== null);
   return h(
     "div",
     { class: "table-scroll", tabindex: "0", role: "region", "aria-label": label },
@@ -81,7 +124,7 @@ export function table(columns, rows, { label, selected, onrow, first, dense } = 
         h(
           "tr",
           {},
-          columns.map((c) => h("th", { class: c.number ? "number" : null, scope: "col" }, c.title)),
+          shown.map((c) => h("th", { class: c.number ? "number" : null, scope: "col" }, c.title)),
         ),
       ),
       h(
@@ -91,7 +134,7 @@ export function table(columns, rows, { label, selected, onrow, first, dense } = 
           h(
             "tr",
             { "aria-selected": selected?.(row) ? "true" : null, onclick: onrow ? () => onrow(row) : null },
-            columns.map((c) =>
+            shown.map((c) =>
               h(
                 "td",
                 {
@@ -108,21 +151,38 @@ export function table(columns, rows, { label, selected, onrow, first, dense } = 
   );
 }
 
-/** Labelled select: options are [value, text]. */
+/**
+ * A value and its text, for the options of `selectField` and `toggleGroup`.
+ * @template {string | number} V
+ * @param {V} value
+ * @param {string} text
+ * @returns {[V, string]}
+ */
+export const option = (value, text) => [value, text];
+
+/**
+ * Labelled select: options are [value, text].
+ * @param {string} label
+ * @param {readonly (readonly [string | number, string])[]} options
+ * @param {string | number | null | undefined} value
+ * @param {(value: string) => unknown} onchange
+ */
 export function selectField(label, options, value, onchange) {
   const id = uniqueId("choice");
-  return h(
-    "div",
-    { class: "field" },
-    h("label", { for: id }, label),
-    h(
-      "select",
-      { id, onchange: (event) => onchange(event.target.value) },
-      options.map(([each, text]) => h("option", { value: each, selected: String(each) === String(value) }, text)),
-    ),
+  /** @type {HTMLSelectElement} */
+  const select = h(
+    "select",
+    { id, onchange: () => onchange(select.value) },
+    options.map(([each, text]) => h("option", { value: each, selected: String(each) === String(value) }, text)),
   );
+  return h("div", { class: "field" }, h("label", { for: id }, label), select);
 }
 
+/**
+ * @param {string} label
+ * @param {HTMLElement} input
+ * @param {string | null} [hint]
+ */
 export function labelledField(label, input, hint) {
   const id = uniqueId("field");
   input.id = id;
@@ -136,7 +196,14 @@ export function labelledField(label, input, hint) {
   );
 }
 
-/** A group of buttons of which one is pressed: options are [value, text]. */
+/**
+ * A group of buttons of which one is pressed: options are [value, text].
+ * @template {string} Value
+ * @param {string} label
+ * @param {readonly (readonly [Value, string, ...unknown[]])[]} options
+ * @param {string} value
+ * @param {(value: Value) => unknown} onchange
+ */
 export function toggleGroup(label, options, value, onchange) {
   const buttons = options.map(([each, text]) =>
     h(
@@ -155,7 +222,12 @@ export function toggleGroup(label, options, value, onchange) {
   return h("div", { class: "tabs", role: "group", "aria-label": label }, buttons);
 }
 
-/** A button with an asynchronous action: disabled and marked busy until the action ends. */
+/**
+ * A button with an asynchronous action: disabled and marked busy until the action ends.
+ * @param {Child} text
+ * @param {() => unknown} act
+ * @param {{ kind?: string, done?: string }} [options]
+ */
 export function button(text, act, { kind = "", done } = {}) {
   const element = h(
     "button",
@@ -169,7 +241,7 @@ export function button(text, act, { kind = "", done } = {}) {
           await act();
           if (done) toast("good", done);
         } catch (error) {
-          if (error.name !== "AbortError") toast("bad", error.message);
+          if (!isAbort(error)) toast("bad", messageOf(error));
         } finally {
           element.disabled = false;
           element.classList.remove("busy");
@@ -181,7 +253,11 @@ export function button(text, act, { kind = "", done } = {}) {
   return element;
 }
 
-/** Error page: title, message, and a button to try again. */
+/**
+ * Error page: title, message, and a button to try again.
+ * @param {unknown} error
+ * @param {() => unknown} [again]
+ */
 export function errorPage(error, again) {
   const what =
     error instanceof Problem
@@ -194,16 +270,21 @@ export function errorPage(error, again) {
     "div",
     { class: "page" },
     h("h1", {}, what),
-    notice("bad", h("p", {}, error.message)),
+    notice("bad", h("p", {}, messageOf(error))),
     again
       ? h("div", { class: "row" }, h("button", { class: "button", type: "button", onclick: again }, "Try again"))
       : null,
   );
 }
 
-/** Show a toast; an error stays until it is closed. */
+/**
+ * Show a toast; an error stays until it is closed.
+ * @param {string} kind
+ * @param {string} text
+ */
 export function toast(kind, text) {
   const corner = document.querySelector(".toasts");
+  if (!corner) return;
   const element = notice(
     kind,
     h("span", {}, text),
@@ -217,68 +298,19 @@ export function toast(kind, text) {
   if (kind !== "bad") setTimeout(() => element.remove(), 6000);
 }
 
-/** Modal dialog with a form: resolves to {name: value}, or null when cancelled. `fields`: [{name, label, value, hint, type, required, minlength}].
- * A checkbox resolves to true or false. `body`: an element above the fields. */
-export function dialog(title, fields, { text, body, confirm = "Go on", kind = "primary" } = {}) {
-  return new Promise((resolve) => {
-    const inputs = fields.map((f) =>
-      h("input", {
-        name: f.name,
-        type: f.type ?? "text",
-        value: f.value ?? "",
-        minlength: f.minlength ?? null,
-        required: f.required !== false,
-        autocomplete: "off",
-      }),
-    );
-    const name = uniqueId("dialog");
-    const box = h(
-      "dialog",
-      { "aria-labelledby": name },
-      h(
-        "form",
-        {
-          method: "dialog",
-          onsubmit: (event) => {
-            event.preventDefault();
-            box.close("yes");
-          },
-        },
-        h("h2", { id: name }, title),
-        text ? h("p", { class: "muted" }, text) : null,
-        body ?? null,
-        fields.map((f, k) => labelledField(f.label, inputs[k], f.hint)),
-        h(
-          "div",
-          { class: "row", style: "justify-content: flex-end" },
-          h("button", { class: "button quiet", type: "button", onclick: () => box.close() }, "Cancel"),
-          h("button", { class: `button ${kind}`, type: "submit" }, confirm),
-        ),
-      ),
-    );
-    box.addEventListener("close", () => {
-      box.remove();
-      resolve(
-        box.returnValue === "yes"
-          ? Object.fromEntries(
-              inputs.map((input) => [input.name, input.type === "checkbox" ? input.checked : input.value]),
-            )
-          : null,
-      );
-    });
-    document.body.append(box);
-    box.showModal();
-    inputs[0]?.focus();
-  });
-}
-
-/** Show a busy indicator in `place`, then the element that `make()` resolves to, or its error. */
+/**
+ * Show a busy indicator in `place`, then the element that `make()` resolves to, or its error.
+ * @template {Element} E
+ * @param {E} place
+ * @param {string} text
+ * @param {() => Child | Promise<Child>} make
+ */
 export async function loadInto(place, text, make) {
   setChildren(place, busyIndicator(text));
   try {
     setChildren(place, await make());
   } catch (error) {
-    if (error.name !== "AbortError") setChildren(place, notice("bad", error.message));
+    if (!isAbort(error)) setChildren(place, notice("bad", messageOf(error)));
   }
   return place;
 }

@@ -2,7 +2,7 @@
 
 import { accessKey, setAccessKey } from "./api.js";
 import { setChildren, h, svg } from "./elements.js";
-import { dialog } from "./components.js";
+import { dialog } from "./dialog.js";
 import { freshnessLine } from "./freshness.js";
 import { show } from "./router.js";
 
@@ -15,6 +15,7 @@ const NAVIGATION = [
   ["/effects", "Effects", "M5 4h11a3 3 0 013 3v13H8a3 3 0 01-3-3zM5 17a3 3 0 013-3h11"],
 ];
 
+/** @param {string} path */
 const icon = (path) =>
   svg(
     "svg",
@@ -32,12 +33,17 @@ const icon = (path) =>
 
 export function buildLayout() {
   const links = NAVIGATION.map(([path, name, drawing]) => h("a", { href: path }, icon(drawing), name));
-  const [themes, keys] = [[], []];
+  /** @type {HTMLElement[]} */
+  const themes = [];
+  /** @type {HTMLElement[]} */
+  const keys = [];
   /** Buttons for theme and access key: in the sidebar, and below the page on a narrow screen. */
   const controls = () => {
-    themes.push(h("button", { type: "button", class: "button quiet tiny", onclick: swap }));
-    keys.push(h("button", { type: "button", class: "button quiet tiny", onclick: () => askKey() }));
-    return [themes.at(-1), keys.at(-1)];
+    const theme = h("button", { type: "button", class: "button quiet tiny", onclick: swap });
+    const key = h("button", { type: "button", class: "button quiet tiny", onclick: () => askKey() });
+    themes.push(theme);
+    keys.push(key);
+    return [theme, key];
   };
   const name = () => {
     for (const each of themes)
@@ -54,6 +60,7 @@ export function buildLayout() {
   }
 
   let asking = false;
+  /** @param {string} [why] */
   async function askKey(why) {
     if (accessKey() && !why) {
       setAccessKey(null);

@@ -7,11 +7,27 @@ import { linkButton } from "../bench/actions.js";
 import { signatureFigure } from "./signature_plot.js";
 import { CHANNELS, ORIGINS, TECHNOLOGIES, VIEWS } from "./labels.js";
 
+/** @import { Effect } from "../../../types/api.js" */
+/** @import { Child } from "../../../types/pages.js" */
+
+/** @param {Effect} effect */
 const effectLink = (effect) => h("a", { href: `/effects/${effect.id}` }, effect.term);
+/**
+ * @param {readonly Child[]} parts
+ * @returns {Child[]}
+ */
 const commaSeparated = (parts) => parts.flatMap((part, k) => (k ? [", ", part] : [part]));
 
+/**
+ * @param {Effect} effect
+ * @param {readonly Effect[]} all
+ */
 export function effectDetail(effect, all) {
   const at = all.indexOf(effect);
+  /**
+   * @param {Effect | undefined} to
+   * @param {string} text
+   */
   const turn = (to, text) => (to ? h("a", { class: "button tiny", href: `/effects/${to.id}` }, text) : null);
   const alike = all.filter(
     (each) => each !== effect && (effect.aliases.includes(each.id) || each.aliases.includes(effect.id)),
@@ -122,16 +138,20 @@ export function effectDetail(effect, all) {
   );
 }
 
+/** @type {Record<string, string>} */
 const AXES_TEXTS = {
   own: "It shows on the axis that turns.",
   cross: "It shows on the axes that do not turn.",
   all: "It shows on every axis.",
 };
+/** @param {Effect} effect */
 const axesParagraph = (effect) => h("p", { class: "muted" }, AXES_TEXTS[effect.rows] ?? "");
 
+/** @param {Effect} effect */
 function sizeCard(effect) {
   const rows = Object.entries(effect.plausible);
   if (!rows.length) return card("How large it is", h("p", { class: "muted" }, "No sizes are written down for it."));
+  /** @param {number} value */
   const sizeCell = (value) => h("span", { class: "nowrap" }, sizeText(value, effect.unit ?? ""));
   return card(
     "How large it is",
@@ -154,6 +174,7 @@ function sizeCard(effect) {
   );
 }
 
+/** @param {Effect} effect */
 function shapeCard(effect) {
   const orders =
     effect.max_order === null

@@ -1,5 +1,6 @@
 // Labels of origins, views, channels and technologies in the catalogue.
 
+/** @type {Record<string, [name: string, about: string]>} */
 export const ORIGINS = {
   sensor: ["Sensor", "What the sensing element and its electronics do."],
   package: ["Package", "How the sensing axes lie in the unit's case."],
@@ -11,6 +12,7 @@ export const ORIGINS = {
   environment: ["Environment", "The Earth, its field, and what changes from one switching-on to the next. Stays here."],
 };
 
+/** @type {Record<string, string>} */
 export const VIEWS = {
   map: "the map over rate and temperature",
   time: "the course in time",
@@ -27,6 +29,7 @@ export const VIEWS = {
   supply_v: "against the supply voltage",
 };
 
+/** @type {Record<string, string>} */
 export const CHANNELS = {
   t_s: "time of each reading",
   power_s: "time since power-on",
@@ -37,4 +40,5 @@ export const CHANNELS = {
   mounting: "number of the mounting",
 };
 
+/** @type {Record<string, string>} */
 export const TECHNOLOGIES = { fog: "Fibre-optic (FOG)", mems: "MEMS", piezo: "Piezoelectric vibrating" };

@@ -2,11 +2,19 @@
 
 import { setChildren, h } from "../core/elements.js";
 import { idText } from "../core/format.js";
-import { chip, emptyState, labelledField, pageHeader, toggleGroup } from "../core/components.js";
+import { chip, emptyState, labelledField, option, pageHeader, toggleGroup } from "../core/components.js";
 import { updateQuery } from "../core/router.js";
 import { signatureThumbnail } from "./signature_plot.js";
 import { CHANNELS, ORIGINS } from "./labels.js";
 
+/** @import { Effect } from "../../../types/api.js" */
+/** @typedef {{ title: string, about: string, effects: Effect[] }} Chapter */
+/** @import { Query } from "../../../types/pages.js" */
+
+/**
+ * @param {readonly Effect[]} all
+ * @param {Query} query
+ */
 export function effectList(all, query) {
   let [asked, origin] = [query.q ?? "", query.origin ?? ""];
   const [place, found] = [h("div", { class: "page" }), h("p", { class: "muted small", "aria-live": "polite" })];
@@ -19,14 +27,15 @@ export function effectList(all, query) {
   function show() {
     const wanted = asked.toLowerCase().split(/\s+/).filter(Boolean);
     const shown = all.filter(
-      (each) => (!origin || each.origin === origin) && wanted.every((word) => texts.get(each).includes(word)),
+      (each) => (!origin || each.origin === origin) && wanted.every((word) => texts.get(each)?.includes(word)),
     );
     found.textContent = shown.length === all.length ? "" : `${shown.length} of ${all.length}`;
     const chapters = Object.entries(ORIGINS)
-      .map(([name, [title, about]]) => [title, about, shown.filter((each) => each.origin === name)])
-      .filter(([, , effects]) => effects.length);
+      .map(([name, [title, about]]) => ({ title, about, effects: shown.filter((each) => each.origin === name) }))
+      .filter(({ effects }) => effects.length);
     setChildren(place, chapters.length ? chapters.map(originSection) : emptyState(`No effect speaks of "${asked}".`));
   }
+  /** @type {HTMLInputElement} */
   const input = h("input", {
     type: "search",
     value: asked,
@@ -51,7 +60,7 @@ export function effectList(all, query) {
       h("div", { style: "flex: 0 1 18rem" }, labelledField("Search", input)),
       toggleGroup(
         "Origin",
-        [["", "all"], ...Object.entries(ORIGINS).map(([name, [title]]) => [name, title.toLowerCase()])],
+        [["", "all"], ...Object.entries(ORIGINS).map(([name, [title]]) => option(name, title.toLowerCase()))],
         origin,
         (value) => {
           origin = value;
@@ -65,7 +74,8 @@ export function effectList(all, query) {
   );
 }
 
-const originSection = ([title, about, effects]) =>
+/** @param {Chapter} chapter */
+const originSection = ({ title, about, effects }) =>
   h(
     "section",
     { class: "stack", "aria-label": title },

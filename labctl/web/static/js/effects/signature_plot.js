@@ -5,9 +5,15 @@ import { colourAt, TEMPERATURE_SCALE } from "../core/colour_scales.js";
 import { colour, figure } from "../core/figure.js";
 import { POSITIONS, signature } from "./signatures.js";
 
+/** @import { Effect } from "../../../types/api.js" */
+/** @import { Picture } from "../../../types/pages.js" */
+
 const [WIDE, HIGH] = [116, 62];
 
-/** A small drawing beside the text; decorative, because the text says all of it. */
+/**
+ * A small drawing beside the text; decorative, because the text says all of it.
+ * @param {string} id
+ */
 export function signatureThumbnail(id) {
   const found = signature(id);
   const picture = svg(
@@ -16,6 +22,11 @@ export function signatureThumbnail(id) {
     svg("line", { x1: 4, y1: HIGH / 2, x2: WIDE - 4, y2: HIGH / 2, class: "zero" }),
   );
   if (!found) return picture;
+  const { course } = found;
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
   const at = (x, y) =>
     `${(6 + ((x - found.from) / (found.to - found.from)) * (WIDE - 12)).toFixed(1)},${(HIGH / 2 - (y * (HIGH - 12)) / 2.1).toFixed(1)}`;
   if (found.from < 0) picture.append(svg("line", { x1: WIDE / 2, y1: 5, x2: WIDE / 2, y2: HIGH - 5, class: "zero" }));
@@ -34,10 +45,10 @@ export function signatureThumbnail(id) {
     );
     return picture;
   }
-  if (found.course)
+  if (course)
     picture.append(
       svg("polyline", {
-        points: found.course.x.map((x, k) => at(x, 1.7 * found.course.y[k] - 0.85)).join(" "),
+        points: course.x.map((x, k) => at(x, 1.7 * course.y[k] - 0.85)).join(" "),
         class: "temperature-course",
       }),
     );
@@ -53,12 +64,18 @@ export function signatureThumbnail(id) {
   return picture;
 }
 
+/**
+ * @param {number} k
+ * @param {number} n
+ */
 const lineColour = (k, n) =>
   n === 1 ? colour("accent") : n === 3 ? colourAt(TEMPERATURE_SCALE, k / 2) : colour(k ? "axis-y" : "axis-x");
 
+/** @param {Effect} effect */
 export function signatureFigure(effect) {
   const found = signature(effect.id);
   if (!found) return null;
+  /** @returns {Picture} */
   const draw = () => ({
     data: [
       ...(found.over === "position"
@@ -131,7 +148,6 @@ export function signatureFigure(effect) {
         yanchor: "top",
         font: { size: 11 },
       })),
-      labctlConfig: { displayModeBar: false },
     },
   });
   return figure(

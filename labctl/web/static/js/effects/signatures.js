@@ -1,15 +1,36 @@
 // Signatures: the error of each effect against the variable that shows it best, as functions. Schematic, without sizes.
 
+/** @typedef {(x: number) => number} Curve */
+/**
+ * @typedef {object} Signature
+ * @property {string} over the variable, a key of VARIABLES
+ * @property {[name: string, curve: Curve][]} lines
+ * @property {Curve} [course] the temperature in the background
+ * @property {[at: number, text: string][]} [marks]
+ */
+
+/** @param {number} degrees */
 const cosine = (degrees) => Math.cos((degrees * Math.PI) / 180);
+/**
+ * @param {number} x
+ * @param {number} knee
+ */
 const excess = (x, knee) => Math.sign(x) * Math.max(0, Math.abs(x) - knee);
-/** Temperature over a campaign: three plateaus with ramps between, 0 to 1. */
+/**
+ * Temperature over a campaign: three plateaus with ramps between, 0 to 1.
+ * @param {number} t
+ */
 const temperatureCourse = (t) =>
   [
     [0.15, 0.3],
     [0.6, 0.75],
   ].reduce((sum, [from, to]) => sum + 0.5 * Math.min(Math.max((t - from) / (to - from), 0), 1), 0);
+/** @param {number} t */
 const temperatureSlope = (t) => ((t > 0.15 && t < 0.3) || (t > 0.6 && t < 0.75) ? 1 : 0);
-/** Lag behind the temperature: grows on each of two ramps, decays after it. */
+/**
+ * Lag behind the temperature: grows on each of two ramps, decays after it.
+ * @param {number} t
+ */
 const laggedTemperature = (t) =>
   [
     [0.15, 0.3],
@@ -24,9 +45,17 @@ const laggedTemperature = (t) =>
           : (1 - Math.exp(-(to - from) / 0.08)) * Math.exp(-(t - to) / 0.08)),
     0,
   );
+/**
+ * @param {readonly number[]} at
+ * @param {readonly number[]} levels
+ * @returns {Curve}
+ */
 const stepFunction = (at, levels) => (t) => levels[at.filter((edge) => t >= edge).length];
 
-/** Variables: axis title, from, to. */
+/**
+ * Variables: axis title, from, to.
+ * @type {Record<string, [title: string, from: number, to: number]>}
+ */
 export const VARIABLES = {
   rate: ["table rate", -1, 1],
   other: ["rate about another axis", -1, 1],
@@ -41,12 +70,25 @@ export const VARIABLES = {
 };
 export const POSITIONS = ["x", "-x", "y", "-y", "z", "-z"];
 
+/**
+ * @param {string} over
+ * @param {Curve} f
+ * @param {Partial<Signature>} [more]
+ * @returns {Signature}
+ */
 const single = (over, f, more = {}) => ({ over, lines: [["error", f]], ...more });
+/**
+ * @param {string} over
+ * @param {readonly string[]} names
+ * @param {(x: number, level: number) => number} f
+ * @returns {Signature}
+ */
 const family = (over, names, f) => ({
   over,
   lines: names.map((name, k) => [name, (x) => f(x, names.length > 1 ? (2 * k) / (names.length - 1) - 1 : 0)]),
 });
 const LEVELS = ["cold", "room", "hot"];
+/** @type {Record<string, Signature>} */
 const ALL = {
   bias: single("rate", () => 0.6),
   bias_temperature: single("temperature", (x) => 0.6 * x + 0.5 * x * x),
@@ -119,7 +161,10 @@ const ALL = {
 
 const POINTS = 181;
 
-/** The signature of an effect as numbers: {over, title, lines: [{name, x, y}], course, marks}; null where the effect has none. */
+/**
+ * The signature of an effect as numbers: {over, title, lines: [{name, x, y}], course, marks}; null where the effect has none.
+ * @param {string} id
+ */
 export function signature(id) {
   const found = ALL[id];
   if (!found) return null;

@@ -2,7 +2,14 @@
 
 import { count, plainNumber } from "../core/format.js";
 
-/** Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length. */
+/** @import { Criticism } from "../../../types/api.js" */
+/** @typedef {Pick<Criticism, "views">} Viewed */
+
+/**
+ * Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length.
+ * @param {Viewed} criticism
+ * @param {string} axis
+ */
 export function datasetRows(criticism, axis) {
   const sets = criticism.views.sets;
   return {
@@ -15,15 +22,22 @@ export function datasetRows(criticism, axis) {
   };
 }
 
+/** @param {Viewed} criticism */
 export const axisNames = (criticism) => Object.keys(criticism.views.sets?.residual_dps ?? {});
 
-/** "n of N data sets" where not every data set is drawn one by one, else null. */
+/**
+ * "n of N data sets" where not every data set is drawn one by one, else null.
+ * @param {Viewed} criticism
+ */
 export function shownText(criticism) {
   const { of, dataset } = criticism.views.sets;
   return dataset.length < of ? `${count(dataset.length)} of ${count(of)} data sets` : null;
 }
 
-/** Numbers as short texts that all differ, so that no two categories of an axis become one. */
+/**
+ * Numbers as short texts that all differ, so that no two categories of an axis become one.
+ * @param {readonly number[]} values
+ */
 export function distinctLabels(values) {
   for (let digits = 3; digits < 17; digits += 1) {
     const labels = values.map((value) => plainNumber(value, digits));
@@ -32,9 +46,13 @@ export function distinctLabels(values) {
   return values.map(String);
 }
 
-/** Data-set numbers as `1-20,35`, for the query string. */
+/**
+ * Data-set numbers as `1-20,35`, for the query string.
+ * @param {Iterable<number>} numbers
+ */
 export function toRanges(numbers) {
   const sorted = [...numbers].sort((a, b) => a - b);
+  /** @type {[number, number][]} */
   const parts = [];
   for (const number of sorted) {
     const last = parts.at(-1);
@@ -44,7 +62,9 @@ export function toRanges(numbers) {
   return parts.map(([from, to]) => (from === to ? `${from}` : `${from}-${to}`)).join(",");
 }
 
+/** @param {string | undefined} text */
 export function fromRanges(text) {
+  /** @type {Set<number>} */
   const found = new Set();
   for (const part of (text ?? "").split(",").filter(Boolean)) {
     const [from, to = from] = part.split("-").map(Number);
@@ -54,6 +74,7 @@ export function fromRanges(text) {
   return found;
 }
 
+/** @type {Record<string, string>} */
 export const UNITS = {
   table_rate_dps: "deg/s",
   previous_rate_dps: "deg/s",
@@ -64,6 +85,7 @@ export const UNITS = {
   supply_v: "V",
   humidity_pct: "%",
 };
+/** @type {Record<string, string>} */
 const NAMES = {
   table_rate_dps: "table rate",
   previous_rate_dps: "previous rate",
@@ -75,7 +97,13 @@ const NAMES = {
   humidity_pct: "humidity",
   order: "data sets in order",
 };
-/** A channel's values in the unit that its title names: hours for times. */
+/**
+ * A channel's values in the unit that its title names: hours for times.
+ * @param {string} name
+ * @param {readonly number[]} values
+ */
 export const scaled = (name, values) => (UNITS[name] === "h" ? values.map((value) => value / 3600) : values);
+/** @param {string} name */
 export const channelName = (name) => NAMES[name] ?? name.replaceAll("_", " ");
+/** @param {string} name */
 export const channelTitle = (name) => (UNITS[name] ? `${channelName(name)}, ${UNITS[name]}` : channelName(name));

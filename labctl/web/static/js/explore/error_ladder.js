@@ -5,17 +5,28 @@ import { h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";
 import { cardWithHeader, loadInto, modelName, table } from "../core/components.js";
-import { residualMap, colourLimit, mapsOf } from "./residual_map.js";
+import { colourLimit, mapsOf } from "./residual_cells.js";
+import { residualMap } from "./residual_map.js";
+
+/** @import { Ladder } from "../../../types/api.js" */
+/** @import { ExploreState } from "./state.js" */
 
 /** The raw error is hidden at first where it is more than this factor above the fitted errors and would flatten their lines. */
 const RAW_ERROR_RATIO = 10;
 
+/** @param {Ladder} ladder */
 export function ladderFigure(ladder) {
   const steps = ladder.steps;
   const x = steps.map((step) => `v${step.version}`);
   const dwarfs =
     Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) >
     RAW_ERROR_RATIO * Math.max(...steps.map((step) => step.rms_dps ?? 0));
+  /**
+   * @param {"raw_rms_dps" | "rms_dps" | "heldout_rms_dps"} key
+   * @param {string} name
+   * @param {object} line
+   * @param {string} symbol
+   */
   const line = (key, name, line, symbol) => ({
     type: "scatter",
     mode: "lines+markers",
@@ -76,23 +87,33 @@ export function ladderFigure(ladder) {
   );
 }
 
+/**
+ * @param {ExploreState} state
+ * @param {AbortSignal} signal
+ */
 export function errorLadder(state, signal) {
   const place = h("div", { class: "stack" });
-  const base = `/api/units/${encodeURIComponent(state.serial)}`;
+  const { serial } = state;
   loadInto(place, "Climbing down the ladder", async () => {
-    const ladder = await get(`${base}/ladder`, { signal });
+    const ladder = await get("/api/units/{serial}/ladder", { path: { serial }, signal });
     const here = ladder.steps.find((step) => step.version === state.version);
     const parts = [ladderFigure(ladder), versionTable(ladder, state)];
     if (here?.parent) parts.push(await faded(here.parent));
     return h("div", { class: "stack" }, parts);
   });
 
+  /** @param {number} parent */
   async function faded(parent) {
-    const before = await get(`${base}/calibrations/${parent}/criticism`, {
+    const before = await get("/api/units/{serial}/calibrations/{version}/criticism", {
+      path: { serial, version: parent },
       query: { recording: state.recording },
       signal,
     });
     const pair = () => [mapsOf(before, state.axis), mapsOf(state.criticism, state.axis)];
+    /**
+     * @param {number} k
+     * @param {string} name
+     */
     const one = (k, name) =>
       residualMap(name, null, () => ({ maps: pair()[k], limit: colourLimit(...pair()) }), {
         pickable: false,
@@ -117,6 +138,10 @@ export function errorLadder(state, signal) {
   return cardWithHeader("Watch the error fall", null, place);
 }
 
+/**
+ * @param {Ladder} ladder
+ * @param {ExploreState} state
+ */
 function versionTable(ladder, state) {
   return table(
     [
@@ -145,16 +170,13 @@ function versionTable(ladder, state) {
       { title: "Recording", number: true, cell: (step) => `${step.recording ?? "–"}` },
       { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
       { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
-      ...(ladder.others.length
-        ? [
-            {
-              title: `As it is on recording ${ladder.recording}, deg/s`,
-              number: true,
-              cell: (step) =>
-                number(step.applied_rms_dps ?? (step.recording === ladder.recording ? step.rms_dps : null)),
-            },
-          ]
-        : []),
+      ladder.others.length
+        ? {
+            title: `As it is on recording ${ladder.recording}, deg/s`,
+            number: true,
+            cell: (step) => number(step.applied_rms_dps ?? (step.recording === ladder.recording ? step.rms_dps : null)),
+          }
+        : null,
     ],
     [...ladder.steps, ...ladder.others],
     { label: "Versions", selected: (step) => step.version === state.version },

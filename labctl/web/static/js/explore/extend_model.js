@@ -5,6 +5,7 @@ import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";
 import {
+  option,
   button,
   fitWarnings,
   selectField,
@@ -19,6 +20,12 @@ import { postFit } from "./accept_warnings.js";
 import { selectedRows } from "./residual_map.js";
 import { shownText } from "./dataset_rows.js";
 
+/** @import { Effect, Preview } from "../../../types/api.js" */
+/** @import { ExploreState } from "./state.js" */
+
+/** @typedef {{ add: Set<string>, remove: Set<string>, formula: string }} Changed */
+
+/** @type {["raw_rms_dps" | "rms_dps" | "heldout_rms_dps" | "noise_floor_dps", string][]} */
 const ERRORS = [
   ["raw_rms_dps", "As the unit is"],
   ["rms_dps", "Left after the fit"],
@@ -26,12 +33,19 @@ const ERRORS = [
   ["noise_floor_dps", "Noise floor"],
 ];
 
-/** Return {element, put(effect)}: `put` adds an effect to the change and previews it. */
-export function extendModel(state, path, effects) {
+/**
+ * Return {element, put(effect)}: `put` adds an effect to the change and previews it.
+ * @param {ExploreState} state
+ * @param {readonly Effect[]} effects
+ */
+export function extendModel(state, effects) {
+  const path = { serial: state.serial, version: state.version };
+  /** @type {Changed} */
   const change = { add: new Set(), remove: new Set(), formula: "" };
   const has = state.calibration.model.effects;
   const chosen = h("div", { class: "row", "aria-live": "polite" });
   const result = h("div", { class: "stack" });
+  /** @type {HTMLInputElement} */
   const formula = h("input", {
     placeholder: "wet_scale: (humidity_pct - 40) * rate_dps",
     oninput: () => {
@@ -41,7 +55,7 @@ export function extendModel(state, path, effects) {
   });
   const pick = selectField(
     "Add an effect",
-    [["", "choose one"], ...effects.filter((e) => !has.includes(e.id)).map((e) => [e.id, idText(e.id)])],
+    [["", "choose one"], ...effects.filter((e) => !has.includes(e.id)).map((e) => option(e.id, idText(e.id)))],
     "",
     (value) => {
       if (value) {
@@ -50,13 +64,23 @@ export function extendModel(state, path, effects) {
       }
     },
   );
-  const drop = selectField("Take one out", [["", "choose one"], ...has.map((id) => [id, idText(id)])], "", (value) => {
-    if (value) {
-      change.remove.add(value);
-      show();
-    }
-  });
+  const drop = selectField(
+    "Take one out",
+    [["", "choose one"], ...has.map((id) => option(id, idText(id)))],
+    "",
+    (value) => {
+      if (value) {
+        change.remove.add(value);
+        show();
+      }
+    },
+  );
 
+  /**
+   * @param {Set<string>} set
+   * @param {string} id
+   * @param {string} sign
+   */
   const tag = (set, id, sign) =>
     h(
       "button",
@@ -93,10 +117,11 @@ export function extendModel(state, path, effects) {
   };
 
   async function preview() {
-    const found = await post(`${path}/preview`, body());
+    const found = await post("/api/units/{serial}/calibrations/{version}/preview", { path, body: body() });
     setChildren(result, shown(found));
   }
 
+  /** @param {Preview} found */
   function shown(found) {
     const floor = found.error.noise_floor_dps;
     return [
@@ -135,7 +160,11 @@ export function extendModel(state, path, effects) {
   }
 
   async function make() {
-    const made = await postFit(`${path}/improve`, body(), "Make version anyway");
+    const made = await postFit(
+      (accepted) =>
+        post("/api/units/{serial}/calibrations/{version}/improve", { path, body: { ...body(), ...accepted } }),
+      "Make version anyway",
+    );
     if (!made) return;
     toast("good", `Version ${made.version} of ${state.serial} is made.`);
     await navigate(
@@ -160,6 +189,7 @@ export function extendModel(state, path, effects) {
   );
   return {
     element,
+    /** @param {string} effect */
     put: async (effect) => {
       change.add.add(effect);
       show();
@@ -169,6 +199,10 @@ export function extendModel(state, path, effects) {
   };
 }
 
+/**
+ * @param {number | null} before
+ * @param {number | null} after
+ */
 function relativeChange(before, after) {
   if (!before || !after) return null;
   const share = after / before - 1;
@@ -179,17 +213,32 @@ function relativeChange(before, after) {
   );
 }
 
-/** The values of an axis in the order of the criticism's data sets. */
+/**
+ * The values of an axis in the order of the criticism's data sets.
+ * @param {ExploreState} state
+ * @param {Preview["residuals"]} columns
+ * @param {"residual_dps"} name
+ */
 export function inDatasetOrder(state, columns, name) {
   const values = new Map(columns.dataset.map((set, k) => [`${set} ${columns.axis[k]}`, columns[name][k]]));
   return selectedRows(state).dataset.map((set) => values.get(`${set} ${state.axis}`) ?? null);
 }
 
+/**
+ * @param {ExploreState} state
+ * @param {Preview} found
+ * @param {number | null} floor
+ */
 function residualFigure(state, found, floor) {
   const draw = () => {
     const rows = selectedRows(state);
     const x = rows.channels.table_rate_dps;
     const after = inDatasetOrder(state, found.residuals, "residual_dps");
+    /**
+     * @param {readonly (number | null)[]} y
+     * @param {string} name
+     * @param {object} marker
+     */
     const dots = (y, name, marker) => ({
       type: "scatter",
       mode: "markers",
@@ -200,6 +249,7 @@ function residualFigure(state, found, floor) {
       customdata: rows.dataset,
       hovertemplate: `data set %{customdata}<br>%{x:.5g} deg/s: %{y:.3g} deg/s<extra>${name}</extra>`,
     });
+    /** @param {number} y */
     const line = (y) => ({
       type: "line",
       xref: "paper",
@@ -225,16 +275,24 @@ function residualFigure(state, found, floor) {
   return figure("Residual before and after", "Dashed: two noise floors.", draw, { height: "18rem" });
 }
 
+/**
+ * @param {ExploreState} state
+ * @param {Preview} found
+ * @param {Changed} change
+ */
 function plausibility(state, found, change) {
   const own = found.axes[state.axis]?.coefficients;
   const added = [...change.add].map((id) => id.split(":")[0]);
   if (!own || !added.length) return null;
-  const ranges = added.map((id) => [id, found.plausible[id]]).filter(([, range]) => range);
+  const ranges = added.flatMap((id) => {
+    const range = found.plausible[id];
+    return range ? [{ id, ...range }] : [];
+  });
   return ranges.length
     ? h(
         "ul",
         { class: "plain" },
-        ranges.map(([id, range]) =>
+        ranges.map(({ id, ...range }) =>
           h(
             "li",
             {},

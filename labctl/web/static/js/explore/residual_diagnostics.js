@@ -3,15 +3,20 @@
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number } from "../core/format.js";
-import { selectField, cardWithHeader, table } from "../core/components.js";
+import { option, selectField, cardWithHeader, table } from "../core/components.js";
 import { query, updateQuery } from "../core/router.js";
-import { cellsText, residualMap, selectedRows, colourLimit, datasetsUnder, mapsOf } from "./residual_map.js";
+import { cellsText, colourLimit, mapsOf } from "./residual_cells.js";
+import { residualMap, selectedRows, datasetsUnder } from "./residual_map.js";
 import { channelName, channelTitle, scaled, shownText } from "./dataset_rows.js";
+
+/** @import { Figure, PlotEvent, PlotTrace } from "../../../types/pages.js" */
+/** @import { ExploreState } from "./state.js" */
 
 /** What there is of these is drawn at first: time where it is known, else the order of the data sets. */
 const DEFAULT_CHANNELS = ["table_rate_dps", "temperature_c", "t_s", "order"];
 const MAX_LISTED = 12;
 
+/** @param {ExploreState} state */
 export function residualDiagnostics(state) {
   const rows = () => selectedRows(state);
   const picture = residualMap(
@@ -27,12 +32,12 @@ export function residualDiagnostics(state) {
 
   const channels = Object.keys(rows().channels);
   const shown = (query().channels?.split(",") ?? DEFAULT_CHANNELS).filter((name) => channels.includes(name));
-  while (shown.length < Math.min(3, channels.length)) shown.push(channels.find((name) => !shown.includes(name)));
+  shown.push(...channels.filter((name) => !shown.includes(name)).slice(0, Math.max(3 - shown.length, 0)));
   const against = shown.map((name, k) => {
     const drawn = residualScatter(state, () => shown[k]);
     const select = selectField(
       "Residual against",
-      channels.map((each) => [each, channelName(each)]),
+      channels.map((each) => option(each, channelName(each))),
       name,
       (value) => {
         shown[k] = value;
@@ -66,7 +71,12 @@ export function residualDiagnostics(state) {
   );
 }
 
-/** Connect the selection of a figure to the state once it is drawn. */
+/**
+ * Connect the selection of a figure to the state once it is drawn.
+ * @param {Figure} element
+ * @param {(event: PlotEvent) => number[]} setsOf
+ * @param {ExploreState} state
+ */
 function bindSelection(element, setsOf, state) {
   element.ondrawn = (plot) => {
     // a redraw ends the selection once more with no points in it
@@ -76,11 +86,16 @@ function bindSelection(element, setsOf, state) {
   };
 }
 
+/**
+ * @param {ExploreState} state
+ * @param {() => string} channel
+ */
 function residualScatter(state, channel) {
   const draw = () => {
     const rows = selectedRows(state);
     const x = scaled(channel(), rows.channels[channel()]);
     const picked = state.pick.size ? rows.dataset.flatMap((set, k) => (state.pick.has(set) ? [k] : [])) : null;
+    /** @type {PlotTrace[]} */
     const data = [
       {
         type: "scatter",
@@ -143,6 +158,7 @@ function residualScatter(state, channel) {
   return element;
 }
 
+/** @param {ExploreState} state */
 function pickedDatasets(state) {
   const rows = selectedRows(state);
   if (!state.pick.size) return h("p", { class: "muted small" }, "Nothing is picked.");

@@ -5,6 +5,11 @@ import { withUncertainty, number, percent, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { axisNames } from "./dataset_rows.js";
 
+/** @import { Criticism, Suspect } from "../../../types/api.js" */
+/** @import { Child } from "../../../types/pages.js" */
+/** @import { ExploreState } from "./state.js" */
+
+/** @type {Record<Criticism["verdict"], [title: string, kind: string]>} */
 const VERDICTS = {
   adequate: ["Nothing is missing", "good"],
   missing: ["Missing", "warn"],
@@ -15,6 +20,7 @@ const VERDICTS = {
 /** Evidence at which the meter is full, nats; its length is the logarithm, so that 70 and 20 000 differ. */
 const FULL_NATS = 1e5;
 
+/** @param {ExploreState} state */
 export function verdictCard(state) {
   const { criticism } = state;
   const [title, kind] = VERDICTS[criticism.verdict];
@@ -50,9 +56,14 @@ export function verdictCard(state) {
   );
 }
 
+/** @param {number | null | undefined} p */
 const chanceText = (p) =>
   p === null || p === undefined ? null : p < 1e-6 ? "chance below 10⁻⁶" : `chance ${number(p, 2)}`;
 
+/**
+ * @param {ExploreState} state
+ * @param {{ onadd: (effect: string) => unknown, explain: (effect: string) => Promise<(number | null)[]> }} acts
+ */
 export function suspectList(state, { onadd, explain }) {
   const { criticism } = state;
   const named = new Set(criticism.named);
@@ -61,6 +72,7 @@ export function suspectList(state, { onadd, explain }) {
     { class: "muted small", "aria-live": "polite" },
     "Draw a suspect over the residual to see what it would explain.",
   );
+  /** @param {Suspect} suspect */
   const draw = (suspect) =>
     button(
       state.overlay?.effect === suspect.effect ? "Hide" : "Draw",
@@ -142,9 +154,14 @@ export function suspectList(state, { onadd, explain }) {
   );
 }
 
+/**
+ * @param {string} title
+ * @param {...Child} children
+ */
 const evidenceItem = (title, ...children) =>
   h("div", { class: "suspect-value" }, h("span", { class: "muted small" }, title), ...children);
 
+/** @param {number} nats */
 function evidenceMeter(nats) {
   const share = Math.max(0, Math.min(Math.log1p(Math.max(nats, 0)) / Math.log1p(FULL_NATS), 1));
   return h(
@@ -159,6 +176,10 @@ function evidenceMeter(nats) {
   );
 }
 
+/**
+ * @param {Suspect} suspect
+ * @param {string} axis
+ */
 function coefficientText(suspect, axis) {
   const own = suspect.coefficients[axis] ?? Object.values(suspect.coefficients)[0] ?? {};
   return Object.entries(own)
@@ -182,9 +203,13 @@ function coefficientText(suspect, axis) {
     );
 }
 
-/** A value with no line break before its uncertainty and its power of ten; only the unit may wrap. */
+/**
+ * A value with no line break before its uncertainty and its power of ten; only the unit may wrap.
+ * @param {string} text
+ */
 const unbroken = (text) => text.replaceAll(/ ([±×]) /g, "\u00a0$1\u00a0");
 
+/** @param {Criticism} criticism */
 function aliasNotice(criticism) {
   const group = criticism.suspects.find(
     (s) => s.alias_group.length > 1 && criticism.named.includes(s.effect),
@@ -197,6 +222,7 @@ function aliasNotice(criticism) {
   );
 }
 
+/** @param {Criticism} criticism */
 function experimentList(criticism) {
   if (!criticism.experiments.length) return null;
   return h(
@@ -223,8 +249,10 @@ function experimentList(criticism) {
   );
 }
 
+/** @param {Criticism} criticism */
 function untestableEffects(criticism) {
   if (!criticism.not_testable.length) return null;
+  /** @param {Criticism["not_testable"][number]} line */
   const why = (line) =>
     line.why === "channel" ? `not recorded: ${line.needs.map(idText).join(", ")}` : "this schedule hides it";
   return h(

@@ -1,6 +1,7 @@
 // The bench page: the running campaign, or what ran last and what comes next.
 
-import { get, Problem } from "../core/api.js";
+import { get } from "../core/api.js";
+import { Problem } from "../core/errors.js";
 import { h } from "../core/elements.js";
 import { chip, pageHeader, notice } from "../core/components.js";
 import { setTrouble } from "../core/freshness.js";
@@ -11,18 +12,27 @@ import { idleBench, noBenchCard } from "../bench/idle_bench.js";
 import { runningCampaign } from "../bench/running_campaign.js";
 import { canResume, isRunning } from "../campaigns/states.js";
 
+/** @import { BenchStatus } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
 const POLL_MS = 5000;
 const AFTER_END_MS = 1500;
 
+/** @param {PageContext} context */
 export async function page({ signal }) {
-  const [benches, states, campaigns, schedule] = await Promise.all(
-    ["/api/benches", "/api/benches/status", "/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })),
-  );
+  const [benches, states, campaigns, schedule] = await Promise.all([
+    get("/api/benches", { signal }),
+    get("/api/benches/status", { signal }),
+    get("/api/campaigns", { signal }),
+    get("/api/schedule", { signal }),
+  ]);
   const bench = benches[0];
   if (!bench) return h("div", { class: "page" }, pageHeader("Bench"), noBenchCard());
   const now =
     campaigns.find((campaign) => campaign.id === bench.campaign) ??
     campaigns.find((campaign) => campaign.bench === bench.name && isRunning(campaign));
+  /** @param {{ serial: string }} each */
   const unit = (each) => h("a", { href: `/units/${encodeURIComponent(each.serial)}` }, each.serial);
   const element = h(
     "div",
@@ -49,13 +59,14 @@ export async function page({ signal }) {
   const unsafe = states.filter((each) => each.unconfirmed);
   for (const each of unsafe) element.append(unconfirmedNotice(each, each.name === bench.name && bench.simulated));
   if (now) {
-    const plan = await get(`/api/campaigns/${now.id}/plan`, { signal });
+    const plan = await get("/api/campaigns/{campaign}/plan", { path: { campaign: now.id }, signal });
     element.append(
       ...runningCampaign(now, plan, { signal, over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS) }),
     );
   } else {
     const last = campaigns.find((campaign) => campaign.bench === bench.name);
-    const whole = last && canResume(last) ? await get(`/api/campaigns/${last.id}`, { signal }) : last;
+    const whole =
+      last && canResume(last) ? await get("/api/campaigns/{campaign}", { path: { campaign: last.id }, signal }) : last;
     element.append(
       idleBench(
         bench,
@@ -68,7 +79,11 @@ export async function page({ signal }) {
   return element;
 }
 
-/** While no campaign runs, poll for one that the schedule or another person has started, and for the safe state. */
+/**
+ * While no campaign runs, poll for one that the schedule or another person has started, and for the safe state.
+ * @param {boolean} unconfirmed
+ * @param {AbortSignal} signal
+ */
 function watchForChange(unconfirmed, signal) {
   const looking = setInterval(async () => {
     try {
@@ -83,6 +98,10 @@ function watchForChange(unconfirmed, signal) {
   window.addEventListener("labctl:fresh", show, { signal });
 }
 
+/**
+ * @param {BenchStatus} bench
+ * @param {boolean} simulated_time
+ */
 function unconfirmedNotice(bench, simulated_time) {
   return notice(
     "bad",

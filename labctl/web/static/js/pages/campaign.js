@@ -7,13 +7,19 @@ import { card, chip, factList, pageHeader, cardWithHeader, notice, toggleGroup }
 import { navigate, updateQuery, show as showAgain } from "../core/router.js";
 import { linkButton, resumeControl, stopButton } from "../bench/actions.js";
 import { eventList } from "../bench/event_list.js";
-import { FINAL_STATES, followCampaign } from "../bench/campaign_stream.js";
+import { followCampaign } from "../bench/campaign_stream.js";
 import { remainingSeconds } from "../bench/campaign_history.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { adviceNotice } from "../campaigns/advice.js";
 import { campaignDuration, campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
-import { isRunning, stateChip } from "../campaigns/states.js";
+import { hasEnded, isRunning, stateKind } from "../campaigns/states.js";
+import { stateChip } from "../campaigns/state_chip.js";
 
+/** @import { Campaign, CampaignPlan } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @type {[level: string, text: string][]} */
 const LEVELS = [
   ["info", "all"],
   ["warning", "warnings and errors"],
@@ -22,15 +28,18 @@ const LEVELS = [
 const MAX_EVENTS = 200;
 const PLAN_REFRESH_MS = 2500;
 
+/** @param {PageContext} context */
 export async function page({ params, query, signal }) {
-  const path = `/api/campaigns/${encodeURIComponent(params.id)}`;
-  let [now, plan, benches] = await Promise.all([
-    get(path, { signal }),
-    get(`${path}/plan`, { signal }),
+  const path = { campaign: params.id };
+  const answers = await Promise.all([
+    get("/api/campaigns/{campaign}", { path, signal }),
+    get("/api/campaigns/{campaign}/plan", { path, signal }),
     get("/api/benches", { signal }),
   ]);
+  let [now, plan] = answers;
+  const benches = answers[2];
   const here = benches[0]?.name === now.bench;
-  const level = LEVELS.some(([each]) => each === query.level) ? query.level : "info";
+  const level = LEVELS.find(([each]) => each === query.level)?.[0] ?? "info";
   const events = eventList(MAX_EVENTS, level, now);
   const [about, reason, connection] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
   const picture = planChart(
@@ -44,8 +53,9 @@ export async function page({ params, query, signal }) {
   );
   let asked = Date.now();
 
+  /** @param {Campaign} next */
   function show(next) {
-    const ended = FINAL_STATES.has(next.state) && !FINAL_STATES.has(now.state);
+    const ended = hasEnded(next) && !hasEnded(now);
     now = next;
     setChildren(about, summary(now, plan));
     setChildren(reason, reasonNotices(now));
@@ -54,7 +64,7 @@ export async function page({ params, query, signal }) {
   }
   async function again() {
     asked = Date.now();
-    plan = await get(`${path}/plan`, { signal }).catch(() => plan);
+    plan = await get("/api/campaigns/{campaign}/plan", { path, signal }).catch(() => plan);
     picture.redraw();
   }
   show(now);
@@ -112,7 +122,12 @@ export async function page({ params, query, signal }) {
   );
 }
 
-/** Resume comes first only where it would be accepted and nothing speaks against it. */
+/**
+ * Resume comes first only where it would be accepted and nothing speaks against it.
+ * @param {Campaign} now
+ * @param {CampaignPlan} plan
+ * @param {boolean} here
+ */
 function endedActions(now, plan, here) {
   const again = linkButton(
     "Plan the same again",
@@ -122,9 +137,13 @@ function endedActions(now, plan, here) {
   return now.resumable && !now.resume_reason ? [...resume, again] : [again, ...resume];
 }
 
+/**
+ * @param {Campaign} now
+ * @param {CampaignPlan} plan
+ */
 function summary(now, plan) {
   const states = plan.timeline.dataset
-    .map((dataset, k) => (dataset === null ? null : plan.timeline.state[k]))
+    .map((dataset, k) => (dataset === null ? null : plan.timeline.state?.[k]))
     .filter(Boolean);
   const done = states.filter((state) => state === "done").length;
   return h(
@@ -147,9 +166,12 @@ function summary(now, plan) {
   );
 }
 
-/** The reason of the present state, as the service gives it. */
+/**
+ * The reason of the present state, as the service gives it.
+ * @param {Campaign} now
+ */
 function reasonNotices(now) {
-  const kind = { done: "good", failed: "bad", aborted: "bad" }[now.state] ?? "warn";
+  const kind = stateKind(now);
   return [
     isRunning(now) && now.state === "running"
       ? null
@@ -165,6 +187,7 @@ function reasonNotices(now) {
   ].filter(Boolean);
 }
 
+/** @param {Campaign} now */
 function recordingsCard(now) {
   const rows = Object.entries(now.recordings);
   if (!rows.length) return card("Units and recordings", h("p", { class: "muted" }, "Nothing was recorded."));

@@ -1,6 +1,7 @@
 // The page that plans a campaign: recipe, plan, visibility of effects, start.
 
 import { get, post } from "../core/api.js";
+import { isAbort, messageOf } from "../core/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
 import { busyIndicator, card, chip, factList, pageHeader, notice } from "../core/components.js";
@@ -13,15 +14,26 @@ import { planChart } from "../campaigns/plan_chart.js";
 import { recipeChoice } from "../campaigns/recipe_choice.js";
 import { visibilityReport } from "../campaigns/visibility.js";
 
+/** @import { Bench, Plan, Recipe } from "../../../types/api.js" */
+/** @import { Choice } from "../campaigns/recipe_choice.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @param {PageContext} context */
 export async function page({ query, signal }) {
-  const [all, benches, catalogue] = await Promise.all(
-    ["/api/recipes", "/api/benches", "/api/effects"].map((path) => get(path, { signal })),
-  );
+  const [all, benches, catalogue] = await Promise.all([
+    get("/api/recipes", { signal }),
+    get("/api/benches", { signal }),
+    get("/api/effects", { signal }),
+  ]);
   const bench = benches[0] ?? null;
   const named = all.find((each) => each.name === query.recipe) ?? shortestRecipe(all);
   // the user's own recipe is in the address too, so that the plan has a link
+  /** @type {Choice} */
   const choice = query.toml ? { name: "own", text: query.toml } : { name: named.name, text: null };
-  let [clip, hide, asked] = [query.clip === "1", [], new AbortController()];
+  let [clip, asked] = [query.clip === "1", new AbortController()];
+  /** @type {string[]} */
+  let hide = [];
   const [planned, found] = [h("div", { "aria-live": "polite" }), h("div", { class: "stack" })];
   const simulated = !bench || bench.simulated;
   const hider = simulated
@@ -29,7 +41,7 @@ export async function page({ query, signal }) {
         hide = list;
       })
     : null;
-  const source = () => (choice.name === "own" ? `${choice.text.trimEnd()}\n` : choice.name);
+  const source = () => (choice.name === "own" ? `${(choice.text ?? "").trimEnd()}\n` : choice.name);
 
   async function plan() {
     asked.abort();
@@ -37,35 +49,38 @@ export async function page({ query, signal }) {
     const given = AbortSignal.any([signal, asked.signal]);
     setChildren(found, busyIndicator("Working out what it could find; for a long plan that takes some seconds."));
     try {
-      const answer = await post("/api/plans", { recipe: source(), clip }, { signal: given });
+      const answer = await post("/api/plans", { body: { recipe: source(), clip }, signal: given });
       setChildren(planned, planCard(answer, bench));
       starting.look();
     } catch (error) {
-      if (error.name === "AbortError") return;
+      if (isAbort(error)) return;
       setChildren(planned, refusalCard(error));
       setChildren(found, h("p", { class: "muted" }, "There is no plan to look at."));
       return;
     }
     try {
-      const answer = await post("/api/plans", { recipe: source(), clip, visibility: true }, { signal: given });
-      setChildren(found, visibilityReport(answer.visibility));
-      hider?.sizes(answer.visibility);
+      const answer = await post("/api/plans", { body: { recipe: source(), clip, visibility: true }, signal: given });
+      const visibility = answer.visibility ?? [];
+      setChildren(found, visibilityReport(visibility));
+      hider?.sizes(visibility);
     } catch (error) {
-      if (error.name !== "AbortError") setChildren(found, notice("", error.message));
+      if (!isAbort(error)) setChildren(found, notice("", messageOf(error)));
     }
   }
+  /** @type {HTMLInputElement} */
+  const clipBox = h("input", {
+    type: "checkbox",
+    checked: clip,
+    onchange: () => {
+      clip = clipBox.checked;
+      updateQuery({ clip: clip ? 1 : null });
+      plan();
+    },
+  });
   const clipping = h(
     "label",
     { class: "row tight" },
-    h("input", {
-      type: "checkbox",
-      checked: clip,
-      onchange: (event) => {
-        clip = event.target.checked;
-        updateQuery({ clip: clip ? 1 : null });
-        plan();
-      },
-    }),
+    clipBox,
     h("span", {}, "Leave out what the bench or the unit cannot do"),
   );
   const starting = startForm(bench, () => ({ recipe: source(), clip, hide }));
@@ -123,12 +138,19 @@ export async function page({ query, signal }) {
   );
 }
 
-/** The shortest campaign that the bench can run. */
+/**
+ * The shortest campaign that the bench can run.
+ * @param {readonly Recipe[]} all
+ */
 function shortestRecipe(all) {
   const able = all.filter((each) => !each.refused && !each.remark);
-  return able.sort((a, b) => a.expected_s - b.expected_s)[0] ?? all[0];
+  return able.sort((a, b) => (a.expected_s ?? 0) - (b.expected_s ?? 0))[0] ?? all[0];
 }
 
+/**
+ * @param {Plan} answer
+ * @param {Bench | null} bench
+ */
 function planCard(answer, bench) {
   const ends = new Date(Date.now() + 1000 * answer.expected_s);
   const simulated = !bench || bench.simulated;
@@ -167,4 +189,5 @@ function planCard(answer, bench) {
   );
 }
 
-const refusalCard = (error) => card("It cannot be done so", notice("bad", h("p", { class: "lead" }, error.message)));
+/** @param {unknown} error */
+const refusalCard = (error) => card("It cannot be done so", notice("bad", h("p", { class: "lead" }, messageOf(error))));

@@ -1,6 +1,7 @@
 // The page of all campaigns and of the schedule.
 
-import { get, Problem, remove } from "../core/api.js";
+import { get, remove } from "../core/api.js";
+import { Problem } from "../core/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
 import { button, card, chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
@@ -8,14 +9,20 @@ import { setTrouble } from "../core/freshness.js";
 import { linkButton } from "../bench/actions.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
 import { campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
-import { isRunning, stateChip } from "../campaigns/states.js";
+import { isRunning } from "../campaigns/states.js";
+import { stateChip } from "../campaigns/state_chip.js";
 import { startTime } from "../campaigns/start_time.js";
+
+/** @import { Campaign, Scheduled, StartEvent } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
 
 const POLL_MS = 4000;
 
+/** @param {PageContext} context */
 export async function page({ signal }) {
   const place = h("div", { class: "page" });
-  const ask = () => Promise.all(["/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })));
+  const ask = () => Promise.all([get("/api/campaigns", { signal }), get("/api/schedule", { signal })]);
   async function show() {
     const [campaigns, schedule] = await ask();
     setChildren(
@@ -58,6 +65,7 @@ export async function page({ signal }) {
   );
 }
 
+/** @param {readonly Campaign[]} rows */
 function campaignTable(rows) {
   return table(
     [
@@ -126,7 +134,12 @@ function campaignTable(rows) {
 
 const OUTCOMES = { started: "good", refused: "bad", missed: "warn", claimed: "accent" };
 
+/**
+ * @param {readonly Scheduled[]} rows
+ * @param {() => unknown} again
+ */
 function scheduleCard(rows, again) {
+  /** @param {StartEvent} event */
   const came = (event) =>
     h(
       "span",
@@ -148,16 +161,13 @@ function scheduleCard(rows, again) {
               : null,
           ],
         },
-        ...(rows.some((row) => row.attendance)
-          ? [
-              {
-                title: "Needs a person",
-                prose: true,
-                cell: (row) =>
-                  row.attendance ? attendanceNotice(row.attendance) : h("span", { class: "muted" }, "no"),
-              },
-            ]
-          : []),
+        rows.some((row) => row.attendance)
+          ? {
+              title: "Needs a person",
+              prose: true,
+              cell: (row) => (row.attendance ? attendanceNotice(row.attendance) : h("span", { class: "muted" }, "no")),
+            }
+          : null,
         {
           title: "Recipe",
           cell: (row) => [
@@ -182,7 +192,7 @@ function scheduleCard(rows, again) {
             button(
               "Cancel",
               async () => {
-                await remove(`/api/schedule/${row.id}`);
+                await remove("/api/schedule/{start}", { path: { start: row.id } });
                 await again();
               },
               { kind: "tiny", done: "Taken out of the schedule." },

@@ -1,9 +1,11 @@
 // The explore page: compare a version with a recording, diagnose residuals, find the missing effect, extend the model.
 
 import { get, getFollowed, post } from "../core/api.js";
+import { isAbort } from "../core/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
 import {
+  option,
   busyIndicator,
   button,
   card,
@@ -15,6 +17,7 @@ import {
   errorPage,
 } from "../core/components.js";
 import { navigate, query } from "../core/router.js";
+import { changedQuery } from "../core/routes.js";
 import { postFit } from "../explore/accept_warnings.js";
 import { extendModel, inDatasetOrder } from "../explore/extend_model.js";
 import { errorComparison } from "../explore/compare/error_comparison.js";
@@ -25,6 +28,10 @@ import { axisNames } from "../explore/dataset_rows.js";
 import { ExploreState } from "../explore/state.js";
 import { errorLadder } from "../explore/error_ladder.js";
 
+/** @import { RecordingRow, Unit } from "../../../types/api.js" */
+/** @import { PageContext, Query } from "../../../types/pages.js" */
+
+/** @type {[id: string, text: string][]} */
 const MODELS = [
   ["bias_scale", "bias and scale factor"],
   ["ojeda2000", "Ojeda 2000: polynomial in rate and temperature"],
@@ -41,8 +48,9 @@ const SECTIONS = [
   ["watch", "Watch"],
 ];
 
+/** @param {PageContext} context */
 export async function page({ query: asked, signal }) {
-  const [units, recordings] = await Promise.all(["/api/units", "/api/recordings"].map((path) => get(path, { signal })));
+  const [units, recordings] = await Promise.all([get("/api/units", { signal }), get("/api/recordings", { signal })]);
   if (!units.length) {
     return h(
       "div",
@@ -75,7 +83,11 @@ export async function page({ query: asked, signal }) {
   return element;
 }
 
-/** Sticky bar: the axis that all figures show, and links to the sections. */
+/**
+ * Sticky bar: the axis that all figures show, and links to the sections.
+ * @param {ExploreState} state
+ * @param {readonly string[]} axes
+ */
 function pageNavigation(state, axes) {
   return h(
     "div",
@@ -83,7 +95,7 @@ function pageNavigation(state, axes) {
     axes.length > 1
       ? toggleGroup(
           "Axis of the gyro",
-          axes.map((axis) => [axis, `axis ${axis}`]),
+          axes.map((axis) => option(axis, `axis ${axis}`)),
           state.axis,
           (axis) => state.selectAxis(axis),
         )
@@ -96,43 +108,59 @@ function pageNavigation(state, axes) {
   );
 }
 
-/** The newest recording with at least half as many data sets as the largest: a running campaign has few so far. */
+/**
+ * The newest recording with at least half as many data sets as the largest: a running campaign has few so far.
+ * @param {readonly RecordingRow[]} own
+ */
 function defaultRecording(own) {
   const most = Math.max(...own.map((each) => each.datasets));
   return Math.max(...own.filter((each) => 2 * each.datasets >= most).map((each) => each.id));
 }
 
+/**
+ * @param {readonly Unit[]} units
+ * @param {Unit} unit
+ * @param {readonly RecordingRow[]} own
+ * @param {readonly number[]} versions
+ * @param {number | undefined} version
+ * @param {number} recording
+ */
 function selectors(units, unit, own, versions, version, recording) {
+  /** @param {Partial<Record<"unit" | "version" | "recording", string>>} changed */
   const to = (changed) => {
-    const next = { unit: unit.serial, version, recording, axis: query().axis, view: query().view, ...changed };
-    if (changed.unit) Object.assign(next, { version: null, recording: null, axis: null });
-    navigate(`/explore?${new URLSearchParams(Object.entries(next).filter(([, value]) => value))}`);
+    const kept = changed.unit ? {} : { version, recording, axis: query().axis };
+    const next = { unit: unit.serial, ...kept, view: query().view, ...changed };
+    navigate(`/explore?${changedQuery("", next)}`);
   };
   return [
     selectField(
       "Unit",
-      units.map((each) => [each.serial, each.serial]),
+      units.map((each) => option(each.serial, each.serial)),
       unit.serial,
       (value) => to({ unit: value }),
     ),
     versions.length
       ? selectField(
           "Version",
-          versions.map((each) => [each, `${each}${each === unit.certified_version ? " (in force)" : ""}`]),
+          versions.map((each) => option(each, `${each}${each === unit.certified_version ? " (in force)" : ""}`)),
           version,
           (value) => to({ version: value }),
         )
       : null,
     selectField(
       "Recording",
-      own.map((each) => [each.id, `${each.id}: ${count(each.datasets)} data sets`]),
+      own.map((each) => option(each.id, `${each.id}: ${count(each.datasets)} data sets`)),
       recording,
       (value) => to({ recording: value }),
     ),
   ].filter(Boolean);
 }
 
-/** A unit that has no calibration yet: fit one. */
+/**
+ * A unit that has no calibration yet: fit one.
+ * @param {Unit} unit
+ * @param {number} recording
+ */
 function firstFitCard(unit, recording) {
   let model = MODELS[0][0];
   return card(
@@ -155,9 +183,9 @@ function firstFitCard(unit, recording) {
       button(
         "Fit",
         async () => {
+          const path = { serial: unit.serial };
           const made = await postFit(
-            `/api/units/${encodeURIComponent(unit.serial)}/calibrations`,
-            { recording, model },
+            (accepted) => post("/api/units/{serial}/calibrations", { path, body: { recording, model, ...accepted } }),
             "Fit anyway",
           );
           if (!made) return;
@@ -171,7 +199,10 @@ function firstFitCard(unit, recording) {
   );
 }
 
-/** A version compared with a recording; shown when the criticism is computed. */
+/**
+ * A version compared with a recording; shown when the criticism is computed.
+ * @param {{ unit: Unit, version: number, versions: number[], recording: number, asked: Query, signal: AbortSignal }} given
+ */
 function versionView({ unit, version, versions, recording, asked, signal }) {
   const stage = h("p", { class: "muted", "aria-live": "polite" });
   const place = h(
@@ -184,14 +215,15 @@ function versionView({ unit, version, versions, recording, asked, signal }) {
       stage,
     ),
   );
-  const path = `/api/units/${encodeURIComponent(unit.serial)}/calibrations/${version}`;
+  const path = { serial: unit.serial, version };
   const asking = Promise.all([
-    getFollowed(`${path}/criticism/events`, {
+    getFollowed("/api/units/{serial}/calibrations/{version}/criticism/events", {
+      path,
       query: { recording },
       signal,
       onstage: (name) => setChildren(stage, `${name} …`),
     }),
-    get(path, { signal }),
+    get("/api/units/{serial}/calibrations/{version}", { path, signal }),
     get("/api/effects", { signal }),
   ]);
   asking
@@ -199,24 +231,28 @@ function versionView({ unit, version, versions, recording, asked, signal }) {
       const axes = axisNames(criticism);
       const state = new ExploreState({
         serial: unit.serial,
-        unit,
         version,
         versions,
         recording,
         criticism,
         calibration,
-        axis: axes.includes(asked.axis) ? asked.axis : axes[0],
+        axis: axes.find((axis) => axis === asked.axis) ?? axes[0],
         pick: asked.pick,
       });
       if (!axes.length) return setChildren(place, verdictCard(state), errorLadder(state, signal));
-      const adding = extendModel(state, path, catalogue.effects);
+      const adding = extendModel(state, catalogue.effects);
+      /** @param {string} effect */
       const explain = async (effect) => {
-        const found = await post(`${path}/preview`, { add: [effect], recording }, { signal });
+        const body = { add: [effect], recording };
+        const found = await post("/api/units/{serial}/calibrations/{version}/preview", { path, body, signal });
         const after = inDatasetOrder(state, found.residuals, "residual_dps");
-        return selectedRows(state).residual.map((before, k) => (after[k] === null ? null : before - after[k]));
+        return selectedRows(state).residual.map((before, k) => {
+          const left = after[k];
+          return left === null ? null : before - left;
+        });
       };
       const parts = [
-        errorComparison(state, path, signal),
+        errorComparison(state, signal),
         residualDiagnostics(state),
         suspectList(state, { onadd: adding.put, explain }),
         adding.element,
@@ -231,7 +267,7 @@ function versionView({ unit, version, versions, recording, asked, signal }) {
     })
     .catch(
       (error) =>
-        error.name !== "AbortError" &&
+        !isAbort(error) &&
         setChildren(
           place,
           errorPage(error, () => navigate(location.pathname + location.search)),

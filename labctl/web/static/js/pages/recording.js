@@ -13,31 +13,45 @@ import { datasetTable } from "../recordings/dataset_table.js";
 import { trace } from "../recordings/trace.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
 
+/** @import { DataSets, Recording } from "../../../types/api.js" */
+
+/** @import { PageContext, Part, RecordingState } from "../../../types/pages.js" */
+
+/** @type {Record<string, string>} */
 const KIND_TEXTS = {
   samples: "every reading",
   points: "one mean per data set",
   coefficients: "a published table, no readings",
 };
 
+/** @param {PageContext} context */
 export async function page({ params, query, signal }) {
-  const path = `/api/recordings/${encodeURIComponent(params.id)}`;
+  const path = { recording: params.id };
   const [about, sets] = await Promise.all([
-    get(path, { query: { points: false }, signal }),
-    get(`${path}/datasets`, { signal }),
+    get("/api/recordings/{recording}", { path, query: { points: false }, signal }),
+    get("/api/recordings/{recording}/datasets", { path, signal }),
   ]);
   const { info } = about;
-  const number_ = (text) => (text && Number.isFinite(Number(text)) ? Number(text) : null);
+  /** @param {string | undefined} text */
+  const numberIn = (text) => (text && Number.isFinite(Number(text)) ? Number(text) : null);
+  /** @type {RecordingState} */
   const state = {
     id: about.id,
     kind: about.kind,
     sets,
     output: info.output ?? {},
     channel: query.channel ?? `gyro_${info.axes[0]}`,
-    from: number_(query.from),
-    until: number_(query.until),
-    dataset: number_(query.dataset),
+    from: numberIn(query.from),
+    until: numberIn(query.until),
+    dataset: numberIn(query.dataset),
+    pick: (dataset) => {
+      state.dataset = dataset === state.dataset ? null : dataset;
+      updateQuery({ dataset: state.dataset });
+      for (const part of parts) part.redraw();
+      if (state.dataset !== null) readings.scrollIntoView({ block: "nearest", behavior: "smooth" });
+    },
   };
-  const element = h("div", { class: "page" }, recordingHeader(about, path), conditionsCard(about, sets));
+  const element = h("div", { class: "page" }, recordingHeader(about), conditionsCard(about, sets));
   if (about.kind === "coefficients") {
     element.append(
       notice(
@@ -48,31 +62,46 @@ export async function page({ params, query, signal }) {
     return element;
   }
   const timed = sets.t_from_s.some((t) => t !== null);
-  const parts = { raw: datasetReadings(state, signal), table: datasetTable(state, query) };
-  if (timed) {
-    parts.trace = trace(state, signal);
-    state.showInTrace = (k) => {
-      const about_ = 0.5 * (sets.t_until_s[k] - sets.t_from_s[k]);
-      parts.trace.show({ from: sets.t_from_s[k] - about_, until: sets.t_until_s[k] + about_ });
-      parts.trace.scrollIntoView({ block: "start", behavior: "smooth" });
-    };
-  }
-  if (!timed && sets.number.length) parts.means = meanPlots(state);
-  if (about.kind === "samples") parts.allan = allan(state, signal);
-  state.pick = (dataset) => {
-    state.dataset = dataset === state.dataset ? null : dataset;
-    updateQuery({ dataset: state.dataset });
-    for (const part of Object.values(parts)) part.redraw();
-    if (state.dataset !== null) parts.raw.scrollIntoView({ block: "nearest", behavior: "smooth" });
-  };
-  element.append(...[parts.trace, parts.means, parts.raw, parts.table, parts.allan].filter(Boolean));
+  const readings = datasetReadings(state, signal);
+  /** @type {Part[]} */
+  const parts = [readings, datasetTable(state, query)];
+  if (!timed && sets.number.length) parts.unshift(meanPlots(state));
+  if (timed) parts.unshift(shownTrace(state, signal));
+  if (about.kind === "samples") parts.push(allan(state, signal));
+  element.append(...parts);
   return element;
 }
 
-function recordingHeader(about, path) {
+/**
+ * The trace, and in the state how to show a data set in it.
+ * @param {RecordingState} state
+ * @param {AbortSignal} signal
+ */
+function shownTrace(state, signal) {
+  const found = trace(state, signal);
+  state.showInTrace = (k) => {
+    const [from, until] = [state.sets.t_from_s[k] ?? 0, state.sets.t_until_s[k] ?? 0];
+    const beside = 0.5 * (until - from);
+    found.show({ from: from - beside, until: until + beside });
+    found.scrollIntoView({ block: "start", behavior: "smooth" });
+  };
+  return found;
+}
+
+/** @param {Recording} about */
+function recordingHeader(about) {
   const unit = encodeURIComponent(about.serial);
+  /**
+   * @param {"csv" | "parquet"} format
+   * @param {string} text
+   */
   const file = (format, text) =>
-    button(text, () => download(`${path}/file?format=${format}`, `recording-${about.id}-${format}.zip`));
+    button(text, () =>
+      download("/api/recordings/{recording}/file", `recording-${about.id}-${format}.zip`, {
+        path: { recording: about.id },
+        query: { format },
+      }),
+    );
   const from = about.campaign
     ? h("a", { href: `/campaigns/${about.campaign}` }, `campaign ${about.campaign}`)
     : "an import";
@@ -94,7 +123,12 @@ function recordingHeader(about, path) {
   );
 }
 
+/**
+ * @param {Recording} recording
+ * @param {DataSets} sets
+ */
 function conditionsCard({ info, datasets, readings: n, kind }, sets) {
+  /** @param {readonly (number | null)[] | undefined} values */
   const span = (values) => {
     const there = (values ?? []).filter((value) => value !== null);
     return there.length ? [Math.min(...there), Math.max(...there)] : null;
@@ -102,7 +136,7 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
   const warm = span(sets.channels.temperature_c?.mean);
   const rates = span(sets.table_rate_dps);
   const units = [...new Set(info.axes.map((axis) => channelUnit(`gyro_${axis}`, info.output)))];
-  const card_ = card(
+  const element = card(
     "Conditions",
     factList([
       ["Axes", info.axes.join(", "), "", `output in ${units.join(", ")}`],
@@ -124,6 +158,6 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
         : ["Latitude", plainNumber(info.latitude_deg), "deg", "the Earth's rate is taken off"],
     ]),
   );
-  if (info.notes) card_.append(h("p", { class: "muted" }, info.notes));
-  return card_;
+  if (info.notes) element.append(h("p", { class: "muted" }, info.notes));
+  return element;
 }

@@ -3,11 +3,16 @@
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, day } from "../core/format.js";
-import { chip, selectField, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
+import { chip, option, selectField, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
 import { updateQuery } from "../core/router.js";
 import { importForm } from "../recordings/import_form.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
 
+/** @import { RecordingRow } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @param {PageContext} context */
 export async function page({ query, signal }) {
   const list = h("div", {});
   let unit = query.unit ?? "";
@@ -19,7 +24,7 @@ export async function page({ query, signal }) {
     setChildren(
       choose,
       units.length > 1
-        ? selectField("Unit", [["", "all units"], ...units.map((serial) => [serial, serial])], unit, (value) => {
+        ? selectField("Unit", [["", "all units"], ...units.map((serial) => option(serial, serial))], unit, (value) => {
             unit = value;
             updateQuery({ unit });
             show();
@@ -43,8 +48,10 @@ export async function page({ query, signal }) {
   );
 }
 
+/** @type {Record<string, string>} */
 const KINDS = { samples: "every reading", points: "means", coefficients: "a published table" };
 
+/** @param {readonly RecordingRow[]} rows */
 function recordingTable(rows) {
   return table(
     [

@@ -7,10 +7,17 @@ import { presentWords } from "../core/freshness.js";
 import { navigate } from "../core/router.js";
 import { isRunning } from "../campaigns/states.js";
 
+/** @import { Bench, Campaign, Unit } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @param {PageContext} context */
 export async function page({ signal }) {
-  const [units, campaigns, benches] = await Promise.all(
-    ["/api/units", "/api/campaigns", "/api/benches"].map((path) => get(path, { signal })),
-  );
+  const [units, campaigns, benches] = await Promise.all([
+    get("/api/units", { signal }),
+    get("/api/campaigns", { signal }),
+    get("/api/benches", { signal }),
+  ]);
   if (units.length || campaigns.length) return overview(units, campaigns, benches);
   return h(
     "div",
@@ -56,23 +63,31 @@ export async function page({ signal }) {
 /** Simulate a recording, fit it, and open it on the explore page. */
 async function openSimulated() {
   const made = await post("/api/recordings/simulated", {
-    recipe: "ojeda2000-121",
-    hide: ["scale_factor_asymmetry=0.0002"],
-    seed: 1,
+    body: { recipe: "ojeda2000-121", hide: ["scale_factor_asymmetry=0.0002"], seed: 1 },
   });
   await openExplore(made.serial, made.recording, "ojeda2000");
 }
 
 async function openExample() {
-  const made = await post("/api/recordings/example", { name: "osu-fog" });
+  const made = await post("/api/recordings/example", { body: { name: "osu-fog" } });
   await openExplore(made.serial, made.recording, "bias_scale");
 }
 
+/**
+ * @param {string} serial
+ * @param {number} recording
+ * @param {string} model
+ */
 async function openExplore(serial, recording, model) {
-  const fitted = await post(`/api/units/${encodeURIComponent(serial)}/calibrations`, { recording, model });
+  const fitted = await post("/api/units/{serial}/calibrations", { path: { serial }, body: { recording, model } });
   await navigate(`/explore?unit=${encodeURIComponent(serial)}&version=${fitted.version}&recording=${recording}`);
 }
 
+/**
+ * @param {readonly Unit[]} units
+ * @param {readonly Campaign[]} campaigns
+ * @param {readonly Bench[]} benches
+ */
 function overview(units, campaigns, benches) {
   const running = campaigns.find(isRunning);
   return h(

@@ -4,8 +4,12 @@ import { get } from "../core/api.js";
 import { h } from "../core/elements.js";
 import { chip, emptyState, pageHeader, table } from "../core/components.js";
 
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @param {PageContext} context */
 export async function page({ signal }) {
   const units = await get("/api/units", { signal });
+  /** @param {string} serial */
   const to = (serial) => `/units/${encodeURIComponent(serial)}`;
   return h(
     "div",

@@ -1,18 +1,27 @@
 // Noise at rest: Allan deviation of each axis, and N, B and K with the reason where one has no value.
 
-import { get, Problem } from "../core/api.js";
+import { get } from "../core/api.js";
+import { Problem } from "../core/errors.js";
 import { setChildren, h, whenNearViewport } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
 import { cardWithHeader, loadInto, notice, table, toggleGroup } from "../core/components.js";
 
+/** @import { Allan, NoiseFigure } from "../../../types/api.js" */
+/** @import { RecordingState } from "../../../types/pages.js" */
+
+/** @type {["N" | "B" | "K", string][]} */
 const NOISE_FIGURES = [
   ["N", "angle random walk"],
   ["B", "bias instability"],
   ["K", "rate random walk"],
 ];
 
-/** Card for the longest stretch at rest, or for the selected data set. */
+/**
+ * Card for the longest stretch at rest, or for the selected data set.
+ * @param {RecordingState} state
+ * @param {AbortSignal} signal
+ */
 export function allan(state, signal) {
   const place = h("div", { class: "stack" });
   const which = h("div", {});
@@ -39,7 +48,9 @@ export function allan(state, signal) {
     const dataset = own ? state.dataset : null;
     loadInto(place, "Working out the Allan deviation", async () => {
       try {
-        return allanFigure(await get(`/api/recordings/${state.id}/allan`, { query: { dataset }, signal }));
+        return allanFigure(
+          await get("/api/recordings/{recording}/allan", { path: { recording: state.id }, query: { dataset }, signal }),
+        );
       } catch (error) {
         if (error instanceof Problem && error.status < 500) return notice("", error.message); // too little at rest is no fault
         throw error;
@@ -54,6 +65,7 @@ export function allan(state, signal) {
   return Object.assign(element, { redraw: show });
 }
 
+/** @param {Allan} found */
 function allanFigure(found) {
   const axes = Object.entries(found.axes);
   const [first, last] = [found.datasets[0], found.datasets.at(-1)];
@@ -126,7 +138,11 @@ function allanFigure(found) {
           title: "Figure",
           cell: ([id, name]) => [h("strong", {}, id), h("span", { class: "muted nowrap" }, `, ${name}`)],
         },
-        ...axes.map(([axis, noise]) => ({ title: `Axis ${axis}`, cell: ([id]) => noiseFigure(noise[id]) })),
+        ...axes.map(([axis, noise]) => ({
+          title: `Axis ${axis}`,
+          /** @param {typeof NOISE_FIGURES[number]} row */
+          cell: ([id]) => noiseFigure(noise[id]),
+        })),
       ],
       NOISE_FIGURES,
       { label: "Figures of IEEE Std 952", first: "11rem" },
@@ -134,7 +150,10 @@ function allanFigure(found) {
   ];
 }
 
-/** A noise figure with its uncertainty, or its upper bound and the reason why it has no value. */
+/**
+ * A noise figure with its uncertainty, or its upper bound and the reason why it has no value.
+ * @param {NoiseFigure | null | undefined} noise
+ */
 function noiseFigure(noise) {
   if (noise?.value !== null && noise?.value !== undefined)
     return [

@@ -1,20 +1,29 @@
 // Form to import a recording: drop or choose files, then show the answer of the service.
 
 import { upload } from "../core/api.js";
+import { messageOf } from "../core/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
 import { busyIndicator, notice } from "../core/components.js";
 import { droppedFiles, recordingFiles } from "./file_input.js";
 
+/** @import { Imported } from "../../../types/api.js" */
+
+/** @param {readonly File[]} files */
 const totalSize = (files) => {
   const bytes = files.reduce((sum, file) => sum + file.size, 0);
   return bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
 };
 
-/** The import card; `taken(imported)` is called when a recording is in the database. */
+/**
+ * The import card; `taken(imported)` is called when a recording is in the database.
+ * @param {(imported: Imported) => unknown} taken
+ */
 export function importForm(taken) {
   const result = h("div", { "aria-live": "polite" });
+  /** @param {boolean} folder */
   const pick = (folder) => {
+    /** @type {HTMLInputElement} */
     const input = h("input", {
       type: "file",
       multiple: true,
@@ -24,7 +33,7 @@ export function importForm(taken) {
       class: "visually-hidden",
       tabindex: "-1",
       onchange: () => {
-        const files = [...input.files];
+        const files = [...(input.files ?? [])];
         input.value = "";
         if (files.length) take(folder ? recordingFiles(files) : { files, left: [] });
       },
@@ -38,17 +47,20 @@ export function importForm(taken) {
       input,
     ];
   };
+  /** @type {HTMLElement} */
   const zone = h(
     "div",
     {
       class: "drop stack",
       ondragover: over,
       ondragenter: over,
-      ondragleave: (event) => zone.contains(event.relatedTarget) || zone.classList.remove("dragover"),
+      ondragleave: (event) =>
+        (event.relatedTarget instanceof Node && zone.contains(event.relatedTarget)) ||
+        zone.classList.remove("dragover"),
       ondrop: async (event) => {
         event.preventDefault();
         zone.classList.remove("dragover");
-        take(await droppedFiles(event.dataTransfer));
+        if (event.dataTransfer) take(await droppedFiles(event.dataTransfer));
       },
     },
     h("p", { class: "drop-title" }, "Drop a recording here"),
@@ -61,11 +73,13 @@ export function importForm(taken) {
     h("div", { class: "row", style: "justify-content: center" }, pick(false), pick(true)),
   );
 
+  /** @param {DragEvent} event */
   function over(event) {
     event.preventDefault();
     zone.classList.add("dragover");
   }
 
+  /** @param {{ files: File[], left: string[] }} chosen */
   async function take({ files, left }) {
     if (!files.length)
       return setChildren(
@@ -90,8 +104,12 @@ export function importForm(taken) {
   return h("section", { class: "card stack", "aria-label": "Import" }, h("h2", {}, "Import"), zone, result);
 }
 
+/**
+ * @param {Imported} made
+ * @param {readonly string[]} left
+ */
 function acceptedNotice(made, left) {
-  const warnings = made.warnings ?? [];
+  const warnings = made.warnings;
   return notice(
     warnings.length ? "bad" : "good",
     h(
@@ -117,7 +135,14 @@ function acceptedNotice(made, left) {
   );
 }
 
-/** The error in large type: it names the file, column and row to correct. */
+/**
+ * The error in large type: it names the file, column and row to correct.
+ * @param {unknown} error
+ */
 function refusedNotice(error) {
-  return notice("bad", h("p", { class: "lead" }, error.message), h("p", { class: "small" }, "Nothing of it was kept."));
+  return notice(
+    "bad",
+    h("p", { class: "lead" }, messageOf(error)),
+    h("p", { class: "small" }, "Nothing of it was kept."),
+  );
 }

@@ -7,7 +7,12 @@ import { plainNumber } from "../core/format.js";
 import { card } from "../core/components.js";
 import { channelUnit } from "./channels.js";
 
-/** `state` has {id, sets, output, dataset, pick(number)}. A click on a point selects its data set. */
+/** @import { Picture, RecordingState } from "../../../types/pages.js" */
+
+/**
+ * `state` has {id, sets, output, dataset, pick(number)}. A click on a point selects its data set.
+ * @param {RecordingState} state
+ */
 export function meanPlots(state) {
   const { sets, output } = state;
   const gyros = Object.keys(sets.channels).filter((name) => name.startsWith("gyro_"));
@@ -17,11 +22,13 @@ export function meanPlots(state) {
     (number, k) =>
       `data set ${number}: ${plainNumber(sets.table_rate_dps[k], 6)} deg/s${warm ? ` at ${plainNumber(warm[k])} deg C` : ""}, ${sets.position[k]} up`,
   );
+  /** @param {number} k */
   const spot = (k) => (sets.number[k] === state.dataset ? 13 : 5);
   const rim = () => ({
     width: sets.number.map((number) => (number === state.dataset ? 2.5 : 0)),
     color: colour("text"),
   });
+  /** @returns {Picture} */
   const drawRate = () => ({
     data: gyros.map((name) => ({
       type: "scatter",
@@ -46,6 +53,7 @@ export function meanPlots(state) {
       yaxis: { title: { text: `output, ${channelUnit(gyros[0], output)}` } },
     },
   });
+  /** @returns {Picture} */
   const drawWarm = () => ({
     data: [
       {
@@ -83,7 +91,7 @@ export function meanPlots(state) {
           { height: "19rem" },
         )
       : null,
-  ].filter(Boolean);
+  ].filter((each) => each !== null);
   for (const picture of pictures)
     picture.ondrawn = (plot) => plot.on("plotly_click", (event) => state.pick(event.points[0].customdata));
   return Object.assign(card("Means", h("div", { class: "columns" }, pictures)), {

@@ -4,24 +4,31 @@ import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { count, number, plainNumber } from "../core/format.js";
-import { selectField, factList, cardWithHeader, loadInto, table } from "../core/components.js";
+import { option, selectField, factList, cardWithHeader, loadInto, table } from "../core/components.js";
 import { channelName, channelTitle, channelUnit } from "./channels.js";
+
+/** @import { Samples } from "../../../types/api.js" */
+/** @import { Fact, RecordingState } from "../../../types/pages.js" */
 
 const MAX_READINGS = 20_000;
 const TABLE_ROWS = 40;
 const NO_CHANNEL = new Set(["dataset", "t_s", "position", "run", "mounting", "valid"]);
 
-/** The card of the selected data set; empty until one is selected. */
+/**
+ * The card of the selected data set; empty until one is selected.
+ * @param {RecordingState} state
+ * @param {AbortSignal} signal
+ */
 export function datasetReadings(state, signal) {
   const element = h("div", {});
   async function show() {
-    const k = state.sets.number.indexOf(state.dataset);
+    const k = state.dataset === null ? -1 : state.sets.number.indexOf(state.dataset);
     if (k < 0) return setChildren(element);
     const place = h("div", { class: "stack" });
     const close = h("button", { type: "button", class: "button tiny", onclick: () => state.pick(null) }, "Close");
     const showButton =
       state.sets.t_from_s[k] !== null && state.showInTrace
-        ? h("button", { type: "button", class: "button tiny", onclick: () => state.showInTrace(k) }, "In the trace")
+        ? h("button", { type: "button", class: "button tiny", onclick: () => state.showInTrace?.(k) }, "In the trace")
         : null;
     setChildren(
       element,
@@ -36,7 +43,8 @@ export function datasetReadings(state, signal) {
       await loadInto(place, "Reading", async () =>
         readingsFigure(
           state,
-          await get(`/api/recordings/${state.id}/samples`, {
+          await get("/api/recordings/{recording}/samples", {
+            path: { recording: state.id },
             query: { dataset: state.dataset, limit: MAX_READINGS },
             signal,
           }),
@@ -48,8 +56,20 @@ export function datasetReadings(state, signal) {
   return Object.assign(element, { redraw: show });
 }
 
+/**
+ * @param {RecordingState} state
+ * @param {number} k
+ */
 function summary(state, k) {
   const { sets } = state;
+  /** @type {Fact[]} */
+  const outputs = Object.entries(sets.channels)
+    .filter(([name]) => name.startsWith("gyro_"))
+    .map(([name, { mean, std }]) => {
+      const unit = channelUnit(name, state.output);
+      const scatter = std[k] === null ? null : `scatter ${number(std[k], 3)} ${unit}`;
+      return [channelName(name).replace("gyro output", "Output"), number(mean[k], 6), unit, scatter];
+    });
   const [from, until] = [sets.t_from_s[k], sets.t_until_s[k]];
   return factList([
     [
@@ -66,22 +86,17 @@ function summary(state, k) {
           sets.chamber_setpoint_c[k] === null ? null : `set point ${plainNumber(sets.chamber_setpoint_c[k])} deg C`,
         ]
       : null,
-    ...Object.keys(sets.channels)
-      .filter((name) => name.startsWith("gyro_"))
-      .map((name) => [
-        channelName(name).replace("gyro output", "Output"),
-        number(sets.channels[name].mean[k], 6),
-        channelUnit(name, state.output),
-        sets.channels[name].std[k] === null
-          ? null
-          : `scatter ${number(sets.channels[name].std[k], 3)} ${channelUnit(name, state.output)}`,
-      ]),
-    ["Readings", count(sets.n[k]), "", from === null ? null : `over ${number(until - from, 4)} s`],
+    ...outputs,
+    ["Readings", count(sets.n[k]), "", from === null || until === null ? null : `over ${number(until - from, 4)} s`],
     sets.lost[k] || sets.damaged[k] ? ["Lost", count(sets.lost[k]), "", `${count(sets.damaged[k])} damaged`] : null,
     sets.reason[k] ? ["State", sets.state[k], "", sets.reason[k]] : null,
   ]);
 }
 
+/**
+ * @param {RecordingState} state
+ * @param {Samples} found
+ */
 function readingsFigure(state, found) {
   const { columns } = found;
   const names = Object.keys(columns).filter((name) => !NO_CHANNEL.has(name) && typeof columns[name][0] === "number");
@@ -145,7 +160,7 @@ function readingsFigure(state, found) {
       { class: "row" },
       selectField(
         "Channel of its readings",
-        names.map((name) => [name, channelName(name)]),
+        names.map((name) => option(name, channelName(name))),
         channel,
         (value) => {
           channel = value;

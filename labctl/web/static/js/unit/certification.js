@@ -3,9 +3,14 @@
 import { get, post } from "../core/api.js";
 import { h } from "../core/elements.js";
 import { instant, number } from "../core/format.js";
-import { chip, dialog, factList, notice, table } from "../core/components.js";
+import { chip, factList, notice, table } from "../core/components.js";
+import { dialog } from "../core/dialog.js";
 import { show } from "../core/router.js";
 
+/** @import { Assessment, Certification } from "../../../types/api.js" */
+/** @import { Field } from "../../../types/pages.js" */
+
+/** @type {Record<string, [text: string, kind: string]>} */
 const VERDICTS = {
   adequate: ["adequate", "good"],
   missing: ["missing", "warn"],
@@ -14,13 +19,19 @@ const VERDICTS = {
   insufficient_data: ["too little data", "warn"],
 };
 
-/** The verdict of an assessment, or the one that was kept with an act. */
+/**
+ * The verdict of an assessment, or the one that was kept with an act.
+ * @param {{ verdict: string | null }} known
+ */
 export function verdictChip(known) {
-  const [text, kind] = VERDICTS[known.verdict] ?? ["none", ""];
+  const [text, kind] = VERDICTS[known.verdict ?? ""] ?? ["none", ""];
   return chip(text, kind);
 }
 
-/** What was overridden by an act. */
+/**
+ * What was overridden by an act.
+ * @param {Certification} act
+ */
 export const overridden = (act) =>
   notice(
     "warn",
@@ -28,11 +39,18 @@ export const overridden = (act) =>
     act.objections.map((each) => h("p", { class: "small" }, each.text)),
   );
 
-/** Ask who certifies a version and why; the verdict on it is shown, and what would have to be overridden. */
-export async function askCertification(base, version) {
-  const known = await get(`${base}/calibrations/${version}/assessment`);
+/**
+ * Ask who certifies a version and why; the verdict on it is shown, and what would have to be overridden.
+ * @param {string} serial
+ * @param {number} version
+ */
+export async function askCertification(serial, version) {
+  const known = await get("/api/units/{serial}/calibrations/{version}/assessment", {
+    path: { serial, version },
+  });
   const needed = known.override_needed;
   const words = `A sentence: at least ${known.least_reason_characters} characters and ${known.least_reason_words} words.`;
+  /** @type {Field[]} */
   const fields = [
     { name: "by", label: "Who" },
     {
@@ -51,14 +69,21 @@ export async function askCertification(base, version) {
     kind: needed ? "danger" : "primary",
   });
   if (!answers) return;
-  const body = { by: answers.by, reason: answers.reason };
-  if (answers.due_days) body.due_days = Number(answers.due_days);
-  if (answers.override) body.override = true;
-  await post(`${base}/calibrations/${version}/certify`, body);
+  const body = {
+    by: answers.by,
+    reason: answers.reason,
+    ...(answers.due_days ? { due_days: Number(answers.due_days) } : {}),
+    ...(answers.override ? { override: true } : {}),
+  };
+  await post("/api/units/{serial}/calibrations/{version}/certify", { path: { serial, version }, body });
   await show();
 }
 
-export async function askRevocation(base, version) {
+/**
+ * @param {string} serial
+ * @param {number} version
+ */
+export async function askRevocation(serial, version) {
   const answers = await dialog(
     `Take version ${version} out of force`,
     [
@@ -72,11 +97,15 @@ export async function askRevocation(base, version) {
     },
   );
   if (!answers) return;
-  await post(`${base}/calibrations/${version}/revoke`, { by: answers.by, reason: answers.reason });
+  const body = { by: answers.by, reason: answers.reason };
+  await post("/api/units/{serial}/calibrations/{version}/revoke", { path: { serial, version }, body });
   await show();
 }
 
-/** What is known of a version: verdict, errors, objections. */
+/**
+ * What is known of a version: verdict, errors, objections.
+ * @param {Assessment} known
+ */
 function assessed(known) {
   return h(
     "div",
@@ -108,6 +137,7 @@ function assessed(known) {
   );
 }
 
+/** @param {readonly Certification[]} history */
 export function certificationTable(history) {
   return table(
     [

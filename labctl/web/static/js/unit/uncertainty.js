@@ -1,50 +1,94 @@
 // Uncertainty in use of a version: over what was calibrated, and its parts at one rate and temperature.
 
 import { get } from "../core/api.js";
+import { isAbort, messageOf } from "../core/errors.js";
 import { h, setChildren } from "../core/elements.js";
 import { number } from "../core/format.js";
 import { busyIndicator, chip, labelledField, notice, table } from "../core/components.js";
 import { query, updateQuery } from "../core/router.js";
 
-/** Parts of a standard uncertainty: key, title, where a known one is from. */
+/** @import { AxisUncertainty, Uncertainty, Validity, Version } from "../../../types/api.js" */
+/** @import { Child } from "../../../types/pages.js" */
+
+/** @typedef {{ title: string, of: (one: AxisUncertainty) => Child, from: (one: AxisUncertainty) => string }} PartRow */
+
+const PATH = "/api/units/{serial}/calibrations/{version}/uncertainty";
+/** Parts of a standard uncertainty: title, value, where a known one is from. */
 const PARTS = [
-  ["coefficients", "Coefficients", () => "covariance of the fit"],
-  ["model", "Model and drift nearby", () => "data sets left out of the fit"],
-  ["repeatability", "From one power-on to the next", (one) => one.repeatability_source],
+  {
+    key: "coefficients",
+    title: "Coefficients",
+    /** @param {AxisUncertainty} one */
+    of: (one) => one.coefficients_dps,
+    from: () => "covariance of the fit",
+  },
+  {
+    key: "model",
+    title: "Model and drift nearby",
+    /** @param {AxisUncertainty} one */
+    of: (one) => one.model_dps,
+    from: () => "data sets left out of the fit",
+  },
+  {
+    key: "repeatability",
+    title: "From one power-on to the next",
+    /** @param {AxisUncertainty} one */
+    of: (one) => one.repeatability_dps,
+    /** @param {AxisUncertainty} one */
+    from: (one) => one.repeatability_source ?? "",
+  },
 ];
-/** Uncertainties have two significant digits (GUM 7.2.6). */
+/**
+ * Uncertainties have two significant digits (GUM 7.2.6).
+ * @param {number | null} u_dps
+ */
 const shown = (u_dps) => number(u_dps, 2);
 const unknown = () => h("span", { class: "warn-text" }, "unknown");
+/** @param {readonly string[]} names */
 const joined = (names) => (names.length > 1 ? `${names.slice(0, -1).join(", ")} and ${names.at(-1)}` : names[0]);
+/** @param {string} text */
 const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
-const titleOf = (part) => PARTS.find(([key]) => key === part)[1];
+/** @param {string} part */
+const titleOf = (part) => PARTS.find(({ key }) => key === part)?.title ?? part;
 
-/** Return {element, show(version)}: the uncertainty of a version, which is the answer about it. `base`: path of the unit. */
-export function uncertaintyInUse(base, signal) {
+/**
+ * Return {element, show(version)}: the uncertainty of a version, which is the answer about it.
+ * @param {string} serial
+ * @param {AbortSignal} signal
+ */
+export function uncertaintyInUse(serial, signal) {
   const element = h("div", { class: "stack" });
   let latest = 0;
   return {
     element,
+    /** @param {Version} version */
     show: async (version) => {
       const own = ++latest;
-      const path = `${base}/calibrations/${version.version}/uncertainty`;
+      const path = { serial, version: version.version };
       setChildren(element, busyIndicator("Working out the uncertainty"));
       try {
         const place = placeOf(version.validity);
-        const answer = await get(path, { query: { ...place, grid: true }, signal });
+        const answer = await get(PATH, { path, query: { ...place, grid: true }, signal });
         if (own === latest) setChildren(element, over(answer), parts(answer, place, path, signal));
       } catch (error) {
         // a model that needs more than a rate and a temperature, or without data to be uncertain by
-        if (error.name !== "AbortError" && own === latest)
-          setChildren(element, notice("warn", h("strong", {}, "Unknown: "), error.message));
+        if (!isAbort(error) && own === latest)
+          setChildren(element, notice("warn", h("strong", {}, "Unknown: "), messageOf(error)));
       }
     },
   };
 }
 
-/** The place of the address, or the middle of the temperatures at half of the fastest rate. */
+/**
+ * The place of the address, or the middle of the temperatures at half of the fastest rate.
+ * @param {Validity} validity
+ */
 function placeOf({ rate_dps, temperature_c }) {
   const asked = query();
+  /**
+   * @param {string | undefined} text
+   * @param {number} otherwise
+   */
   const given = (text, otherwise) => (text && Number.isFinite(Number(text)) ? Number(text) : otherwise);
   return {
     rate_dps: given(asked.rate, Number(((rate_dps[1] ?? 0) / 2).toPrecision(3))),
@@ -52,8 +96,12 @@ function placeOf({ rate_dps, temperature_c }) {
   };
 }
 
-/** The table over what was calibrated: a row for each axis and temperature, a column for each rate. */
+/**
+ * The table over what was calibrated: a row for each axis and temperature, a column for each rate.
+ * @param {Uncertainty} answer
+ */
 function over({ grid, coverage_factor }) {
+  if (!grid) return null;
   const rows = Object.entries(grid.axes).flatMap(([axis, lines]) =>
     lines.map((cells, k) => ({ axis, warm: grid.temperature_c[k], cells })),
   );
@@ -73,9 +121,10 @@ function over({ grid, coverage_factor }) {
         ...grid.rate_dps.map((rate, k) => ({
           title: `${number(rate, 3)} deg/s`,
           number: true,
+          /** @param {{ cells: readonly AxisUncertainty[] }} row */
           cell: (row) => cell(row.cells[k], coverage_factor),
         })),
-      ].filter(Boolean),
+      ],
       rows,
       { dense: true, label: "Uncertainty in use" },
     ),
@@ -83,7 +132,11 @@ function over({ grid, coverage_factor }) {
   );
 }
 
-/** An expanded uncertainty; where it is unknown, what is known of it below. */
+/**
+ * An expanded uncertainty; where it is unknown, what is known of it below.
+ * @param {AxisUncertainty} one
+ * @param {number} k
+ */
 function cell(one, k) {
   if (one.expanded_dps !== null) return shown(one.expanded_dps);
   const least =
@@ -91,8 +144,12 @@ function cell(one, k) {
   return [unknown(), least];
 }
 
-/** Why some of the cells are unknown, one line for each reason. */
+/**
+ * Why some of the cells are unknown, one line for each reason.
+ * @param {readonly AxisUncertainty[]} cells
+ */
 function reasons(cells) {
+  /** @type {Map<string, { parts: Set<string>, cells: Set<AxisUncertainty> }>} */
   const found = new Map();
   for (const one of cells)
     for (const [part, why] of Object.entries(one.unknown)) {
@@ -102,6 +159,7 @@ function reasons(cells) {
       found.set(why, places);
     }
   if (!found.size) return null;
+  /** @param {number} n */
   const where = (n) => (n === cells.length ? "" : ` (${n} of ${cells.length} cells)`);
   return notice(
     "warn",
@@ -123,9 +181,19 @@ function reasons(cells) {
   );
 }
 
-/** The parts at a place that can be chosen. */
+/**
+ * The parts at a place that can be chosen.
+ * @param {Uncertainty} first
+ * @param {{ rate_dps: number, temperature_c: number }} place
+ * @param {{ serial: string, version: number }} path
+ * @param {AbortSignal} signal
+ */
 function parts(first, place, path, signal) {
   const result = h("div", { class: "stack", "aria-live": "polite" });
+  /**
+   * @param {number} value
+   * @returns {HTMLInputElement}
+   */
   const input = (value) =>
     h("input", {
       type: "number",
@@ -142,10 +210,11 @@ function parts(first, place, path, signal) {
     const own = ++latest;
     updateQuery({ rate: rate.value, temperature: warm.value });
     try {
-      const answer = await get(path, { query: { rate_dps: rate.value, temperature_c: warm.value }, signal });
+      const asked = { rate_dps: Number(rate.value), temperature_c: Number(warm.value) };
+      const answer = await get(PATH, { path, query: asked, signal });
       if (own === latest) setChildren(result, atPlace(answer));
     } catch (error) {
-      if (error.name !== "AbortError" && own === latest) setChildren(result, notice("bad", error.message));
+      if (!isAbort(error) && own === latest) setChildren(result, notice("bad", messageOf(error)));
     }
   }
   setChildren(result, atPlace(first));
@@ -158,16 +227,24 @@ function parts(first, place, path, signal) {
   );
 }
 
+/** @param {Uncertainty} answer */
 function atPlace(answer) {
   const axes = Object.entries(answer.axes);
+  /**
+   * @param {number | null} value
+   * @param {boolean} [strong]
+   */
   const figure = (value, strong) =>
     value === null ? unknown() : strong ? h("strong", {}, shown(value)) : shown(value);
   const k = answer.coverage_factor;
-  const rows = [
-    ...PARTS.map(([part, title, source]) => ({
+  /** @type {(PartRow | null)[]} */
+  const all = [
+    ...PARTS.map(({ key, title, of, from }) => ({
       title,
-      of: (one) => figure(one[`${part}_dps`]),
-      from: (one) => one.unknown[part] ?? source(one),
+      /** @param {AxisUncertainty} one */
+      of: (one) => figure(of(one)),
+      /** @param {AxisUncertainty} one */
+      from: (one) => one.unknown[key] ?? from(one),
     })),
     { title: "Combined", of: (one) => figure(one.combined_dps), from: becauseOf },
     { title: `Expanded, k = ${k}`, of: (one) => figure(one.expanded_dps, true), from: becauseOf },
@@ -178,7 +255,8 @@ function atPlace(answer) {
           from: () => "coefficients and model alone, without another power-on",
         }
       : null,
-  ].filter(Boolean);
+  ];
+  const rows = all.filter((row) => row !== null);
   return h(
     "div",
     { class: "stack" },
@@ -193,7 +271,12 @@ function atPlace(answer) {
     table(
       [
         { title: "Standard uncertainty, deg/s", cell: (row) => row.title },
-        ...axes.map(([axis, one]) => ({ title: `Axis ${axis}`, number: true, cell: (row) => row.of(one) })),
+        ...axes.map(([axis, one]) => ({
+          title: `Axis ${axis}`,
+          number: true,
+          /** @param {PartRow} row */
+          cell: (row) => row.of(one),
+        })),
         { title: "From", prose: true, cell: (row) => byAxis(axes, row.from) },
       ],
       rows,
@@ -202,7 +285,10 @@ function atPlace(answer) {
   );
 }
 
-/** What an unknown sum lacks. */
+/**
+ * What an unknown sum lacks.
+ * @param {AxisUncertainty} one
+ */
 const becauseOf = (one) =>
   one.combined_dps === null
     ? `unknown, as ${joined(Object.keys(one.unknown))} ${Object.keys(one.unknown).length > 1 ? "are" : "is"}`
@@ -210,7 +296,11 @@ const becauseOf = (one) =>
       ? "all parts, wider for few power-ons"
       : "all parts";
 
-/** A text of each axis, once where all say the same. */
+/**
+ * A text of each axis, once where all say the same.
+ * @param {readonly [string, AxisUncertainty][]} axes
+ * @param {(one: AxisUncertainty) => string} text
+ */
 function byAxis(axes, text) {
   const texts = axes.map(([axis, one]) => [axis, text(one)]);
   if (new Set(texts.map(([, said]) => said)).size === 1) return texts[0][1];

@@ -2,17 +2,26 @@
 
 import { h } from "../../core/elements.js";
 import { axisColour, colour, figure } from "../../core/figure.js";
-import { linesOf, ownRows, positionsOf } from "./rows.js";
+import { linesOf, ownRows, pickRows, positionsOf } from "./rows.js";
 
+/** @import { Comparison } from "../../../../types/api.js" */
+/** @import { Picture } from "../../../../types/pages.js" */
+/** @import { ExploreState } from "../state.js" */
+
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function atRest(comparison, state) {
   const own = ownRows(comparison, state.axis);
   const here = own.table_rate_dps
     .map((rate, k) => (Math.abs(rate) < comparison.at_rest_dps ? k : -1))
     .filter((k) => k >= 0);
   if (!here.length) return h("p", { class: "muted" }, "No data set of this recording is at rest.");
-  const at = (name) => here.map((k) => own[name][k]);
-  const lines = linesOf(comparison.over_temperature, state.axis, positionsOf({ position: at("position") }));
+  const rest = pickRows(own, here);
+  const lines = linesOf(comparison.over_temperature, state.axis, positionsOf(rest));
   const floor = state.criticism.error.noise_floor_dps;
+  /** @returns {Picture} */
   const draw = () => ({
     data: [
       ...lines.flatMap((each) =>
@@ -36,9 +45,9 @@ export function atRest(comparison, state) {
         type: "scatter",
         mode: "markers",
         name: "measured",
-        x: at("temperature_c"),
-        y: at("measured_error_dps"),
-        customdata: at("dataset"),
+        x: rest.temperature_c,
+        y: rest.measured_error_dps,
+        customdata: rest.dataset,
         error_y: floor ? { type: "constant", value: 2 * floor, thickness: 1, width: 0 } : undefined,
         marker: { color: axisColour(state.axis), size: 7 },
         hovertemplate: "data set %{customdata}<br>%{x:.4g} deg C: %{y:.4g} deg/s<extra></extra>",

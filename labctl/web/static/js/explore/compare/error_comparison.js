@@ -9,6 +9,10 @@ import { atRest } from "./at_rest.js";
 import { surfaces } from "./surfaces.js";
 import { fullTurn } from "./full_turn.js";
 
+/** @import { Comparison } from "../../../../types/api.js" */
+/** @import { ExploreState } from "../state.js" */
+
+/** @type {[id: string, text: string, draw: (comparison: Comparison, state: ExploreState) => HTMLElement][]} */
 const VIEWS = [
   ["lines", "Error over rate", overRate],
   ["warm", "Error over temperature", overTemperature],
@@ -18,24 +22,33 @@ const VIEWS = [
   ["turn", "Per full turn", fullTurn],
 ];
 
-export function errorComparison(state, path, signal) {
+/**
+ * @param {ExploreState} state
+ * @param {AbortSignal} signal
+ */
+export function errorComparison(state, signal) {
   const place = h("div", { style: "min-height: 28rem" });
   const source = h("p", { class: "muted small" });
-  let view = VIEWS.some(([id]) => id === query().view) ? query().view : "lines";
+  let view = VIEWS.find(([id]) => id === query().view) ?? VIEWS[0];
+  /** @type {Comparison | null} */
   let comparison = null;
   const shown = () =>
     loadInto(place, "Reading the data sets", async () => {
-      comparison ??= await get(`${path}/comparison`, { query: { recording: state.recording }, signal });
+      comparison ??= await get("/api/units/{serial}/calibrations/{version}/comparison", {
+        path: { serial: state.serial, version: state.version },
+        query: { recording: state.recording },
+        signal,
+      });
       source.textContent = sourceText(comparison);
-      return VIEWS.find(([id]) => id === view)[2](comparison, state);
+      return view[2](comparison, state);
     });
   shown();
   state.onchange((what) => what === "axis" && shown());
   return cardWithHeader(
     "Compare",
-    toggleGroup("What to compare", VIEWS, view, (value) => {
-      view = value;
-      updateQuery({ view: value === "lines" ? null : value });
+    toggleGroup("What to compare", VIEWS, view[0], (value) => {
+      view = VIEWS.find(([id]) => id === value) ?? VIEWS[0];
+      updateQuery({ view: view === VIEWS[0] ? null : value });
       shown();
     }),
     source,
@@ -43,6 +56,7 @@ export function errorComparison(state, path, signal) {
   );
 }
 
+/** @param {Comparison} comparison */
 function sourceText({ source, held, left_out: leftOut }) {
   const at = Object.entries(held).map(([name, value]) => `${name} ${Number(value.toPrecision(4))}`);
   return `Model: ${source}.${at.length ? ` Lines are at ${at.join(", ")}.` : ""}${leftOut.length ? ` Without ${leftOut.map((line) => line.effect.replaceAll("_", " ")).join(", ")}, which ${leftOut.length > 1 ? "do" : "does"} not leave with the calibration.` : ""}`;

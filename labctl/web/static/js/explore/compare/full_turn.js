@@ -5,12 +5,22 @@ import { temperatureColours } from "../../core/colour_scales.js";
 import { h } from "../../core/elements.js";
 import { figure } from "../../core/figure.js";
 import { number, plainNumber } from "../../core/format.js";
-import { ownRows, rms, span } from "./rows.js";
+import { ownRows, pickRows, rms, span } from "./rows.js";
 import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
+
+/** @import { Comparison } from "../../../../types/api.js" */
+/** @import { PlotTrace } from "../../../../types/pages.js" */
+/** @import { Rows } from "./rows.js" */
+/** @import { Axes } from "./scenes.js" */
+/** @import { ExploreState } from "../state.js" */
 
 /** More temperature levels than this are dots without lines. */
 const MOST_LINES = 24;
 
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function fullTurn(comparison, state) {
   const own = ownRows(comparison, state.axis);
   const here = own.dataset.map((_, k) => k).filter((k) => own.turn_before_deg[k] !== null);
@@ -20,22 +30,24 @@ export function fullTurn(comparison, state) {
       { class: "muted" },
       `No data set of this recording turns the axis at ${comparison.least_turn_rate_dps} deg/s or more, or none is at rest.`,
     );
-  const rows = Object.fromEntries(Object.entries(own).map(([name, values]) => [name, here.map((k) => values[k])]));
+  const rows = pickRows(own, here);
+  const turn = { before: numbersOf(rows.turn_before_deg), after: numbersOf(rows.turn_after_deg) };
   const draw = () => {
     const colours = temperatureColours(rows.temperature_c, barPlace());
     const titles = [
-      ["turn_before_deg", "before: static bias off only"],
-      ["turn_after_deg", "after the calibration"],
-    ].map(([name, title]) => `${title}, RMS ${number(rms(rows[name]), 2)} deg`);
+      `before: static bias off only, RMS ${number(rms(turn.before), 2)} deg`,
+      `after the calibration, RMS ${number(rms(turn.after), 2)} deg`,
+    ];
+    /** @type {Axes} */
     const axes = {
       x: ["rate, deg/s", span(rows.rate)],
       y: ["deg C", span(rows.temperature_c)],
-      z: ["deg per turn", span([...rows.turn_before_deg, ...rows.turn_after_deg])],
+      z: ["deg per turn", span([...turn.before, ...turn.after])],
     };
     return {
       data: [
-        ...turnTraces(rows, "turn_before_deg", "scene", colours),
-        ...turnTraces(rows, "turn_after_deg", "scene2", colours),
+        ...turnTraces(rows, turn.before, "before", "scene", colours),
+        ...turnTraces(rows, turn.after, "after", "scene2", colours),
       ],
       layout: { ...sceneLayout(titles, axes), coloraxis: colours.axis, showlegend: false },
     };
@@ -48,7 +60,18 @@ export function fullTurn(comparison, state) {
   );
 }
 
-function turnTraces(rows, name, scene, colours) {
+/** @param {readonly (number | null)[]} values */
+const numbersOf = (values) => values.map((value) => value ?? 0);
+
+/**
+ * @param {Rows} rows
+ * @param {readonly number[]} turn
+ * @param {string} name
+ * @param {string} scene
+ * @param {{ of: (temperature: number) => string }} colours
+ * @returns {PlotTrace[]}
+ */
+function turnTraces(rows, turn, name, scene, colours) {
   const levels = [...new Set(rows.temperature_level_c)].sort((a, b) => a - b);
   const dots = {
     type: "scatter3d",
@@ -57,7 +80,7 @@ function turnTraces(rows, name, scene, colours) {
     scene,
     x: rows.rate,
     y: rows.temperature_c,
-    z: rows[name],
+    z: turn,
     marker: { size: 3, color: rows.temperature_c, coloraxis: "coloraxis" },
     customdata: rows.dataset,
     hovertemplate: "data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C<br>%{z:.3g} deg per turn<extra></extra>",
@@ -78,7 +101,7 @@ function turnTraces(rows, name, scene, colours) {
               scene,
               x: line.map((k) => rows.rate[k]),
               y: line.map((k) => rows.temperature_c[k]),
-              z: line.map((k) => rows[name][k]),
+              z: line.map((k) => turn[k]),
               line: { color: colours.of(level), width: 3 },
               hoverinfo: "skip",
             };

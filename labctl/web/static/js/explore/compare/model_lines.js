@@ -5,10 +5,23 @@ import { figure } from "../../core/figure.js";
 import { plainNumber } from "../../core/format.js";
 import { alongRate, linesOf, ownRows, positionsOf, rowsWhere, signOf } from "./rows.js";
 
+/** @import { Comparison, ModelLines } from "../../../../types/api.js" */
+/** @import { PlotLayout, PlotTrace } from "../../../../types/pages.js" */
+/** @import { Rows } from "./rows.js" */
+/** @import { ExploreState } from "../state.js" */
+
 const PANEL_PX = { wide: 210, narrow: 230 };
 const isNarrow = () => window.innerWidth < 760;
 
-/** Dots of some rows, coloured by `colours`. */
+/**
+ * Dots of some rows, coloured by `colours`.
+ * @param {Rows} rows
+ * @param {readonly number[]} x
+ * @param {readonly number[]} colours
+ * @param {string} unit
+ * @param {object} [more]
+ * @returns {PlotTrace}
+ */
 const dots = (rows, x, colours, unit, more) => ({
   type: "scatter",
   mode: "markers",
@@ -21,6 +34,14 @@ const dots = (rows, x, colours, unit, more) => ({
   hovertemplate: `data set %{customdata}<br>%{x:.5g} ${unit}: %{y:.4g} deg/s<extra></extra>`,
   ...more,
 });
+/**
+ * @param {readonly number[]} x
+ * @param {readonly number[]} y
+ * @param {string} name
+ * @param {string} shade
+ * @param {object} [more]
+ * @returns {PlotTrace}
+ */
 const line = (x, y, name, shade, more) => ({
   type: "scatter",
   mode: "lines",
@@ -33,11 +54,16 @@ const line = (x, y, name, shade, more) => ({
   ...more,
 });
 
+/** @param {readonly ModelLines[]} lines */
 const ofAll = (lines) =>
   lines.length && lines[0].level.length < lines[0].levels
     ? ` Lines: ${lines[0].level.length} of ${lines[0].levels} levels, all dots.`
     : "";
 
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function overRate(comparison, state) {
   const rows = ownRows(comparison, state.axis);
   const lines = linesOf(comparison.over_rate, state.axis, positionsOf(rows));
@@ -67,6 +93,10 @@ export function overRate(comparison, state) {
   );
 }
 
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function overTemperature(comparison, state) {
   const rows = ownRows(comparison, state.axis);
   const lines = linesOf(comparison.over_temperature, state.axis, positionsOf(rows));
@@ -101,7 +131,10 @@ export function overTemperature(comparison, state) {
   );
 }
 
-/** A panel for each output (row) and turning axis (column): Yang's nine where three axes were turned. */
+/**
+ * A panel for each output (row) and turning axis (column): Yang's nine where three axes were turned.
+ * @param {Comparison} comparison
+ */
 export function allPanels(comparison) {
   const outputs = [...new Set(comparison.columns.axis)];
   const positions = [...new Set(comparison.columns.position)];
@@ -111,6 +144,7 @@ export function allPanels(comparison) {
     const columns = below ? 1 : positions.length;
     const colours = temperatureColours(comparison.columns.temperature_c);
     const rowsOfPanels = Math.ceil(panels.length / columns);
+    /** @type {PlotLayout} */
     const layout = {
       coloraxis: colours.axis,
       annotations: [],

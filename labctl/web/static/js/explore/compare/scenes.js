@@ -2,15 +2,23 @@
 
 import { colour } from "../../core/figure.js";
 
+/** @typedef {[title: string, range: [low: number, high: number]]} SceneAxis */
+/** @typedef {Record<"x" | "y" | "z", SceneAxis>} Axes */
+
 const isNarrow = () => window.innerWidth < 760;
 export const twoScenes = () => (isNarrow() ? "46rem" : "30rem");
 
 /** Where the colour bar is: at the right, or below on a narrow screen, so that the scenes have its width. */
 export const barPlace = () => (isNarrow() ? { orientation: "h", y: -0.01, yanchor: "top", len: 0.9 } : {});
 
-/** Layout of scenes `scene` and `scene2`; `axes` are {x: [title, [low, high]], y, z}, the same for both. */
+/**
+ * Layout of scenes `scene` and `scene2`; `axes` are {x: [title, [low, high]], y, z}, the same for both.
+ * @param {readonly string[]} titles
+ * @param {Axes} axes
+ */
 export function sceneLayout(titles, axes) {
   const below = isNarrow();
+  /** @param {SceneAxis} axis */
   const axis = ([title, [low, high]]) => {
     const margin = 0.04 * (high - low || 1);
     return {
@@ -20,6 +28,7 @@ export function sceneLayout(titles, axes) {
       color: colour("text-muted"),
     };
   };
+  /** @param {number} k */
   const scene = (k) => ({
     domain: below ? { x: [0, 1], y: k ? [0, 0.46] : [0.52, 0.98] } : { x: k ? [0.51, 1] : [0, 0.49], y: [0, 0.95] },
     xaxis: axis(axes.x),
@@ -31,6 +40,10 @@ export function sceneLayout(titles, axes) {
     },
     aspectmode: "cube",
   });
+  /**
+   * @param {string} text
+   * @param {number} k
+   */
   const title = (text, k) => ({
     text,
     showarrow: false,

@@ -5,11 +5,22 @@ import { alongRate, linesOf, ownRows, positionsOf, rms, span } from "./rows.js";
 import { number } from "../../core/format.js";
 import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
 
+/** @import { Comparison } from "../../../../types/api.js" */
+/** @import { Picture, PlotTrace } from "../../../../types/pages.js" */
+/** @import { Rows } from "./rows.js" */
+/** @import { Axes } from "./scenes.js" */
+/** @import { ExploreState } from "../state.js" */
+
 const SCALE = "Viridis";
 
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function surfaces(comparison, state) {
   const rows = ownRows(comparison, state.axis);
   const lines = linesOf(comparison.over_rate, state.axis, positionsOf(rows));
+  /** @returns {Picture} */
   const draw = () => {
     const reach = span([
       ...rows.measured_error_dps,
@@ -21,6 +32,7 @@ export function surfaces(comparison, state) {
       `after: what remains, RMS ${number(rms(rows.residual_dps), 2)} deg/s`,
     ];
     const shared = { colorscale: SCALE, cmin: reach[0], cmax: reach[1] };
+    /** @type {Axes} */
     const axes = {
       x: ["rate, deg/s", span(rows.rate)],
       y: ["deg C", span(rows.temperature_c)],
@@ -36,15 +48,15 @@ export function surfaces(comparison, state) {
           showscale: k === 0,
           colorbar: { title: { text: "deg/s" }, thickness: 12, outlinewidth: 0, ...barPlace() },
           opacity: 0.85,
-          x: alongRate(each)[0],
+          x: alongRate(each, each.error_dps)[0],
           y: each.level,
           z: each.error_dps,
           hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>modelled %{z:.4g} deg/s<extra></extra>",
         })),
-        dots(rows, "measured_error_dps", "measured", "scene"),
+        dots(rows, rows.measured_error_dps, "measured", "scene"),
         residualSurface(rows, shared),
-        dots(rows, "residual_dps", "what remains", "scene2"),
-      ].filter(Boolean),
+        dots(rows, rows.residual_dps, "what remains", "scene2"),
+      ].filter((trace) => trace !== null),
       layout: { ...sceneLayout(titles, axes), showlegend: false },
     };
   };
@@ -56,23 +68,36 @@ export function surfaces(comparison, state) {
   );
 }
 
-const dots = (rows, name, label, scene) => ({
+/**
+ * @param {Rows} rows
+ * @param {readonly number[]} z
+ * @param {string} label
+ * @param {string} scene
+ * @returns {PlotTrace}
+ */
+const dots = (rows, z, label, scene) => ({
   type: "scatter3d",
   mode: "markers",
   name: label,
   scene,
   x: rows.rate,
   y: rows.temperature_c,
-  z: rows[name],
+  z,
   marker: { size: 2.5, color: colour("text") },
   customdata: rows.dataset,
   hovertemplate: `data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C<br>${label} %{z:.4g} deg/s<extra></extra>`,
 });
 
-/** The mean residual of each cell as a surface; null where cells do not make a grid. */
+/**
+ * The mean residual of each cell as a surface; null where cells do not make a grid.
+ * @param {Rows} rows
+ * @param {object} shared
+ * @returns {PlotTrace | null}
+ */
 function residualSurface(rows, shared) {
   const rates = [...new Set(rows.rate_level_dps)].sort((a, b) => a - b);
   const warm = [...new Set(rows.temperature_level_c)].sort((a, b) => a - b);
+  /** @type {Map<string, number[]>} */
   const cells = new Map();
   rows.dataset.forEach((_, k) => {
     const id = `${rows.rate_level_dps[k]} ${rows.temperature_level_c[k]}`;
@@ -80,6 +105,7 @@ function residualSurface(rows, shared) {
   });
   if (positionsOf(rows).length > 1 || cells.size < 0.9 * rates.length * warm.length) return null;
   const sign = positionsOf(rows)[0].startsWith("-") ? -1 : 1;
+  /** @param {readonly number[] | undefined} values */
   const mean = (values) => (values ? values.reduce((sum, value) => sum + value, 0) / values.length : null);
   return {
     type: "surface",
