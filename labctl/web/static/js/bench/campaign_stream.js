@@ -52,10 +52,10 @@ export async function followCampaign(campaign, handlers, signal) {
       })) {
         [heard, tries] = [Date.now(), 0];
         report(false);
-        if (message.event === "progress") handlers.progress(message.data);
+        if (message.event === "progress") handlers.progress(/** @type {Campaign} */ (message.data));
         else if (message.id !== null) {
           after = message.id;
-          handlers.event(message.data);
+          handlers.event(/** @type {CampaignEvent} */ (message.data));
         }
       }
       const status = await get("/api/campaigns/{campaign}", { path: { campaign }, signal });

@@ -2,7 +2,7 @@
 
 import { setChildren, h } from "../core/elements.js";
 import { number, sizeText, unitText, idText } from "../core/format.js";
-import { option, selectField, labelledField } from "../core/components.js";
+import { labelledField, option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 
 /** @import { Effect, Visibility } from "../../../types/api.js" */

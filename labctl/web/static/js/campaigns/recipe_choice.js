@@ -2,7 +2,8 @@
 
 import { setChildren, uniqueId, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
-import { card, chip, labelledField } from "../core/components.js";
+import { card, chip } from "../core/components.js";
+import { labelledField } from "../core/fields.js";
 
 /** @import { Recipe } from "../../../types/api.js" */
 /** @import { Child } from "../../../types/pages.js" */

@@ -146,18 +146,19 @@ export async function* eventStream(path, { path: parameters, after, query, signa
 }
 
 /** @typedef {"/api/units/{serial}/calibrations/{version}/criticism/events"} FollowedPath */
+/** @typedef {Streams[FollowedPath]} Followed */
 /**
  * The answer of a long computation, followed to its end: `onstage` is called with each stage, in words. Leaving the
  * page (`signal`) cancels the computation in the service.
  * @param {FollowedPath} path
  * @param {Options<"get", FollowedPath> & { onstage: (stage: string) => void }} options
- * @returns {Promise<Streams[FollowedPath]["answer"]>}
+ * @returns {Promise<Followed["answer"]>}
  */
 export async function getFollowed(path, { onstage, ...options }) {
   for await (const { event, data } of eventStream(path, options)) {
-    if (event === "stage") onstage(data.stage);
-    else if (event === "answer") return data;
-    else if (event === "problem") throw new Problem(data);
+    if (event === "stage") onstage(/** @type {Followed["stage"]} */ (data).stage);
+    else if (event === "answer") return /** @type {Followed["answer"]} */ (data);
+    else if (event === "problem") throw new Problem(/** @type {Followed["problem"]} */ (data));
   }
   throw new Unreachable();
 }

@@ -1,6 +1,6 @@
 // A modal dialog that asks for some values.
 
-import { labelledField } from "./components.js";
+import { labelledField } from "./fields.js";
 import { uniqueId, h } from "./elements.js";
 
 /** @import { Answers, Child, Field } from "../../../types/pages.js" */

@@ -1,6 +1,6 @@
 // Messages of a stream of server-sent events.
 
-/** @typedef {{ event: string, id: number | null, data: any }} EventMessage */
+/** @typedef {{ event: string, id: number | null, data: unknown }} EventMessage */
 
 /**
  * Split what was received so far into whole messages and the rest.

@@ -2,7 +2,8 @@
 
 import { setChildren, h } from "../core/elements.js";
 import { idText } from "../core/format.js";
-import { chip, emptyState, labelledField, option, pageHeader, toggleGroup } from "../core/components.js";
+import { chip, emptyState, pageHeader } from "../core/components.js";
+import { labelledField, option, toggleGroup } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 import { signatureThumbnail } from "./signature_plot.js";
 import { CHANNELS, ORIGINS } from "./labels.js";

@@ -2,7 +2,7 @@
 
 import { count, plainNumber } from "../core/format.js";
 
-/** @import { Criticism } from "../../../types/api.js" */
+/** @import { Criticism, Preview } from "../../../types/api.js" */
 /** @typedef {Pick<Criticism, "views">} Viewed */
 
 /**
@@ -32,6 +32,17 @@ export const axisNames = (criticism) => Object.keys(criticism.views.sets?.residu
 export function shownText(criticism) {
   const { of, dataset } = criticism.views.sets;
   return dataset.length < of ? `${count(dataset.length)} of ${count(of)} data sets` : null;
+}
+
+/**
+ * The values of an axis in the order of the criticism's data sets.
+ * @param {{ criticism: Viewed, axis: string }} state
+ * @param {Pick<Preview["residuals"], "dataset" | "axis" | "residual_dps">} columns
+ * @param {"residual_dps"} name
+ */
+export function inDatasetOrder(state, columns, name) {
+  const values = new Map(columns.dataset.map((set, k) => [`${set} ${columns.axis[k]}`, columns[name][k]]));
+  return datasetRows(state.criticism, state.axis).dataset.map((set) => values.get(`${set} ${state.axis}`) ?? null);
 }
 
 /**

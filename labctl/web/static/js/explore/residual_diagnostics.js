@@ -3,7 +3,8 @@
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number } from "../core/format.js";
-import { option, selectField, cardWithHeader, table } from "../core/components.js";
+import { cardWithHeader, table } from "../core/components.js";
+import { option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
 import { cellsText, colourLimit, mapsOf } from "./residual_cells.js";
 import { residualMap, selectedRows, datasetsUnder } from "./residual_map.js";

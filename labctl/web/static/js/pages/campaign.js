@@ -3,7 +3,8 @@
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, percent } from "../core/format.js";
-import { card, chip, factList, pageHeader, cardWithHeader, notice, toggleGroup } from "../core/components.js";
+import { card, chip, factList, pageHeader, cardWithHeader, notice } from "../core/components.js";
+import { toggleGroup } from "../core/fields.js";
 import { navigate, updateQuery, show as showAgain } from "../core/router.js";
 import { linkButton, resumeControl, stopButton } from "../bench/actions.js";
 import { eventList } from "../bench/event_list.js";

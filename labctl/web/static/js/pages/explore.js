@@ -4,27 +4,17 @@ import { get, getFollowed, post } from "../core/api.js";
 import { isAbort } from "../core/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
-import {
-  option,
-  busyIndicator,
-  button,
-  card,
-  selectField,
-  emptyState,
-  pageHeader,
-  notice,
-  toggleGroup,
-  errorPage,
-} from "../core/components.js";
+import { busyIndicator, button, card, emptyState, pageHeader, notice, errorPage } from "../core/components.js";
+import { option, selectField, toggleGroup } from "../core/fields.js";
 import { navigate, query } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
 import { postFit } from "../explore/accept_warnings.js";
-import { extendModel, inDatasetOrder } from "../explore/extend_model.js";
+import { extendModel } from "../explore/extend_model.js";
 import { errorComparison } from "../explore/compare/error_comparison.js";
 import { residualDiagnostics } from "../explore/residual_diagnostics.js";
 import { suspectList, verdictCard } from "../explore/suspects.js";
 import { selectedRows } from "../explore/residual_map.js";
-import { axisNames } from "../explore/dataset_rows.js";
+import { axisNames, inDatasetOrder } from "../explore/dataset_rows.js";
 import { ExploreState } from "../explore/state.js";
 import { errorLadder } from "../explore/error_ladder.js";
 

@@ -3,7 +3,8 @@
 import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, day } from "../core/format.js";
-import { chip, option, selectField, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
+import { chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
+import { option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 import { importForm } from "../recordings/import_form.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";

@@ -5,7 +5,8 @@ import { Problem } from "../core/errors.js";
 import { setChildren, h, whenNearViewport } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
-import { cardWithHeader, loadInto, notice, table, toggleGroup } from "../core/components.js";
+import { cardWithHeader, loadInto, notice, table } from "../core/components.js";
+import { toggleGroup } from "../core/fields.js";
 
 /** @import { Allan, NoiseFigure } from "../../../types/api.js" */
 /** @import { RecordingState } from "../../../types/pages.js" */

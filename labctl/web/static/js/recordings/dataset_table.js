@@ -2,7 +2,8 @@
 
 import { setChildren, h } from "../core/elements.js";
 import { count, duration, mean, number, plainNumber } from "../core/format.js";
-import { chip, option, selectField, cardWithHeader, table } from "../core/components.js";
+import { chip, cardWithHeader, table } from "../core/components.js";
+import { option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 import { channelName, channelUnit } from "./channels.js";
 

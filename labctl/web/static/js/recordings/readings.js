@@ -4,7 +4,8 @@ import { get } from "../core/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { count, number, plainNumber } from "../core/format.js";
-import { option, selectField, factList, cardWithHeader, loadInto, table } from "../core/components.js";
+import { factList, cardWithHeader, loadInto, table } from "../core/components.js";
+import { option, selectField } from "../core/fields.js";
 import { channelName, channelTitle, channelUnit } from "./channels.js";
 
 /** @import { Samples } from "../../../types/api.js" */

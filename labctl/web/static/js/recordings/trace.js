@@ -7,7 +7,8 @@ import { continuousPieces, envelopeOutline, meanLine } from "./trace_pieces.js";
 import { setChildren, h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { count, duration, isNumber, number } from "../core/format.js";
-import { busyIndicator, option, selectField, cardWithHeader, notice } from "../core/components.js";
+import { busyIndicator, cardWithHeader, notice } from "../core/components.js";
+import { option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 import { channelName, channelTitle } from "./channels.js";
 

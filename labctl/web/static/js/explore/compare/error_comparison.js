@@ -2,7 +2,8 @@
 
 import { get } from "../../core/api.js";
 import { h } from "../../core/elements.js";
-import { cardWithHeader, loadInto, toggleGroup } from "../../core/components.js";
+import { cardWithHeader, loadInto } from "../../core/components.js";
+import { toggleGroup } from "../../core/fields.js";
 import { query, updateQuery } from "../../core/router.js";
 import { allPanels, overRate, overTemperature } from "./model_lines.js";
 import { atRest } from "./at_rest.js";
