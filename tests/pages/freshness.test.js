@@ -9,9 +9,9 @@ import {
   freshnessWords,
   STALE_MS,
   stalenessOf,
-} from "../../labctl/web/static/js/core/freshness_state.js";
+} from "../../labctl/web/static/js/core/freshness/state.js";
 
-/** @import { Heard } from "../../labctl/web/static/js/core/freshness_state.js" */
+/** @import { Heard } from "../../labctl/web/static/js/core/freshness/state.js" */
 
 /** @type {Heard} */
 const fresh = { service_s: 0.4, open_s: 60, bench_s: 1.2, paused: false, trouble: "", clock: "12:00:00" };

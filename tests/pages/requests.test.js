@@ -3,8 +3,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { address } from "../../labctl/web/static/js/core/address.js";
-import { parseMessage, splitMessages } from "../../labctl/web/static/js/core/event_message.js";
+import { address } from "../../labctl/web/static/js/core/http/address.js";
+import { parseMessage, splitMessages } from "../../labctl/web/static/js/core/http/event_message.js";
 import { changedQuery, matchRoute, routeOf } from "../../labctl/web/static/js/core/routes.js";
 
 test("parameters of a path are encoded, and none may lack", () => {

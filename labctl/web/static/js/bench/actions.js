@@ -1,6 +1,6 @@
 // Buttons that act on a campaign or a bench. Each asks for the operator's name, and for a reason where one is recorded.
 
-import { get, post } from "../core/api.js";
+import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { button, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";

@@ -1,7 +1,7 @@
 // Event stream of a campaign: reconnects after a break and reports when the stream is silent.
 
-import { eventStream, get } from "../core/api.js";
-import { isAbort, Problem } from "../core/errors.js";
+import { eventStream, get } from "../core/http/api.js";
+import { isAbort, Problem } from "../core/http/errors.js";
 import { hasEnded } from "../campaigns/states.js";
 
 /** @import { Campaign, CampaignEvent } from "../../../types/api.js" */

@@ -3,7 +3,7 @@
 import { h, uniqueId } from "../core/elements.js";
 import { percent } from "../core/format.js";
 import { card, factList, notice } from "../core/components.js";
-import { presentWords } from "../core/freshness.js";
+import { presentWords } from "../core/freshness/line.js";
 import { adviceNotice } from "../campaigns/advice.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
 import { campaignInstant, durationTaken } from "../campaigns/campaign_time.js";

@@ -1,6 +1,6 @@
 // The readings of the newest finished data set of a campaign.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { plainNumber } from "../core/format.js";

@@ -1,6 +1,6 @@
 // A running campaign: status bar, operator prompt, warnings, gauges and plots.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { duration } from "../core/format.js";
 import { card, cardWithHeader, notice } from "../core/components.js";

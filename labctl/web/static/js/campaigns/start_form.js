@@ -1,7 +1,7 @@
 // Start form: start now, at a time, on a cron line, or in simulation alone.
 
-import { post } from "../core/api.js";
-import { isAbort, messageOf } from "../core/errors.js";
+import { post } from "../core/http/api.js";
+import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { instant } from "../core/format.js";
 import { button, card, notice, toast } from "../core/components.js";

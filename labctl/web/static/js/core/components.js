@@ -1,6 +1,6 @@
 // User interface components that several pages use.
 
-import { isAbort, messageOf, Problem, Unreachable } from "./errors.js";
+import { isAbort, messageOf, Problem, Unreachable } from "./http/errors.js";
 import { setChildren, h } from "./elements.js";
 
 /** @import { Child, Column, Fact } from "../../../types/pages.js" */

@@ -1,6 +1,6 @@
 // Figures: a Plotly plot in the colours of the theme, with buttons that save it as PNG, SVG or CSV.
 
-import { saveBlob } from "./api.js";
+import { saveBlob } from "./http/api.js";
 import { csvText, fileName, traceRows } from "./csv.js";
 import { h, whenNearViewport } from "./elements.js";
 

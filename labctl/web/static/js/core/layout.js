@@ -1,9 +1,9 @@
 // Layout around every page: how fresh it is, sidebar, access key, colour theme.
 
-import { accessKey, setAccessKey } from "./api.js";
+import { accessKey, setAccessKey } from "./http/api.js";
 import { setChildren, h, svg } from "./elements.js";
 import { dialog } from "./dialog.js";
-import { freshnessLine } from "./freshness.js";
+import { freshnessLine } from "./freshness/line.js";
 import { show } from "./router.js";
 
 const NAVIGATION = [

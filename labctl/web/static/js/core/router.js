@@ -1,6 +1,6 @@
 // Client-side router: the address determines what the page shows.
 
-import { Unreachable, isAbort } from "./errors.js";
+import { Unreachable, isAbort } from "./http/errors.js";
 import { changedQuery, matchRoute, routeOf } from "./routes.js";
 
 /** @import { Query } from "../../../types/pages.js" */

@@ -1,6 +1,6 @@
 // A fit that the service refuses: why, in its own sentences, and the question whether to do it all the same.
 
-import { Problem } from "../core/errors.js";
+import { Problem } from "../core/http/errors.js";
 import { h } from "../core/elements.js";
 import { notice } from "../core/components.js";
 import { dialog } from "../core/dialog.js";

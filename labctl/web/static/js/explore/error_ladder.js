@@ -1,6 +1,6 @@
 // The error of each version down to the noise floor, and the residual maps of this version and its parent.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";

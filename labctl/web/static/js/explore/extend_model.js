@@ -1,6 +1,6 @@
 // Extend the model: preview a changed model, then save it as the next version.
 
-import { post } from "../core/api.js";
+import { post } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { number, idText } from "../core/format.js";
 import { button, fitWarnings, cardWithHeader, notice, table, toast } from "../core/components.js";

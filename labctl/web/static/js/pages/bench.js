@@ -1,10 +1,10 @@
 // The bench page: the running campaign, or what ran last and what comes next.
 
-import { get } from "../core/api.js";
-import { Problem } from "../core/errors.js";
+import { get } from "../core/http/api.js";
+import { Problem } from "../core/http/errors.js";
 import { h } from "../core/elements.js";
 import { chip, pageHeader, notice } from "../core/components.js";
-import { setTrouble } from "../core/freshness.js";
+import { setTrouble } from "../core/freshness/line.js";
 import { show } from "../core/router.js";
 import { clearButton } from "../bench/actions.js";
 import { campaignInstant } from "../campaigns/campaign_time.js";

@@ -1,6 +1,6 @@
 // The page of one campaign: its plan and progress, its events, and why it ended.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, percent } from "../core/format.js";
 import { card, chip, factList, pageHeader, cardWithHeader, notice } from "../core/components.js";

@@ -1,7 +1,7 @@
 // The page that plans a campaign: recipe, plan, visibility of effects, start.
 
-import { get, post } from "../core/api.js";
-import { isAbort, messageOf } from "../core/errors.js";
+import { get, post } from "../core/http/api.js";
+import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
 import { busyIndicator, card, chip, factList, pageHeader, notice } from "../core/components.js";

@@ -1,11 +1,11 @@
 // The page of all campaigns and of the schedule.
 
-import { get, remove } from "../core/api.js";
-import { Problem } from "../core/errors.js";
+import { get, remove } from "../core/http/api.js";
+import { Problem } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
 import { button, card, chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
-import { setTrouble } from "../core/freshness.js";
+import { setTrouble } from "../core/freshness/line.js";
 import { linkButton } from "../bench/actions.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
 import { campaignInstant, durationTaken } from "../campaigns/campaign_time.js";

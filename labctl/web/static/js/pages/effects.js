@@ -1,7 +1,7 @@
 // The catalogue of effects, or the page of one effect.
 
-import { get } from "../core/api.js";
-import { Problem } from "../core/errors.js";
+import { get } from "../core/http/api.js";
+import { Problem } from "../core/http/errors.js";
 import { effectList } from "../effects/list.js";
 import { effectDetail } from "../effects/detail.js";
 

@@ -1,7 +1,7 @@
 // The explore page: compare a version with a recording, diagnose residuals, find the missing effect, extend the model.
 
-import { get, getFollowed, post } from "../core/api.js";
-import { isAbort } from "../core/errors.js";
+import { get, getFollowed, post } from "../core/http/api.js";
+import { isAbort } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
 import { busyIndicator, button, card, emptyState, pageHeader, notice, errorPage } from "../core/components.js";

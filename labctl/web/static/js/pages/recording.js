@@ -1,6 +1,6 @@
 // The page of one recording: conditions, trace, data sets, readings, noise, and the file to download.
 
-import { download, get } from "../core/api.js";
+import { download, get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { count, day, number, plainNumber } from "../core/format.js";
 import { button, card, factList, pageHeader, notice } from "../core/components.js";

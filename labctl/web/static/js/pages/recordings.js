@@ -1,6 +1,6 @@
 // The page of all recordings, with the import form.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, day } from "../core/format.js";
 import { chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";

@@ -1,9 +1,9 @@
 // The start page: an overview, or, with an empty database, the ways to begin.
 
-import { get, post } from "../core/api.js";
+import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { button, card, pageHeader } from "../core/components.js";
-import { presentWords } from "../core/freshness.js";
+import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
 import { isRunning } from "../campaigns/states.js";
 

@@ -1,6 +1,6 @@
 // The page of one unit: its calibrations, certifications, error ladder, coefficients and uncertainty in use.
 
-import { download, get } from "../core/api.js";
+import { download, get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { day, instant, number } from "../core/format.js";
 import {

@@ -1,6 +1,6 @@
 // The page of all units, by serial number.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { chip, emptyState, pageHeader, table } from "../core/components.js";
 

@@ -1,7 +1,7 @@
 // Noise at rest: Allan deviation of each axis, and N, B and K with the reason where one has no value.
 
-import { get } from "../core/api.js";
-import { Problem } from "../core/errors.js";
+import { get } from "../core/http/api.js";
+import { Problem } from "../core/http/errors.js";
 import { setChildren, h, whenNearViewport } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";

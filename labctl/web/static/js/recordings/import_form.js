@@ -1,7 +1,7 @@
 // Form to import a recording: drop or choose files, then show the answer of the service.
 
-import { upload } from "../core/api.js";
-import { messageOf } from "../core/errors.js";
+import { upload } from "../core/http/api.js";
+import { messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
 import { busyIndicator, notice } from "../core/components.js";

@@ -1,6 +1,6 @@
 // The raw readings of one data set.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { count, number, plainNumber } from "../core/format.js";

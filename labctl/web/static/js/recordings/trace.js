@@ -1,7 +1,7 @@
 // One channel over time. The service sends at most as many columns as the plot can show.
 
-import { get } from "../core/api.js";
-import { isAbort, messageOf } from "../core/errors.js";
+import { get } from "../core/http/api.js";
+import { isAbort, messageOf } from "../core/http/errors.js";
 import { timeUnit } from "../core/time_unit.js";
 import { continuousPieces, envelopeOutline, meanLine } from "./trace_pieces.js";
 import { setChildren, h } from "../core/elements.js";

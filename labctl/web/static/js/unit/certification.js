@@ -1,6 +1,6 @@
 // Certification of a version: what is known of it, the questions that are asked, and the acts that were kept.
 
-import { get, post } from "../core/api.js";
+import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { instant, number } from "../core/format.js";
 import { chip, factList, notice, table } from "../core/components.js";

@@ -1,7 +1,7 @@
 // Uncertainty in use of a version: over what was calibrated, and its parts at one rate and temperature.
 
-import { get } from "../core/api.js";
-import { isAbort, messageOf } from "../core/errors.js";
+import { get } from "../core/http/api.js";
+import { isAbort, messageOf } from "../core/http/errors.js";
 import { h, setChildren } from "../core/elements.js";
 import { number } from "../core/format.js";
 import { busyIndicator, notice, table } from "../core/components.js";

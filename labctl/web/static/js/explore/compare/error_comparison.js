@@ -1,6 +1,6 @@
 // Compare: the version as it is beside the recording. Points, lines, surfaces and turns all come from one answer.
 
-import { get } from "../../core/api.js";
+import { get } from "../../core/http/api.js";
 import { h } from "../../core/elements.js";
 import { cardWithHeader, loadInto } from "../../core/components.js";
 import { toggleGroup } from "../../core/fields.js";

@@ -1,6 +1,6 @@
 // Errors of requests, and what a page says of them.
 
-/** @import { ProblemDocument, Warning } from "../../../types/api.js" */
+/** @import { ProblemDocument, Warning } from "../../../../types/api.js" */
 
 /** A problem document of the service (RFC 9457): `status`, `type`, `title`, and `detail` as the message. */
 export class Problem extends Error {

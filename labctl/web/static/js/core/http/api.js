@@ -5,7 +5,7 @@ import { address } from "./address.js";
 import { Problem, Unreachable, isAbort } from "./errors.js";
 import { parseMessage, splitMessages } from "./event_message.js";
 
-/** @import { AnswerOf, Options, PathOf, PostOptions, Streams } from "../../../types/api.js" */
+/** @import { AnswerOf, Options, PathOf, PostOptions, Streams } from "../../../../types/api.js" */
 /** @import { EventMessage } from "./event_message.js" */
 /**
  * @template {PathOf<"get">} P

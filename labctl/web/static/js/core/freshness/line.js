@@ -1,12 +1,12 @@
 // How fresh the page is: asks the service for a sign of life once a second, and says when it was last heard.
 // State of the document: data-stale="yes" once nothing was heard for STALE_MS, "paused" while the tab was hidden.
 
-import { h, setChildren } from "./elements.js";
-import { freshnessWords, stalenessOf } from "./freshness_state.js";
+import { h, setChildren } from "../elements.js";
+import { freshnessWords, stalenessOf } from "./state.js";
 
-/** @import { Heartbeat } from "../../../types/api.js" */
-/** @import { Child } from "../../../types/pages.js" */
-/** @import { Heard, Staleness } from "./freshness_state.js" */
+/** @import { Heartbeat } from "../../../../types/api.js" */
+/** @import { Child } from "../../../../types/pages.js" */
+/** @import { Heard, Staleness } from "./state.js" */
 
 const ASK_MS = 1000;
 /** An answer may take this long; with the time between questions a page is stale less than 5 s after the last answer. */
