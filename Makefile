@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: install demo test lint bench study attack lock clean
+.PHONY: install demo test lint types bench study attack lock clean
 
 install: $(VENV)/.installed
 demo: install
@@ -19,6 +19,14 @@ lint: $(VENV)/.tested
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	@scripts/install-page-tools
+	@scripts/check-pages
+
+# The types of the pages, from the OpenAPI document of this labctl; kept in the repository, and a test holds them to it.
+types: $(VENV)/.tested
+	@scripts/install-page-tools
+	@$(BIN)/python scripts/openapi-document >node_modules/.openapi.json
+	@npm run --silent types -- node_modules/.openapi.json
 
 bench: $(VENV)/.tested
 	@$(BIN)/python -m benchmarks
@@ -54,4 +62,4 @@ lock:
 	uv pip compile pyproject.toml --extra build --extra study --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/study.txt
 
 clean:
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

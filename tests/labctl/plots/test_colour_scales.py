@@ -17,7 +17,7 @@ def script(name: str) -> str:
 
 
 def scale_of(name: str) -> list[list[object]]:
-    (found,) = re.findall(rf"export const {name} = (\[\[.*\]\]);", script("core/colour_scales.js"))
+    (found,) = re.findall(rf"export const {name} = (\[[^;]*\]);", script("core/colour_scales.js"))
     return [[float(share), colour] for share, colour in re.findall(r'\[([\d.]+), "(#\w+)"\]', found)]
 
 

@@ -1,19 +1,36 @@
 // Event stream of a campaign: reconnects after a break and reports when the stream is silent.
 
-import { eventStream, get, Problem } from "../core/api.js";
+import { eventStream, get } from "../core/http/api.js";
+import { isAbort, Problem } from "../core/http/errors.js";
+import { hasEnded } from "../campaigns/states.js";
 
-export const FINAL_STATES = new Set(["done", "aborted", "failed"]);
+/** @import { Campaign, CampaignEvent } from "../../../types/api.js" */
+
 /** The service sends a keep-alive every 10 s. */
 const SILENCE_LIMIT_MS = 25_000;
 const RETRY_DELAYS_MS = [1000, 2000, 4000, 8000, 15_000];
 const CHECK_MS = 1000;
 
 /**
- * Follow until the campaign ends or `signal` aborts. `handlers`: {progress(status), event(event), link({stale, since, why})};
- * `link` is called when the stream falls silent (since when, and why) and when it is live again.
+ * @typedef {object} Handlers
+ * @property {(status: Campaign) => void} progress
+ * @property {(event: CampaignEvent) => void} event
+ * @property {(link: { stale: boolean, since: number, why: string }) => void} link called when the stream falls silent
+ *   (since when, and why) and when it is live again
+ */
+
+/**
+ * Follow until the campaign ends or `signal` aborts.
+ * @param {number} campaign
+ * @param {Handlers} handlers
+ * @param {AbortSignal} signal
  */
 export async function followCampaign(campaign, handlers, signal) {
   let [heard, stale, after, tries] = [Date.now(), false, 0, 0];
+  /**
+   * @param {boolean} now
+   * @param {string} [why]
+   */
   const report = (now, why = "") => {
     if (now !== stale || now) handlers.link({ stale: now, since: heard, why });
     stale = now;
@@ -28,21 +45,28 @@ export async function followCampaign(campaign, handlers, signal) {
   while (!signal.aborted) {
     [connection, asked] = [new AbortController(), Date.now()];
     try {
-      for await (const message of eventStream(`/api/campaigns/${campaign}/events`, { after, signal: AbortSignal.any([signal, connection.signal]) })) {
+      for await (const message of eventStream("/api/campaigns/{campaign}/events", {
+        path: { campaign },
+        after,
+        signal: AbortSignal.any([signal, connection.signal]),
+      })) {
         [heard, tries] = [Date.now(), 0];
         report(false);
-        if (message.event === "progress") handlers.progress(message.data);
+        if (message.event === "progress") handlers.progress(/** @type {Campaign} */ (message.data));
         else if (message.id !== null) {
           after = message.id;
-          handlers.event(message.data);
+          handlers.event(/** @type {CampaignEvent} */ (message.data));
         }
       }
-      const status = await get(`/api/campaigns/${campaign}`, { signal });
+      const status = await get("/api/campaigns/{campaign}", { path: { campaign }, signal });
       handlers.progress(status);
-      if (FINAL_STATES.has(status.state)) break;
+      if (hasEnded(status)) break;
     } catch (error) {
       if (signal.aborted) break;
-      report(true, error instanceof Problem ? error.message : error.name === "AbortError" ? "the service says nothing" : "the connection broke");
+      report(
+        true,
+        error instanceof Problem ? error.message : isAbort(error) ? "the service says nothing" : "the connection broke",
+      );
       if (error instanceof Problem && error.status < 500) break;
     }
     await new Promise((resolve) => setTimeout(resolve, RETRY_DELAYS_MS[Math.min(tries, RETRY_DELAYS_MS.length - 1)]));

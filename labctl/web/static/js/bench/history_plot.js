@@ -1,42 +1,82 @@
 // History plot: temperatures above, table rate below.
 
 import { colour, figure } from "../core/figure.js";
+import { timeUnit } from "../core/time_unit.js";
+
+/** @import { Columns } from "./campaign_history.js" */
 
 const MIN_INTERVAL_MS = 1000;
-const UNITS = [[10_800, "h", 3600], [600, "min", 60], [0, "s", 1]];
+const HOURS_FROM_S = 10_800;
 
+/** @param {Columns} history */
 export function historyPlot(history) {
   const draw = () => {
     const { t_s } = history;
     const long = (t_s.at(-1) ?? 0) - (t_s[0] ?? 0);
-    const [, unit, seconds] = UNITS.find(([from]) => long >= from);
-    const x = t_s.map((t) => t / seconds);
-    const line = (name, values, shade, more = {}) => ({ type: "scatter", mode: "lines", name, x, y: values, line: { color: colour(shade), width: 1.8, ...more.line }, hovertemplate: `%{y:.5~g} ${more.unit ?? "deg C"}<extra>${name}</extra>`, ...more.trace });
+    const unit = timeUnit(long, HOURS_FROM_S);
+    const x = t_s.map((t) => t / unit.seconds);
+    /**
+     * @param {string} name
+     * @param {readonly (number | null)[]} values
+     * @param {string} shade
+     * @param {{ unit?: string, line?: object, trace?: object }} [more]
+     */
+    const line = (name, values, shade, more = {}) => ({
+      type: "scatter",
+      mode: "lines",
+      name,
+      x,
+      y: values,
+      line: { color: colour(shade), width: 1.8, ...more.line },
+      hovertemplate: `%{y:.5~g} ${more.unit ?? "deg C"}<extra>${name}</extra>`,
+      ...more.trace,
+    });
     return {
       data: [
         line("set point", history.setpoint_c, "border-strong", { line: { dash: "dot", shape: "hv" } }),
         line("chamber", history.chamber_c, "axis-x"),
         line("gyro", history.gyro_c, "axis-y"),
-        line("table rate", history.rate_dps, "axis-z", { unit: "deg/s", line: { shape: "hv" }, trace: { yaxis: "y2" } }),
+        line("table rate", history.rate_dps, "axis-z", {
+          unit: "deg/s",
+          line: { shape: "hv" },
+          trace: { yaxis: "y2" },
+        }),
       ],
       layout: {
-        margin: { l: 58, r: 12, t: 34, b: 42 }, hovermode: "x unified",
-        xaxis: { title: { text: `time of the campaign, ${unit}` }, anchor: "y2" },
-        yaxis: { title: { text: "deg C" }, domain: [0.42, 1] }, yaxis2: { title: { text: "deg/s" }, domain: [0, 0.34], anchor: "x" },
+        margin: { l: 58, r: 12, t: 34, b: 42 },
+        hovermode: "x unified",
+        xaxis: { title: { text: `time of the campaign, ${unit.name}` }, anchor: "y2" },
+        yaxis: { title: { text: "deg C" }, domain: [0.42, 1] },
+        yaxis2: { title: { text: "deg/s" }, domain: [0, 0.34], anchor: "x" },
       },
     };
   };
-  const element = figure("Bench since this page was opened", "From the event stream, since this tab began to listen.", draw, { height: "21rem", csv: () => [Object.keys(history), ...history.t_s.map((_, k) => Object.values(history).map((values) => values[k]))] });
+  const element = figure(
+    "Bench since this page was opened",
+    "From the event stream, since this tab began to listen.",
+    draw,
+    {
+      height: "21rem",
+      csv: () => [
+        Object.keys(history),
+        ...history.t_s.map((_, k) => Object.values(history).map((values) => values[k])),
+      ],
+    },
+  );
   let next = 0;
+  /** @type {ReturnType<typeof setTimeout> | null} */
   let waiting = null;
   /** Redraw at most once a second: a bench in virtual time sends far more messages. */
-  element.onStatus = () => {
+  const onStatus = () => {
     if (waiting) return;
-    waiting = setTimeout(() => {
-      waiting = null;
-      next = Date.now() + MIN_INTERVAL_MS;
-      element.redraw();
-    }, Math.max(0, next - Date.now()));
+    waiting = setTimeout(
+      () => {
+        waiting = null;
+        next = Date.now() + MIN_INTERVAL_MS;
+        element.redraw();
+      },
+      Math.max(0, next - Date.now()),
+    );
   };
-  return element;
+  return Object.assign(element, { onStatus });
 }

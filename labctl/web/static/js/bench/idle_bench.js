@@ -3,41 +3,110 @@
 import { h, uniqueId } from "../core/elements.js";
 import { percent } from "../core/format.js";
 import { card, factList, notice } from "../core/components.js";
-import { presentWords } from "../core/freshness.js";
+import { presentWords } from "../core/freshness/line.js";
 import { adviceNotice } from "../campaigns/advice.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
 import { campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
-import { CHIP_KINDS, stateChip } from "../campaigns/states.js";
+import { stateKind } from "../campaigns/states.js";
+import { stateChip } from "../campaigns/state_chip.js";
 import { startTime } from "../campaigns/start_time.js";
 import { linkButton, resumeControl } from "./actions.js";
 
+/** @import { Bench, Campaign, Scheduled } from "../../../types/api.js" */
+/** @import { Child } from "../../../types/pages.js" */
+
 export function noBenchCard() {
-  return card("This service drives no bench",
+  return card(
+    "This service drives no bench",
     h("p", {}, "It serves calibrations and takes recordings in. A bench comes with it when it is started so:"),
     h("pre", { class: "command" }, "labctl serve --simulate\nlabctl serve --bench FILE"),
-    h("p", { class: "muted" }, "The first has a simulated tri-axial bench, as fast as you like with --speed; the second drives the instruments that the bench file names."),
-    h("div", { class: "row" }, linkButton("To the recordings", "/recordings")));
+    h(
+      "p",
+      { class: "muted" },
+      "The first has a simulated tri-axial bench, as fast as you like with --speed; the second drives the instruments that the bench file names.",
+    ),
+    h("div", { class: "row" }, linkButton("To the recordings", "/recordings")),
+  );
 }
 
-/** A card whose heading speaks of the present, and is another one while the page is stale. */
+/**
+ * A card whose heading speaks of the present, and is another one while the page is stale.
+ * @param {string} fresh
+ * @param {string} stale
+ * @param {...Child} children
+ */
 function presentCard(fresh, stale, ...children) {
   const id = uniqueId("present");
-  return h("section", { class: "card stack", "aria-labelledby": id }, h("h2", { id }, presentWords(fresh, stale)), ...children);
+  return h(
+    "section",
+    { class: "card stack", "aria-labelledby": id },
+    h("h2", { id }, presentWords(fresh, stale)),
+    ...children,
+  );
 }
 
-/** `next` is the next entry of the schedule, `last` the newest campaign; either may be undefined. */
+/**
+ * `next` is the next entry of the schedule, `last` the newest campaign; either may be undefined.
+ * @param {Bench} bench
+ * @param {Campaign | undefined} last
+ * @param {Scheduled | undefined} next
+ */
 export function idleBench(bench, last, next) {
-  return h("div", { class: "columns", style: "--column-min: 17rem" },
-    presentCard("Nothing runs", "State of the bench",
-      h("p", {}, bench.unconfirmed ? "No campaign starts before the bench was looked at." : presentWords(`${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`)),
-      h("div", { class: "row" }, linkButton("Plan a campaign", "/campaigns/new", "primary"), linkButton("All campaigns", "/campaigns"))),
-    card("Next on the schedule", next
-      ? [h("p", { class: "lead" }, startTime(next)), h("p", { class: "muted" }, `${next.recipe} on ${next.bench}`, next.cron ? [", then again: ", h("code", {}, next.cron)] : null), attendanceNotice(next.attendance)]
-      : h("p", { class: "muted" }, presentWords("Nothing is scheduled."))),
-    last ? card(`Last: campaign ${last.id}`,
-      h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),
-      factList([["Ended", last.ended_at ? campaignInstant(last, last.ended_at) : "not", "", durationTaken(last)], ["Progress", percent(last.progress)]]),
-      adviceNotice(last) ?? (last.reason ? notice(CHIP_KINDS[last.state] ?? "warn", last.reason) : null),
-      h("div", { class: "row" }, Object.entries(last.recordings).map(([serial, recording]) => linkButton(`Explore ${serial}`, `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`)),
-        last.bench === bench.name ? resumeControl(last) : null)) : null);
+  return h(
+    "div",
+    { class: "columns", style: "--column-min: 17rem" },
+    presentCard(
+      "Nothing runs",
+      "State of the bench",
+      h(
+        "p",
+        {},
+        bench.unconfirmed
+          ? "No campaign starts before the bench was looked at."
+          : presentWords(
+              `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`,
+            ),
+      ),
+      h(
+        "div",
+        { class: "row" },
+        linkButton("Plan a campaign", "/campaigns/new", "primary"),
+        linkButton("All campaigns", "/campaigns"),
+      ),
+    ),
+    card(
+      "Next on the schedule",
+      next
+        ? [
+            h("p", { class: "lead" }, startTime(next)),
+            h(
+              "p",
+              { class: "muted" },
+              `${next.recipe} on ${next.bench}`,
+              next.cron ? [", then again: ", h("code", {}, next.cron)] : null,
+            ),
+            attendanceNotice(next.attendance),
+          ]
+        : h("p", { class: "muted" }, presentWords("Nothing is scheduled.")),
+    ),
+    last
+      ? card(
+          `Last: campaign ${last.id}`,
+          h("div", { class: "row" }, stateChip(last), h("a", { href: `/campaigns/${last.id}` }, last.recipe)),
+          factList([
+            ["Ended", last.ended_at ? campaignInstant(last, last.ended_at) : "not", "", durationTaken(last)],
+            ["Progress", percent(last.progress)],
+          ]),
+          adviceNotice(last) ?? (last.reason ? notice(stateKind(last), last.reason) : null),
+          h(
+            "div",
+            { class: "row" },
+            Object.entries(last.recordings).map(([serial, recording]) =>
+              linkButton(`Explore ${serial}`, `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`),
+            ),
+            last.bench === bench.name ? resumeControl(last) : null,
+          ),
+        )
+      : null,
+  );
 }

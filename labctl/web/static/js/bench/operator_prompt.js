@@ -3,65 +3,172 @@
 import { h, svg } from "../core/elements.js";
 import { answerButtons } from "./actions.js";
 
-const AXES = ["x", "y", "z"];
-/** Projection of the directions front left, front right and up to 2D, per unit of length; right-handed. */
-const VIEW = [[-0.8, 0.42], [0.8, 0.42], [0, -1]];
+/** @import { Prompt } from "../../../types/api.js" */
 
-/** The body axes as directions (front left, front right, up) when `position` points up; right-handed also upside down. */
+/** @typedef {"x" | "y" | "z"} Axis */
+/** @typedef {[number, number, number]} Point */
+
+/** @type {Axis[]} */
+const AXES = ["x", "y", "z"];
+/**
+ * Projection of the directions front left, front right and up to 2D, per unit of length; right-handed.
+ * @type {[number, number][]}
+ */
+const VIEW = [
+  [-0.8, 0.42],
+  [0.8, 0.42],
+  [0, -1],
+];
+
+/**
+ * The body axes as directions (front left, front right, up) when `position` points up; right-handed also upside down.
+ * @param {string} position
+ */
 function bodyAxes(position) {
-  const up = AXES.indexOf(position.replace("-", ""));
+  const up = AXES.indexOf(axisOf(position));
   const down = position.startsWith("-");
   const [next, last] = [AXES[(up + 1) % 3], AXES[(up + 2) % 3]];
-  const at = { [AXES[up]]: down ? [0, 0, -1] : [0, 0, 1] };
+  /** @type {Record<Axis, Point>} */
+  const at = { x: [0, 0, 0], y: [0, 0, 0], z: [0, 0, 0] };
+  at[AXES[up]] = down ? [0, 0, -1] : [0, 0, 1];
   at[next] = down ? [0, 1, 0] : [1, 0, 0];
   at[last] = down ? [1, 0, 0] : [0, 1, 0];
   return at;
 }
 
+/** @param {string} position */
+const axisOf = (position) => /** @type {Axis} */ (position.replace("-", ""));
+/**
+ * @param {Point} point
+ * @param {number} factor
+ * @returns {Point}
+ */
+const scaled = ([a, b, c], factor) => [factor * a, factor * b, factor * c];
 const CENTRE = [150, 128];
 const SCALE = 52;
+/**
+ * @param {Point} point
+ * @param {number} [size]
+ * @returns {[number, number]}
+ */
 const project = ([a, b, c], size = SCALE) => {
   const [x, y] = [0, 1].map((k) => a * VIEW[0][k] + b * VIEW[1][k] + c * VIEW[2][k]);
   return [CENTRE[0] + x * size, CENTRE[1] + y * size];
 };
-const polygonPoints = (corners) => corners.map((corner) => project(corner).map((v) => v.toFixed(1)).join(",")).join(" ");
+/** @param {readonly Point[]} corners */
+const polygonPoints = (corners) =>
+  corners
+    .map((corner) =>
+      project(corner)
+        .map((v) => v.toFixed(1))
+        .join(","),
+    )
+    .join(" ");
 
-/** A cube on the table with its axes; the one that points up is emphasised. Ids of positions: x, y, z, -x, -y, -z. */
+/**
+ * A cube on the table with its axes; the one that points up is emphasised. Ids of positions: x, y, z, -x, -y, -z.
+ * @param {string} position
+ */
 export function mountingDrawing(position) {
   const axes = bodyAxes(position);
+  /**
+   * @param {readonly Point[]} corners
+   * @param {string} kind
+   */
   const face = (corners, kind) => svg("polygon", { points: polygonPoints(corners), class: `cube ${kind}` });
+  /**
+   * @param {Axis} name
+   * @param {number} [large]
+   */
   const arrow = (name, large = 11) => {
     const to = axes[name];
-    const [from, tip] = [project(to.map((v) => v * 1.0)), project(to.map((v) => v * 1.75))];
+    const [from, tip] = [project(to), project(scaled(to, 1.75))];
     const along = Math.atan2(tip[1] - from[1], tip[0] - from[0]);
-    const head = [0.45, -0.45].map((turn) => [tip[0] - large * Math.cos(along + turn), tip[1] - large * Math.sin(along + turn)]);
+    const head = [0.45, -0.45].map((turn) => [
+      tip[0] - large * Math.cos(along + turn),
+      tip[1] - large * Math.sin(along + turn),
+    ]);
     const neck = [tip[0] - 0.8 * large * Math.cos(along), tip[1] - 0.8 * large * Math.sin(along)];
-    const word = project(to.map((v) => v * 2.05));
+    const word = project(scaled(to, 2.05));
     const hidden = to[2] < 0;
-    return svg("g", { class: `axis axis-${name} ${hidden ? "hidden" : ""}` },
+    return svg(
+      "g",
+      { class: `axis axis-${name} ${hidden ? "hidden" : ""}` },
       svg("line", { x1: from[0], y1: from[1], x2: neck[0], y2: neck[1] }),
       svg("polygon", { points: [tip, ...head].map((p) => p.join(",")).join(" ") }),
-      svg("text", { x: word[0], y: word[1] + 5, "text-anchor": "middle" }, large > 11 ? `${name} up` : name));
+      svg("text", { x: word[0], y: word[1] + 5, "text-anchor": "middle" }, large > 11 ? `${name} up` : name),
+    );
   };
   const [low, high] = [-1, 1];
   const up = project([0, 0, 2.05]);
   const down = position.startsWith("-");
-  return svg("svg", { viewBox: "0 0 300 265", class: "mounting", role: "img", "aria-label": `The unit with its ${position} axis pointing up along the table axis` },
-    svg("ellipse", { cx: 150, cy: 188, rx: 132, ry: 56, class: "table" }), svg("ellipse", { cx: 150, cy: 182, rx: 132, ry: 56, class: "table top" }),
+  return svg(
+    "svg",
+    {
+      viewBox: "0 0 300 265",
+      class: "mounting",
+      role: "img",
+      "aria-label": `The unit with its ${position} axis pointing up along the table axis`,
+    },
+    svg("ellipse", { cx: 150, cy: 188, rx: 132, ry: 56, class: "table" }),
+    svg("ellipse", { cx: 150, cy: 182, rx: 132, ry: 56, class: "table top" }),
     AXES.filter((name) => axes[name][2] < 0).map((name) => arrow(name)),
-    face([[high, low, low], [high, high, low], [high, high, high], [high, low, high]], "left"),
-    face([[low, high, low], [high, high, low], [high, high, high], [low, high, high]], "right"),
-    face([[low, low, high], [high, low, high], [high, high, high], [low, high, high]], "top"),
+    face(
+      [
+        [high, low, low],
+        [high, high, low],
+        [high, high, high],
+        [high, low, high],
+      ],
+      "left",
+    ),
+    face(
+      [
+        [low, high, low],
+        [high, high, low],
+        [high, high, high],
+        [low, high, high],
+      ],
+      "right",
+    ),
+    face(
+      [
+        [low, low, high],
+        [high, low, high],
+        [high, high, high],
+        [low, high, high],
+      ],
+      "top",
+    ),
     AXES.filter((name) => axes[name][2] === 0).map((name) => arrow(name)),
-    down ? svg("g", { class: "axis up inverted" }, svg("line", { x1: 150, y1: project([0, 0, 1])[1], x2: 150, y2: project([0, 0, 1.75])[1] }), svg("text", { x: up[0], y: up[1] + 5, "text-anchor": "middle" }, `${position} up`))
-      : svg("g", { class: "up" }, arrow(position, 20)));
+    down
+      ? svg(
+          "g",
+          { class: "axis up inverted" },
+          svg("line", { x1: 150, y1: project([0, 0, 1])[1], x2: 150, y2: project([0, 0, 1.75])[1] }),
+          svg("text", { x: up[0], y: up[1] + 5, "text-anchor": "middle" }, `${position} up`),
+        )
+      : svg("g", { class: "up" }, arrow(axisOf(position), 20)),
+  );
 }
 
-/** The card of an open question. */
+/**
+ * The card of an open question.
+ * @param {number} campaign
+ * @param {Prompt} prompt
+ */
 export function operatorPrompt(campaign, prompt) {
-  return h("section", { class: "card prompt", role: "alert", "aria-label": "A question for you" },
+  return h(
+    "section",
+    { class: "card prompt", role: "alert", "aria-label": "A question for you" },
     prompt.position ? mountingDrawing(prompt.position) : null,
-    h("div", { class: "stack" }, h("h2", {}, prompt.kind === "mount" ? `Turn the unit: ${prompt.position} up` : "The bench asks"), h("p", {}, `${prompt.text[0].toUpperCase()}${prompt.text.slice(1)}.`),
+    h(
+      "div",
+      { class: "stack" },
+      h("h2", {}, prompt.kind === "mount" ? `Turn the unit: ${prompt.position} up` : "The bench asks"),
+      h("p", {}, `${prompt.text[0].toUpperCase()}${prompt.text.slice(1)}.`),
       h("p", { class: "muted" }, "The table is at rest and waits for you."),
-      h("div", { class: "row" }, answerButtons(campaign, prompt))));
+      h("div", { class: "row" }, answerButtons(campaign, prompt)),
+    ),
+  );
 }

@@ -1,16 +1,17 @@
 // A running campaign: status bar, operator prompt, warnings, gauges and plots.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { duration } from "../core/format.js";
 import { card, cardWithHeader, notice } from "../core/components.js";
 import { navigate } from "../core/router.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { campaignInstant } from "../campaigns/campaign_time.js";
-import { stateChip } from "../campaigns/states.js";
+import { hasEnded } from "../campaigns/states.js";
+import { stateChip } from "../campaigns/state_chip.js";
 import { linkButton, pauseButton, resumeButton, stopButton } from "./actions.js";
 import { eventList } from "./event_list.js";
-import { FINAL_STATES, followCampaign } from "./campaign_stream.js";
+import { followCampaign } from "./campaign_stream.js";
 import { gauges } from "./gauges.js";
 import { liveOutput } from "./live_output.js";
 import { campaignHistory, remainingSeconds, appendStatus } from "./campaign_history.js";
@@ -18,21 +19,49 @@ import { operatorPrompt } from "./operator_prompt.js";
 import { lastDataset } from "./last_dataset.js";
 import { historyPlot } from "./history_plot.js";
 
+/** @import { Campaign, CampaignPlan } from "../../../types/api.js" */
+
 const MAX_EVENTS = 8;
 const PLAN_REFRESH_MS = 2500;
 
-/** `over()` is called when the campaign has ended. */
+/**
+ * `over()` is called when the campaign has ended.
+ * @param {Campaign} status
+ * @param {CampaignPlan} plan
+ * @param {{ signal: AbortSignal, over: () => void }} page
+ */
 export function runningCampaign(status, plan, { signal, over }) {
   const { timeline } = plan;
   const history = campaignHistory(status.id);
   const bar = statusBar(status, plan);
-  const [connection, prompt, warningList] = [h("div", { "aria-live": "assertive" }), h("div", {}), h("div", { class: "stack", "aria-live": "polite" })];
+  const [connection, prompt, warningList] = [
+    h("div", { "aria-live": "assertive" }),
+    h("div", {}),
+    h("div", { class: "stack", "aria-live": "polite" }),
+  ];
   const dials = gauges(timeline);
-  const [historyFigure, outputCard, datasetCard, events] = [historyPlot(history), liveOutput(status.id), lastDataset(timeline, signal), eventList(MAX_EVENTS, "info", status)];
-  let [now, asked, planned] = [status, null, 0];
-  const picture = planChart(`Campaign ${status.id} plan`, () => ({ timeline: plan.timeline, now_s: now.t_s, live: true }), { height: "22rem", pick: (dataset) => Object.values(now.recordings)[0] && navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
+  const [historyFigure, outputCard, datasetCard, events] = [
+    historyPlot(history),
+    liveOutput(status.id),
+    lastDataset(timeline, signal),
+    eventList(MAX_EVENTS, "info", status),
+  ];
+  let [now, planned] = [status, 0];
+  /** @type {string | undefined} */
+  let asked;
+  const picture = planChart(
+    `Campaign ${status.id} plan`,
+    () => ({ timeline: plan.timeline, now_s: now.t_s, live: true }),
+    {
+      height: "22rem",
+      pick: (dataset) =>
+        Object.values(now.recordings)[0] &&
+        navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`),
+    },
+  );
   const setpoint = () => now.setpoint_c ?? timeline.temperature_c[Math.max((now.step ?? 1) - 1, 0)];
 
+  /** @param {Campaign} next */
   function show(next) {
     now = next;
     bar.show(now);
@@ -46,62 +75,145 @@ export function runningCampaign(status, plan, { signal, over }) {
       setChildren(prompt, now.prompt ? operatorPrompt(now.id, now.prompt) : null);
     }
     setChildren(warningList, warnings(now));
-    if (FINAL_STATES.has(now.state)) over();
+    if (hasEnded(now)) over();
     else if (Date.now() > planned) again();
   }
   /** Reload the plan for the states of its steps. */
   async function again() {
     planned = Date.now() + PLAN_REFRESH_MS;
     try {
-      plan.timeline = (await get(`/api/campaigns/${status.id}/plan`, { signal })).timeline;
+      plan.timeline = (await get("/api/campaigns/{campaign}/plan", { path: { campaign: status.id }, signal })).timeline;
       picture.redraw();
     } catch {
       // the event stream reports a silent service
     }
   }
   show(status);
-  followCampaign(status.id, {
-    progress: show,
-    event: (event) => events.add(event),
-    link: ({ stale, since, why }) => {
-      bar.classList.toggle("stale", stale);
-      setChildren(connection, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `), `What you see may no longer be so: ${why}. Trying again.`) : null);
+  followCampaign(
+    status.id,
+    {
+      progress: show,
+      event: (event) => events.add(event),
+      link: ({ stale, since, why }) => {
+        bar.classList.toggle("stale", stale);
+        setChildren(
+          connection,
+          stale
+            ? notice(
+                "bad",
+                h(
+                  "strong",
+                  {},
+                  `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `,
+                ),
+                `What you see may no longer be so: ${why}. Trying again.`,
+              )
+            : null,
+        );
+      },
     },
-  }, signal);
-  return [bar, connection, prompt, warningList, dials,
-    h("div", { class: "columns", style: "--column-min: 26rem" }, card("Rate and temperatures", historyFigure), outputCard),
+    signal,
+  );
+  return [
+    bar,
+    connection,
+    prompt,
+    warningList,
+    dials,
+    h(
+      "div",
+      { class: "columns", style: "--column-min: 26rem" },
+      card("Rate and temperatures", historyFigure),
+      outputCard,
+    ),
     cardWithHeader("Plan", linkButton(`Campaign ${status.id}`, `/campaigns/${status.id}`, "tiny"), picture),
     datasetCard,
-    cardWithHeader("Last events", linkButton("All of them", `/campaigns/${status.id}?level=info#events`, "tiny"), events)];
+    cardWithHeader(
+      "Last events",
+      linkButton("All of them", `/campaigns/${status.id}?level=info#events`, "tiny"),
+      events,
+    ),
+  ];
 }
 
+/**
+ * @param {Campaign} status
+ * @param {CampaignPlan} plan
+ */
 function statusBar(status, plan) {
-  const [state, text, beside, acts] = [h("span", {}), h("strong", { class: "status-bar-step" }), h("span", { class: "muted small" }), h("div", { class: "row tight" })];
+  const [state, text, beside, acts] = [
+    h("span", {}),
+    h("strong", { class: "status-bar-step" }),
+    h("span", { class: "muted small" }),
+    h("div", { class: "row tight" }),
+  ];
   const bar = h("i", {});
-  const meter = h("div", { class: "meter thick", role: "progressbar", "aria-label": "Progress of the campaign", "aria-valuemin": "0", "aria-valuemax": "100" }, bar);
+  const meter = h(
+    "div",
+    {
+      class: "meter thick",
+      role: "progressbar",
+      "aria-label": "Progress of the campaign",
+      "aria-valuemin": "0",
+      "aria-valuemax": "100",
+    },
+    bar,
+  );
   const stop = stopButton(status.id);
+  /** @type {string | null} */
   let mode = null;
-  const element = h("section", { class: "card status-bar", "aria-label": "What the bench is doing" },
-    h("div", { class: "status-bar-line" }, h("div", { class: "row" }, state, text), h("div", { class: "row tight status-bar-actions" }, acts, stop)), meter, beside);
-  element.show = (now) => {
+  const element = h(
+    "section",
+    { class: "card status-bar", "aria-label": "What the bench is doing" },
+    h(
+      "div",
+      { class: "status-bar-line" },
+      h("div", { class: "row" }, state, text),
+      h("div", { class: "row tight status-bar-actions" }, acts, stop),
+    ),
+    meter,
+    beside,
+  );
+  /** @param {Campaign} now */
+  const show = (now) => {
     setChildren(state, stateChip(now));
     text.textContent = now.step_text || "About to begin";
     bar.style.width = `${(100 * now.progress).toFixed(2)}%`;
     meter.setAttribute("aria-valuenow", String(Math.round(100 * now.progress)));
-    setChildren(beside, `Step ${now.step ?? "–"} of ${now.steps}, ${(100 * now.progress).toFixed(1)} %. `,
-      now.expected_end ? `${duration(remainingSeconds(now, plan.expected_s))} left, end ${campaignInstant(now, now.expected_end)}.` : "",
-      now.wish === "pause" ? h("strong", {}, " Pauses after this data set.") : now.wish === "abort" ? h("strong", {}, " Stops now.") : null);
+    setChildren(
+      beside,
+      `Step ${now.step ?? "–"} of ${now.steps}, ${(100 * now.progress).toFixed(1)} %. `,
+      now.expected_end
+        ? `${duration(remainingSeconds(now, plan.expected_s))} left, end ${campaignInstant(now, now.expected_end)}.`
+        : "",
+      now.wish === "pause"
+        ? h("strong", {}, " Pauses after this data set.")
+        : now.wish === "abort"
+          ? h("strong", {}, " Stops now.")
+          : null,
+    );
     const wanted = now.state === "paused" || now.wish === "pause" ? "resume" : "pause";
     if (wanted !== mode) setChildren(acts, wanted === "resume" ? resumeButton(now.id) : pauseButton(now.id));
     mode = wanted;
   };
-  return element;
+  return Object.assign(element, { show });
 }
 
-/** Notices for links that fail, dropped units, a pause and the last fault; empty when there are none. */
+/**
+ * Notices for links that fail, dropped units, a pause and the last fault; empty when there are none.
+ * @param {Campaign} now
+ */
 function warnings(now) {
-  const listed = (found, text) => Object.entries(found).map(([name, why]) => notice("warn", h("strong", {}, `${name} `), `${text}: ${why}`));
-  return [...listed(now.links, "does not answer as it should"), ...listed(now.dropped, "takes no further part"),
+  /**
+   * @param {Record<string, string>} found
+   * @param {string} text
+   */
+  const listed = (found, text) =>
+    Object.entries(found).map(([name, why]) => notice("warn", h("strong", {}, `${name} `), `${text}: ${why}`));
+  return [
+    ...listed(now.links, "does not answer as it should"),
+    ...listed(now.dropped, "takes no further part"),
     now.state === "paused" ? notice("warn", `Paused: ${now.reason || "no reason given"}.`) : null,
-    now.last_error ? notice("bad", h("strong", {}, "Last fault: "), now.last_error) : null].filter(Boolean);
+    now.last_error ? notice("bad", h("strong", {}, "Last fault: "), now.last_error) : null,
+  ].filter(Boolean);
 }

@@ -2,99 +2,173 @@
 
 import { colour, figure } from "../core/figure.js";
 import { duration, plainNumber } from "../core/format.js";
+import { planSteps, positionBands, setPointCourse } from "./plan_steps.js";
 
-/** States of a data set and their colours, in the order of the legend. */
-const STATES = [["done", "good"], ["running", "accent"], ["to come", "border-strong"], ["failed", "bad"], ["interrupted", "bad"], ["skipped", "text-muted"]];
+/** @import { Timeline } from "../../../types/api.js" */
+/** @import { PlotTrace } from "../../../types/pages.js" */
+
+/**
+ * States of a data set and their colours, in the order of the legend.
+ * @type {[state: string, colour: string][]}
+ */
+const STATES = [
+  ["done", "good"],
+  ["running", "accent"],
+  ["to come", "border-strong"],
+  ["failed", "bad"],
+  ["interrupted", "bad"],
+  ["skipped", "text-muted"],
+];
 /** Plans longer than this are drawn in hours, shorter ones in minutes, s. */
 const HOURS_FROM_S = 3 * 3600;
-
-/** Steps in order of time, with begin and end in units of `unit_s`: actual times where a step has run, else planned. */
-function planSteps(timeline, unit_s) {
-  return timeline.number.map((number, k) => {
-    const from = timeline.forecast_s?.[k] ?? timeline.start_s[k];
-    const over = timeline.ended_s?.[k];
-    const until = Number.isFinite(over) && over >= from ? over : from + (timeline.state?.[k] === "skipped" ? 0 : timeline.expected_s[k]);
-    return { number, kind: timeline.kind[k], from: from / unit_s, until: until / unit_s, warm: timeline.temperature_c[k], rate: timeline.rate_dps[k], position: timeline.position[k], dataset: timeline.dataset[k], state: timeline.state?.[k] ?? "to come" };
-  });
-}
-
-/** The chamber set point over time: constant, or a ramp while the chamber moves. */
-function setPointCourse(steps) {
-  const [x, y] = [[], []];
-  let held = null;
-  for (const step of steps) {
-    if (step.warm === null) continue;
-    if (step.kind === "move_chamber") {
-      x.push(step.from, step.until);
-      y.push(held ?? step.warm, step.warm);
-    } else {
-      x.push(step.from, step.until);
-      y.push(step.warm, step.warm);
-    }
-    held = step.warm;
-  }
-  return { x, y };
-}
-
-function positionBands(steps) {
-  const found = [];
-  for (const step of steps) {
-    if (!step.position) continue;
-    const last = found.at(-1);
-    if (last?.position === step.position) last.until = step.until;
-    else found.push({ position: step.position, from: step.from, until: step.until });
-  }
-  return found;
-}
 
 /**
  * The chart of a plan. `give()` returns {timeline, now_s, live}: the columns of the API, the present moment in seconds of
  * the campaign (null: it does not run), and whether to show states. `pick(dataset)` is called for a clicked data set.
+ * @param {string} name
+ * @param {() => { timeline: Timeline, now_s?: number | null, live?: boolean }} give
+ * @param {{ height?: string, pick?: (dataset: number) => unknown }} [options]
  */
 export function planChart(name, give, { height = "24rem", pick } = {}) {
-  const caption = "Above: set point of the chamber, with the data sets on it. Below: their table rates. Bands: which axis of the unit points up.";
+  const caption =
+    "Above: set point of the chamber, with the data sets on it. Below: their table rates. Bands: which axis of the unit points up.";
   const draw = () => {
     const { timeline, now_s = null, live = false } = give();
-    const unit_s = timeline.start_s.at(-1) + timeline.expected_s.at(-1) > HOURS_FROM_S ? 3600 : 60;
+    const unit_s = (timeline.start_s.at(-1) ?? 0) + (timeline.expected_s.at(-1) ?? 0) > HOURS_FROM_S ? 3600 : 60;
     const steps = planSteps(timeline, unit_s);
     const sets = steps.filter((step) => step.dataset !== null);
     const narrow = window.innerWidth < 760;
     const marks = STATES.flatMap(([state, shade]) => {
       const here = sets.filter((step) => step.state === state);
       if (!here.length) return [];
+      /** @type {PlotTrace} */
       const common = {
-        type: "scatter", mode: "markers", name: live ? `${state} (${here.length})` : "data sets", legendgroup: state, x: here.map((step) => (step.from + step.until) / 2), customdata: here.map((step) => step.dataset),
-        text: here.map((step) => `data set ${step.dataset}: ${plainNumber(step.rate)} deg/s at ${plainNumber(step.warm)} deg C, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`),
-        hovertemplate: "%{text}<extra></extra>", selected: { marker: { opacity: 1 } },
+        type: "scatter",
+        mode: "markers",
+        name: live ? `${state} (${here.length})` : "data sets",
+        legendgroup: state,
+        x: here.map((step) => (step.from + step.until) / 2),
+        customdata: here.map((step) => step.dataset),
+        text: here.map(
+          (step) =>
+            `data set ${step.dataset}: ${plainNumber(step.rate)} deg/s at ${plainNumber(step.warm)} deg C, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`,
+        ),
+        hovertemplate: "%{text}<extra></extra>",
+        selected: { marker: { opacity: 1 } },
       };
       const fill = colour(live ? shade : "accent");
       return [
-        { ...common, y: here.map((step) => step.warm), showlegend: live, marker: { symbol: "line-ns", size: 11, color: fill, line: { color: fill, width: state === "running" ? 4 : 1.6 } } },
-        { ...common, y: here.map((step) => step.rate), yaxis: "y2", showlegend: false, marker: { size: sets.length > 200 ? 4 : 5.5, color: fill, symbol: state === "skipped" ? "circle-open" : "circle" } },
+        {
+          ...common,
+          y: here.map((step) => step.warm),
+          showlegend: live,
+          marker: {
+            symbol: "line-ns",
+            size: 11,
+            color: fill,
+            line: { color: fill, width: state === "running" ? 4 : 1.6 },
+          },
+        },
+        {
+          ...common,
+          y: here.map((step) => step.rate),
+          yaxis: "y2",
+          showlegend: false,
+          marker: {
+            size: sets.length > 200 ? 4 : 5.5,
+            color: fill,
+            symbol: state === "skipped" ? "circle-open" : "circle",
+          },
+        },
       ];
     });
     const end = steps.at(-1)?.until ?? 1;
-    const shapes = positionBands(steps).map((band) => ({ type: "rect", xref: "x", yref: "paper", x0: band.from, x1: band.until, y0: 0, y1: 1, line: { width: 0 }, fillcolor: colour(`axis-${band.position.replace("-", "")}`), opacity: 0.1, layer: "below" }));
-    const words = positionBands(steps).filter((band) => band.until - band.from > end / (narrow ? 12 : 30)).map((band) => ({ text: `<b>${band.position}</b> up`, showarrow: false, xref: "x", yref: "paper", x: (band.from + band.until) / 2, y: 1, yanchor: "bottom", font: { size: 11.5, color: colour(`axis-${band.position.replace("-", "")}`) } }));
-    if (Number.isFinite(now_s)) {
-      shapes.push({ type: "line", xref: "x", yref: "paper", x0: now_s / unit_s, x1: now_s / unit_s, y0: 0, y1: 1, line: { color: colour("text"), width: 1.6, dash: "dot" } });
-      words.push({ text: "now", showarrow: false, xref: "x", yref: "paper", x: now_s / unit_s, y: 0.42, yanchor: "middle", xanchor: now_s / unit_s > end * 0.9 ? "right" : "left", font: { size: 11.5, color: colour("text") } });
+    /** @type {object[]} */
+    const shapes = positionBands(steps).map((band) => ({
+      type: "rect",
+      xref: "x",
+      yref: "paper",
+      x0: band.from,
+      x1: band.until,
+      y0: 0,
+      y1: 1,
+      line: { width: 0 },
+      fillcolor: colour(`axis-${band.position.replace("-", "")}`),
+      opacity: 0.1,
+      layer: "below",
+    }));
+    /** @type {object[]} */
+    const words = positionBands(steps)
+      .filter((band) => band.until - band.from > end / (narrow ? 12 : 30))
+      .map((band) => ({
+        text: `<b>${band.position}</b> up`,
+        showarrow: false,
+        xref: "x",
+        yref: "paper",
+        x: (band.from + band.until) / 2,
+        y: 1,
+        yanchor: "bottom",
+        font: { size: 11.5, color: colour(`axis-${band.position.replace("-", "")}`) },
+      }));
+    if (now_s !== null) {
+      shapes.push({
+        type: "line",
+        xref: "x",
+        yref: "paper",
+        x0: now_s / unit_s,
+        x1: now_s / unit_s,
+        y0: 0,
+        y1: 1,
+        line: { color: colour("text"), width: 1.6, dash: "dot" },
+      });
+      words.push({
+        text: "now",
+        showarrow: false,
+        xref: "x",
+        yref: "paper",
+        x: now_s / unit_s,
+        y: 0.42,
+        yanchor: "middle",
+        xanchor: now_s / unit_s > end * 0.9 ? "right" : "left",
+        font: { size: 11.5, color: colour("text") },
+      });
     }
     return {
-      data: [{ type: "scatter", mode: "lines", name: "set point", ...setPointCourse(steps), line: { color: colour("text-muted"), width: 1.5 }, hoverinfo: "skip", showlegend: false }, ...marks],
+      data: [
+        {
+          type: "scatter",
+          mode: "lines",
+          name: "set point",
+          ...setPointCourse(steps),
+          line: { color: colour("text-muted"), width: 1.5 },
+          hoverinfo: "skip",
+          showlegend: false,
+        },
+        ...marks,
+      ],
       layout: {
-        margin: { l: 56, r: 12, t: live ? 44 : 24, b: 42 }, shapes, annotations: words, legend: { orientation: "h", y: 1.07, yanchor: "bottom", x: 0 },
-        xaxis: { title: { text: `time since the beginning, ${unit_s === 3600 ? "h" : "min"}` }, anchor: "y2", range: [-0.01 * end, Math.max(end, (now_s || 0) / unit_s) * 1.01] },
-        yaxis: { title: { text: "set point, deg C" }, domain: [0.46, 1] }, yaxis2: { title: { text: "rate, deg/s" }, domain: [0, 0.38], anchor: "x" },
+        margin: { l: 56, r: 12, t: live ? 44 : 24, b: 42 },
+        shapes,
+        annotations: words,
+        legend: { orientation: "h", y: 1.07, yanchor: "bottom", x: 0 },
+        xaxis: {
+          title: { text: `time since the beginning, ${unit_s === 3600 ? "h" : "min"}` },
+          anchor: "y2",
+          range: [-0.01 * end, Math.max(end, (now_s || 0) / unit_s) * 1.01],
+        },
+        yaxis: { title: { text: "set point, deg C" }, domain: [0.46, 1] },
+        yaxis2: { title: { text: "rate, deg/s" }, domain: [0, 0.38], anchor: "x" },
       },
     };
   };
   const csv = () => {
     const { timeline } = give();
-    const names = Object.keys(timeline);
-    return [names, ...timeline.number.map((_, k) => names.map((each) => timeline[each][k]))];
+    const columns = Object.entries(timeline);
+    return [columns.map(([each]) => each), ...timeline.number.map((_, k) => columns.map(([, values]) => values[k]))];
   };
   const element = figure(name, caption, draw, { height, csv });
-  if (pick) element.ondrawn = (plot) => plot.on("plotly_click", (event) => event.points[0].customdata && pick(event.points[0].customdata));
+  if (pick)
+    element.ondrawn = (plot) =>
+      plot.on("plotly_click", (event) => event.points[0].customdata && pick(event.points[0].customdata));
   return element;
 }

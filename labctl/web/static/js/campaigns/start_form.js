@@ -1,26 +1,50 @@
 // Start form: start now, at a time, on a cron line, or in simulation alone.
 
-import { post } from "../core/api.js";
+import { post } from "../core/http/api.js";
+import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { instant } from "../core/format.js";
-import { button, card, labelledField, notice, toggleGroup, toast } from "../core/components.js";
+import { button, card, notice, toast } from "../core/components.js";
+import { labelledField, toggleGroup } from "../core/fields.js";
 import { navigate } from "../core/router.js";
 import { askBenchClear } from "../bench/actions.js";
 import { attendanceNotice, wallText } from "./attendance.js";
 
+/** @import { Child } from "../../../types/pages.js" */
+
+/** @import { Attendance, Bench } from "../../../types/api.js" */
+
 const LOCAL_TIME_ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone;
+/** @typedef {"now" | "at" | "cron" | "simulation"} When */
+/** @typedef {{ recipe: string, clip: boolean, hide: string[] }} Order */
+
 const HOUR_S = 3600;
 
-/** `order()` returns the chosen {recipe, clip, hide}; `bench` is the bench of the service, or null. `look()` of the element
- * says again when the plan needs a person. */
+/**
+ * `order()` returns the chosen {recipe, clip, hide}; `bench` is the bench of the service, or null. `look()` of the element
+ * says again when the plan needs a person.
+ * @param {Bench | null} bench
+ * @param {() => Order} order
+ */
 export function startForm(bench, order) {
-  const when = [...(bench ? [["now", "Now"], ["at", "At a time"], ["cron", "Again and again"]] : []), ["simulation", "In simulation, without a bench"]];
+  /** @type {[When, string][]} */
+  const onBench = [
+    ["now", "Now"],
+    ["at", "At a time"],
+    ["cron", "Again and again"],
+  ];
+  /** @type {[When, string][]} */
+  const when = [...(bench ? onBench : []), ["simulation", "In simulation, without a bench"]];
   const place = h("div", { class: "stack" });
   let chosen = when[0][0];
   const at = h("input", { type: "datetime-local" });
   const cron = h("input", { type: "text", value: "0 20 * * FRI", spellcheck: "false" });
   const zone = h("input", { type: "text", value: LOCAL_TIME_ZONE, spellcheck: "false", list: "zones" });
-  const zones = h("datalist", { id: "zones" }, (Intl.supportedValuesOf?.("timeZone") ?? []).map((value) => h("option", { value })));
+  const zones = h(
+    "datalist",
+    { id: "zones" },
+    (Intl.supportedValuesOf?.("timeZone") ?? []).map((value) => h("option", { value })),
+  );
   const priority = h("input", { type: "number", value: "0", min: "-100", max: "100", step: "1" });
   const late = h("input", { type: "number", min: "0", step: "any", placeholder: "any time" });
   const seed = h("input", { type: "number", value: "1", min: "0", step: "1" });
@@ -37,22 +61,27 @@ export function startForm(bench, order) {
     if (!bench || bench.simulated || chosen === "simulation" || (chosen === "at" && !at.value)) return;
     const { hide, ...rest } = order();
     try {
-      const answer = await post("/api/plans", { ...rest, ...timeOfStart(), ...(chosen === "now" ? {} : { time_zone: zone.value || null }) }, { signal: asked.signal });
+      const answer = await post("/api/plans", {
+        body: { ...rest, ...timeOfStart(), ...(chosen === "now" ? {} : { time_zone: zone.value || null }) },
+        signal: asked.signal,
+      });
       setChildren(attended, attendanceNotice(answer.attendance, propose));
     } catch (error) {
-      if (error.name !== "AbortError") setChildren(attended, notice("", error.message));
+      if (!isAbort(error)) setChildren(attended, notice("", messageOf(error)));
     }
   }
+  /** @param {Attendance} attendance */
   function propose(attendance) {
-    [at.value, zone.value] = [wallText(attendance.better_start), attendance.time_zone];
+    [at.value, zone.value] = [wallText(attendance.better_start ?? ""), attendance.time_zone];
     group.querySelectorAll("button")[when.findIndex(([each]) => each === "at")].click();
   }
   for (const input of [at, cron, zone]) input.addEventListener("change", look);
 
-  async function now() {
-    const clear = await askBenchClear(bench);
+  /** @param {Bench} there */
+  async function now(there) {
+    const clear = await askBenchClear(there);
     if (!clear) return;
-    const made = await post("/api/campaigns", { ...order(), ...clear });
+    const made = await post("/api/campaigns", { body: { ...order(), ...clear } });
     toast("good", `Campaign ${made.id} begins.`);
     await navigate("/bench");
   }
@@ -60,22 +89,82 @@ export function startForm(bench, order) {
     const { hide, ...rest } = order();
     if (hide.length) throw new Error("An effect can be hidden only in a campaign that begins now.");
     if (chosen === "at" && !at.value) throw new Error("Say when it is to begin.");
-    const clear = await askBenchClear(bench, { later: true });
+    const clear = bench && (await askBenchClear(bench, { later: true }));
     if (!clear) return;
-    const made = await post("/api/campaigns", { ...rest, ...clear, ...timeOfStart(), time_zone: zone.value || null, priority: Number(priority.value), ...(late.value === "" ? {} : { late_limit_s: Number(late.value) * HOUR_S }) });
-    toast("good", `It begins ${instant(made.due_at)}, your time.`);
+    const made = await post("/api/campaigns", {
+      body: {
+        ...rest,
+        ...clear,
+        ...timeOfStart(),
+        time_zone: zone.value || null,
+        priority: Number(priority.value),
+        ...(late.value === "" ? {} : { late_limit_s: Number(late.value) * HOUR_S }),
+      },
+    });
+    toast("good", `It begins ${instant("due_at" in made ? made.due_at : null)}, your time.`);
     await navigate("/campaigns");
   }
   async function simulated() {
-    const made = await post("/api/recordings/simulated", { ...order(), seed: Number(seed.value) });
+    const made = await post("/api/recordings/simulated", { body: { ...order(), seed: Number(seed.value) } });
     toast("good", `Recording ${made.recording}: ${made.datasets} data sets.`);
     await navigate(`/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}`);
   }
+  /** @param {Bench} there */
+  const startNow = (there) => [
+    there.unconfirmed
+      ? notice("bad", "The bench was not confirmed safe: ", h("a", { href: "/bench" }, "look at it first"), ".")
+      : there.campaign
+        ? notice(
+            "warn",
+            `Campaign ${there.campaign} runs on ${there.name} now; it has to end first. A start at a time waits for it.`,
+          )
+        : null,
+    h(
+      "div",
+      { class: "row" },
+      button(`Start on ${there.name}`, () => now(there), { kind: "primary large" }),
+    ),
+  ];
+  /** @type {Record<When, () => Child>} */
   const FORMS = {
-    now: () => [bench.unconfirmed ? notice("bad", "The bench was not confirmed safe: ", h("a", { href: "/bench" }, "look at it first"), ".") : bench.campaign ? notice("warn", `Campaign ${bench.campaign} runs on ${bench.name} now; it has to end first. A start at a time waits for it.`) : null, h("div", { class: "row" }, button(`Start on ${bench.name}`, now, { kind: "primary large" }))],
-    at: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Begin at", at), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" }))],
-    cron: () => [h("div", { class: "row", style: "align-items: start" }, labelledField("Cron line", cron, "minute hour day month weekday"), labelledField("Time zone", zone), labelledField("Priority", priority, "Of starts that are due, the highest goes first."), labelledField("May be late by, h", late, "Empty: any time, once."), zones), h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" }))],
-    simulation: () => [h("p", { class: "muted" }, "A recording of this plan is made at once in simulation and taken in; no bench moves, no campaign is kept."), h("div", { class: "row", style: "align-items: end" }, labelledField("Seed", seed, "Same seed, same recording."), button("Simulate the recording", simulated, { kind: "primary large" }))],
+    now: () => (bench ? startNow(bench) : null),
+    at: () => [
+      h(
+        "div",
+        { class: "row", style: "align-items: start" },
+        labelledField("Begin at", at),
+        labelledField("Time zone", zone),
+        labelledField("Priority", priority, "Of starts that are due, the highest goes first."),
+        labelledField("May be late by, h", late, "Empty: any time, once."),
+        zones,
+      ),
+      h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" })),
+    ],
+    cron: () => [
+      h(
+        "div",
+        { class: "row", style: "align-items: start" },
+        labelledField("Cron line", cron, "minute hour day month weekday"),
+        labelledField("Time zone", zone),
+        labelledField("Priority", priority, "Of starts that are due, the highest goes first."),
+        labelledField("May be late by, h", late, "Empty: any time, once."),
+        zones,
+      ),
+      h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" })),
+    ],
+    simulation: () => [
+      h(
+        "p",
+        { class: "muted" },
+        "A recording of this plan is made at once in simulation and taken in; no bench moves, no campaign is kept.",
+      ),
+      h(
+        "div",
+        { class: "row", style: "align-items: end" },
+        labelledField("Seed", seed, "Same seed, same recording."),
+        button("Simulate the recording", simulated, { kind: "primary large" }),
+      ),
+    ],
   };
   const show = () => setChildren(place, FORMS[chosen]());
   show();
@@ -84,6 +173,12 @@ export function startForm(bench, order) {
     show();
     look();
   });
-  const element = card("Begin", bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."), h("div", {}, group), attended, place);
+  const element = card(
+    "Begin",
+    bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."),
+    h("div", {}, group),
+    attended,
+    place,
+  );
   return Object.assign(element, { id: "begin", look });
 }

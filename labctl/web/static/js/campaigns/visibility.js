@@ -4,25 +4,75 @@ import { h } from "../core/elements.js";
 import { sizeText, idText } from "../core/format.js";
 import { notice, table } from "../core/components.js";
 
+/** @import { Visibility } from "../../../types/api.js" */
+
 /** Below this share left beside the usual model, the model absorbs the effect. */
 const ABSORBED_SHARE = 0.02;
 
+/** @param {{ effect: string }} row */
 const effectLink = (row) => h("a", { href: `/effects/${row.effect}` }, idText(row.effect));
 
+/** @param {Visibility} row */
 const smallestSize = (row) => (row.smallest_size === null ? "–" : sizeText(row.smallest_size, row.unit));
 
+/** @param {readonly Visibility[]} rows */
 export function visibilityReport(rows) {
   const seen = rows.filter((row) => row.visible).sort((a, b) => b.share - a.share);
   const fitted = rows.filter((row) => !row.visible && row.why === "schedule" && row.share < ABSORBED_SHARE);
   const unseen = rows.filter((row) => !row.visible && !fitted.includes(row));
   return [
-    h("p", {}, h("strong", {}, `It could find ${seen.length} of ${rows.length} effects`), unseen.length ? ` and could not find ${unseen.length}; ` : "; ", fitted.length ? `${fitted.length} are part of the usual model and are fitted.` : null),
-    h("ul", { class: "detectable-effects", "aria-label": "Effects this plan could find, from which size on" }, seen.map((row) => h("li", { title: `${Math.round(100 * row.share)} % of it is left beside the usual model` }, effectLink(row), h("span", { class: "nowrap" }, smallestSize(row))))),
-    h("p", { class: "muted small" }, "Beside each: the smallest size that is just detectable, in the effect's unit. ppm: millionths, of the rate or of the full effect."),
-    unseen.length ? table([
-      { title: "Could not be found", cell: effectLink },
-      { title: "Why, and what would show it", prose: true, cell: (row) => (row.why === "channel" ? `needs ${row.needs.map(idText).join(", ")}, which is not logged` : [h("span", {}, "this schedule does not part it from the rest"), row.experiment ? h("span", { class: "muted small secondary" }, `Try: ${row.experiment}`) : null]) },
-    ], unseen, { label: "Effects this plan could not find" }) : notice("good", "Nothing of the catalogue stays hidden from it."),
-    fitted.length ? h("p", { class: "muted small" }, "In the usual model already: ", fitted.flatMap((row, k) => (k ? [", ", effectLink(row)] : [effectLink(row)])), ".") : null,
+    h(
+      "p",
+      {},
+      h("strong", {}, `It could find ${seen.length} of ${rows.length} effects`),
+      unseen.length ? ` and could not find ${unseen.length}; ` : "; ",
+      fitted.length ? `${fitted.length} are part of the usual model and are fitted.` : null,
+    ),
+    h(
+      "ul",
+      { class: "detectable-effects", "aria-label": "Effects this plan could find, from which size on" },
+      seen.map((row) =>
+        h(
+          "li",
+          { title: `${Math.round(100 * row.share)} % of it is left beside the usual model` },
+          effectLink(row),
+          h("span", { class: "nowrap" }, smallestSize(row)),
+        ),
+      ),
+    ),
+    h(
+      "p",
+      { class: "muted small" },
+      "Beside each: the smallest size that is just detectable, in the effect's unit. ppm: millionths, of the rate or of the full effect.",
+    ),
+    unseen.length
+      ? table(
+          [
+            { title: "Could not be found", cell: effectLink },
+            {
+              title: "Why, and what would show it",
+              prose: true,
+              cell: (row) =>
+                row.why === "channel"
+                  ? `needs ${row.needs.map(idText).join(", ")}, which is not logged`
+                  : [
+                      h("span", {}, "this schedule does not part it from the rest"),
+                      row.experiment ? h("span", { class: "muted small secondary" }, `Try: ${row.experiment}`) : null,
+                    ],
+            },
+          ],
+          unseen,
+          { label: "Effects this plan could not find" },
+        )
+      : notice("good", "Nothing of the catalogue stays hidden from it."),
+    fitted.length
+      ? h(
+          "p",
+          { class: "muted small" },
+          "In the usual model already: ",
+          fitted.flatMap((row, k) => (k ? [", ", effectLink(row)] : [effectLink(row)])),
+          ".",
+        )
+      : null,
   ];
 }

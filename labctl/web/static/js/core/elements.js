@@ -1,43 +1,89 @@
 // DOM elements: create, fill, identify, observe.
 
+/** @import { Attributes, Child, SvgAttributes } from "../../../types/pages.js" */
+
 const SVG = "http://www.w3.org/2000/svg";
 
-/** Create an element: `h("a", {href, class, onclick, "aria-label"}, ...children)`. Null, undefined and false are left out. */
+/**
+ * Create an element: `h("a", {href, class, onclick, "aria-label"}, ...children)`. Null, undefined and false are left out.
+ * @template {keyof HTMLElementTagNameMap} Tag
+ * @param {Tag} tag
+ * @param {Attributes} [attributes]
+ * @param {...Child} children
+ */
 export function h(tag, attributes = {}, ...children) {
   return applyAttributes(document.createElement(tag), attributes, children);
 }
 
-/** The same for SVG. */
+/**
+ * The same for SVG.
+ * @template {keyof SVGElementTagNameMap} Tag
+ * @param {Tag} tag
+ * @param {SvgAttributes} [attributes]
+ * @param {...Child} children
+ */
 export function svg(tag, attributes = {}, ...children) {
   return applyAttributes(document.createElementNS(SVG, tag), attributes, children);
 }
 
+/**
+ * @template {Element} E
+ * @param {E} element
+ * @param {Attributes | SvgAttributes} attributes
+ * @param {Child} children
+ */
 function applyAttributes(element, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
     if (value === null || value === undefined || value === false) continue;
-    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (name === "value" || name === "checked" || name === "disabled" || name === "selected") element[name] = value;
-    else element.setAttribute(name, value === true ? "" : value);
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
+    else if (name === "value" || name === "checked" || name === "disabled" || name === "selected")
+      Object.assign(element, { [name]: value });
+    else element.setAttribute(name, value === true ? "" : String(value));
   }
-  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
+  element.append(...shown(children));
   return element;
 }
 
-/** Replace the children of an element. */
+/**
+ * Replace the children of an element.
+ * @template {Element} E
+ * @param {E} element
+ * @param {...Child} children
+ */
 export function setChildren(element, ...children) {
-  element.replaceChildren(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
+  element.replaceChildren(...shown(children));
   return element;
+}
+
+/**
+ * @param {Child} child
+ * @returns {(Node | string)[]}
+ */
+function shown(child) {
+  if (Array.isArray(child)) return child.flatMap(shown);
+  if (child === null || child === undefined || child === false) return [];
+  return [child instanceof Node ? child : String(child)];
 }
 
 let numbers = 0;
-/** An id that is unique on the page, for a label and its field. */
+/**
+ * An id that is unique on the page, for a label and its field.
+ * @param {string} stem
+ */
 export const uniqueId = (stem) => `${stem}-${++numbers}`;
 
-/** Call `act` once, when the element comes near the viewport. */
+/**
+ * Call `act` once, when the element comes near the viewport.
+ * @param {Element} element
+ * @param {() => unknown} act
+ */
 export function whenNearViewport(element, act) {
-  new IntersectionObserver((entries, observer) => {
-    if (!entries.some((entry) => entry.isIntersecting)) return;
-    observer.disconnect();
-    act();
-  }, { rootMargin: "300px" }).observe(element);
+  new IntersectionObserver(
+    (entries, observer) => {
+      if (!entries.some((entry) => entry.isIntersecting)) return;
+      observer.disconnect();
+      act();
+    },
+    { rootMargin: "300px" },
+  ).observe(element);
 }

@@ -2,74 +2,148 @@
 
 import { roundedToUncertainty } from "./rounding.js";
 
-/** A number with `digits` significant digits, not in the form 1e-3: 0.00120, 1 234, 4.5e-7. */
+/** @typedef {number | null | undefined} Numeric */
+
+/**
+ * Whether there is a finite number.
+ * @param {unknown} value
+ * @returns {value is number}
+ */
+export const isNumber = (value) => Number.isFinite(value);
+
+/**
+ * A number with `digits` significant digits, not in the form 1e-3: 0.00120, 1 234, 4.5e-7.
+ * @param {Numeric} value
+ * @param {number} [digits]
+ */
 export function number(value, digits = 3) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (!isNumber(value)) return "–";
   const size = Math.abs(value);
   if (size !== 0 && (size < 1e-5 || size >= 1e7)) return power(value, digits);
-  const text = Number(value.toPrecision(digits));
-  const decimals = size === 0 ? 0 : Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(text) || 1)));
-  return text.toFixed(Math.min(decimals, 8));
+  const rounded = Number(value.toPrecision(digits));
+  const decimals = size === 0 ? 0 : Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(rounded) || 1)));
+  return rounded.toFixed(Math.min(decimals, 8));
 }
 
-const SUPERSCRIPTS = { "-": "⁻", "+": "", ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])) };
+/** @type {Record<string, string>} */
+const SUPERSCRIPTS = {
+  "-": "⁻",
+  "+": "",
+  ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((raised, digit) => [digit, raised])),
+};
+/**
+ * @param {number} value
+ * @param {number} digits
+ */
 function power(value, digits) {
   const [factor, exponent] = value.toExponential(digits - 1).split("e");
   return `${factor} × 10${superscript(exponent)}`;
 }
+/** @param {string | number} text */
 const superscript = (text) => [...String(text)].map((sign) => SUPERSCRIPTS[sign] ?? sign).join("");
 
-/** A number without trailing zeros, for settings: -100, 12.5, 0.0042. */
-export const plainNumber = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "–");
-export const withUnit = (value, unit, digits) => (Number.isFinite(value) ? `${number(value, digits)} ${unit}` : "–");
-export const count = (value) => (Number.isFinite(value) ? value.toLocaleString("en-GB") : "–");
-export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)} %` : "–");
+/**
+ * A number without trailing zeros, for settings: -100, 12.5, 0.0042.
+ * @param {Numeric} value
+ * @param {number} [digits]
+ */
+export const plainNumber = (value, digits = 4) => (isNumber(value) ? String(Number(value.toPrecision(digits))) : "–");
+/**
+ * @param {Numeric} value
+ * @param {string} unit
+ * @param {number} [digits]
+ */
+export const withUnit = (value, unit, digits) => (isNumber(value) ? `${number(value, digits)} ${unit}` : "–");
+/** @param {Numeric} value */
+export const count = (value) => (isNumber(value) ? value.toLocaleString("en-GB") : "–");
+/** @param {Numeric} share */
+export const percent = (share) => (isNumber(share) ? `${Math.round(100 * share)} %` : "–");
 
-/** A mean to one place beyond its spread, so that a column of means lines up; to five digits where there is no spread. */
+/**
+ * A mean to one place beyond its spread, so that a column of means lines up; to five digits where there is no spread.
+ * @param {Numeric} value
+ * @param {Numeric} spread
+ */
 export function mean(value, spread) {
-  if (!Number.isFinite(value) || !(spread > 0)) return number(value, 5);
+  if (!isNumber(value) || !isNumber(spread) || spread <= 0) return number(value, 5);
   return value.toFixed(Math.min(Math.max(2 - Math.floor(Math.log10(spread)), 0), 8));
 }
 
-/** Seconds as 45 h 10 min, 3 min 20 s, 12 s. */
+/**
+ * Seconds as 45 h 10 min, 3 min 20 s, 12 s.
+ * @param {Numeric} seconds
+ */
 export function duration(seconds) {
-  if (!Number.isFinite(seconds)) return "–";
+  if (!isNumber(seconds)) return "–";
   const whole = Math.max(0, Math.round(seconds));
   const [hours, minutes] = [Math.floor(whole / 3600), Math.floor((whole % 3600) / 60)];
   if (hours) return `${hours} h ${minutes} min`;
   return minutes ? `${minutes} min ${whole % 60} s` : `${whole} s`;
 }
 
+/** @type {Intl.DateTimeFormatOptions} */
 const DAY = { weekday: "short", day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };
-/** An instant in the time zone of the browser. */
+/**
+ * An instant in the time zone of the browser.
+ * @param {string | null | undefined} text
+ */
 export const instant = (text) => (text ? new Date(text).toLocaleString("en-GB", DAY) : "–");
-export const day = (text) => (text ? new Date(text).toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" }) : "–");
+/** @param {string | null | undefined} text */
+export const day = (text) =>
+  text ? new Date(text).toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" }) : "–";
+/** @param {string | null | undefined} text */
 export const clock = (text) => (text ? new Date(text).toLocaleTimeString("en-GB") : "–");
 
-/** An id as text: scale_factor_asymmetry -> scale factor asymmetry. */
+/**
+ * An id as text: scale_factor_asymmetry -> scale factor asymmetry.
+ * @param {string} id
+ */
 export const idText = (id) => String(id).replaceAll("_", " ");
 
-/** A unit as text: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none. */
-export const unitText = (unit) => (unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => superscript(power)));
+/**
+ * A unit as text: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none.
+ * @param {string | null | undefined} unit
+ */
+export const unitText = (unit) =>
+  unit === "1" ? "" : (unit ?? "").replace(/\^(-?\d)/g, (_, power) => superscript(power));
 
-/** A size with its unit; a plain number is a share of the rate, or of the full effect: 14 ppm, 2.7 %. */
+/**
+ * A size with its unit; a plain number is a share of the rate, or of the full effect: 14 ppm, 2.7 %.
+ * @param {Numeric} value
+ * @param {string | null | undefined} unit
+ * @param {number} [digits]
+ */
 export function sizeText(value, unit, digits = 2) {
-  if (!Number.isFinite(value)) return "–";
+  if (!isNumber(value)) return "–";
   if (unit !== "1") return `${value === 0 ? "0" : number(value, digits)} ${unitText(unit)}`;
   return Math.abs(value) >= 0.01 ? `${plainNumber(100 * value, digits)} %` : `${plainNumber(1e6 * value, digits)} ppm`;
 }
 
-/** A result and its expanded uncertainty as texts of the same place, with their common suffix: power of ten and unit. */
+/**
+ * A result and its expanded uncertainty as texts of the same place, with their common suffix: power of ten and unit.
+ * @param {number} value
+ * @param {number | null} expanded
+ * @param {string} unit
+ */
 export function resultTexts(value, expanded, unit) {
   const [factor, own] = unit !== "1" ? [1, unitText(unit)] : Math.abs(value) >= 0.01 ? [100, "%"] : [1e6, "ppm"];
-  const { value: middle, u: half, exponent } = roundedToUncertainty(value * factor, expanded === null ? null : expanded * factor);
+  const {
+    value: middle,
+    u: half,
+    exponent,
+  } = roundedToUncertainty(value * factor, expanded === null ? null : expanded * factor);
   return { middle, half, power: exponent ? `× 10${superscript(exponent)}` : "", suffix: own };
 }
 
-/** A result with its expanded uncertainty, to the same place: 201.3 ± 3.1 ppm, (9.06 ± 0.02) × 10⁻⁷ (deg/s)⁻¹. */
+/**
+ * A result with its expanded uncertainty, to the same place: 201.3 ± 3.1 ppm, (9.06 ± 0.02) × 10⁻⁷ (deg/s)⁻¹.
+ * @param {Numeric} value
+ * @param {number | null} expanded
+ * @param {string} unit
+ */
 export function withUncertainty(value, expanded, unit) {
-  if (!Number.isFinite(value)) return "–";
-  const { middle, half, power, suffix } = resultTexts(value, expanded > 0 ? expanded : null, unit);
+  if (!isNumber(value)) return "–";
+  const { middle, half, power, suffix } = resultTexts(value, expanded !== null && expanded > 0 ? expanded : null, unit);
   const text = half === null ? middle : `${middle} ± ${half}`;
   return [power ? (half === null ? `${text} ${power}` : `(${text}) ${power}`) : text, suffix].filter(Boolean).join(" ");
 }

@@ -1,9 +1,9 @@
 // Layout around every page: how fresh it is, sidebar, access key, colour theme.
 
-import { accessKey, setAccessKey } from "./api.js";
+import { accessKey, setAccessKey } from "./http/api.js";
 import { setChildren, h, svg } from "./elements.js";
-import { dialog } from "./components.js";
-import { freshnessLine } from "./freshness.js";
+import { dialog } from "./dialog.js";
+import { freshnessLine } from "./freshness/line.js";
 import { show } from "./router.js";
 
 const NAVIGATION = [
@@ -15,19 +15,39 @@ const NAVIGATION = [
   ["/effects", "Effects", "M5 4h11a3 3 0 013 3v13H8a3 3 0 01-3-3zM5 17a3 3 0 013-3h11"],
 ];
 
-const icon = (path) => svg("svg", { viewBox: "0 0 24 24", fill: "none", stroke: "currentColor", "stroke-width": "1.8", "stroke-linecap": "round", "stroke-linejoin": "round", "aria-hidden": "true" }, svg("path", { d: path }));
+/** @param {string} path */
+const icon = (path) =>
+  svg(
+    "svg",
+    {
+      viewBox: "0 0 24 24",
+      fill: "none",
+      stroke: "currentColor",
+      "stroke-width": "1.8",
+      "stroke-linecap": "round",
+      "stroke-linejoin": "round",
+      "aria-hidden": "true",
+    },
+    svg("path", { d: path }),
+  );
 
 export function buildLayout() {
   const links = NAVIGATION.map(([path, name, drawing]) => h("a", { href: path }, icon(drawing), name));
-  const [themes, keys] = [[], []];
+  /** @type {HTMLElement[]} */
+  const themes = [];
+  /** @type {HTMLElement[]} */
+  const keys = [];
   /** Buttons for theme and access key: in the sidebar, and below the page on a narrow screen. */
   const controls = () => {
-    themes.push(h("button", { type: "button", class: "button quiet tiny", onclick: swap }));
-    keys.push(h("button", { type: "button", class: "button quiet tiny", onclick: () => askKey() }));
-    return [themes.at(-1), keys.at(-1)];
+    const theme = h("button", { type: "button", class: "button quiet tiny", onclick: swap });
+    const key = h("button", { type: "button", class: "button quiet tiny", onclick: () => askKey() });
+    themes.push(theme);
+    keys.push(key);
+    return [theme, key];
   };
   const name = () => {
-    for (const each of themes) setChildren(each, document.documentElement.dataset.theme === "dark" ? "Light colours" : "Dark colours");
+    for (const each of themes)
+      setChildren(each, document.documentElement.dataset.theme === "dark" ? "Light colours" : "Dark colours");
     for (const each of keys) setChildren(each, accessKey() ? "Forget the key" : "Use a key");
   };
 
@@ -40,6 +60,7 @@ export function buildLayout() {
   }
 
   let asking = false;
+  /** @param {string} [why] */
   async function askKey(why) {
     if (accessKey() && !why) {
       setAccessKey(null);
@@ -48,7 +69,18 @@ export function buildLayout() {
     }
     if (asking) return null;
     asking = true;
-    const given = await dialog("This service asks for a key", [{ name: "key", label: "Key", type: "password", hint: "Made by `labctl key create`; kept in this tab until it is closed." }], { text: why, confirm: "Use it" });
+    const given = await dialog(
+      "This service asks for a key",
+      [
+        {
+          name: "key",
+          label: "Key",
+          type: "password",
+          hint: "Made by `labctl key create`; kept in this tab until it is closed.",
+        },
+      ],
+      { text: why, confirm: "Use it" },
+    );
     asking = false;
     if (!given) return null;
     setAccessKey(given.key.trim());
@@ -56,20 +88,33 @@ export function buildLayout() {
     return show();
   }
 
-  window.addEventListener("labctl:key", (event) => askKey(event.detail ?? "Reading asks for a viewer's key, acting for an operator's."));
-  window.addEventListener("labctl:moved", () => links.forEach((link) => {
-    const here = location.pathname === link.pathname || location.pathname.startsWith(`${link.pathname}/`);
-    here ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current");
-  }));
+  window.addEventListener("labctl:key", (event) =>
+    askKey(event.detail ?? "Reading asks for a viewer's key, acting for an operator's."),
+  );
+  window.addEventListener("labctl:moved", () =>
+    links.forEach((link) => {
+      const here = location.pathname === link.pathname || location.pathname.startsWith(`${link.pathname}/`);
+      here ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current");
+    }),
+  );
 
   document.body.append(
     h("a", { class: "skip-link", href: "#main" }, "To the page"),
-    h("div", { class: "sidebar" },
+    h(
+      "div",
+      { class: "sidebar" },
       h("a", { class: "brand", href: "/" }, h("img", { src: "/static/mark.svg", alt: "" }), "labctl"),
       h("nav", { "aria-label": "Pages" }, links),
-      h("div", { class: "sidebar-footer" }, controls())),
-    h("div", { class: "content" }, h("header", { class: "head" }, freshnessLine()), h("main", { id: "main", tabindex: "-1" })),
+      h("div", { class: "sidebar-footer" }, controls()),
+    ),
+    h(
+      "div",
+      { class: "content" },
+      h("header", { class: "head" }, freshnessLine()),
+      h("main", { id: "main", tabindex: "-1" }),
+    ),
     h("footer", { class: "page-footer" }, controls()),
-    h("div", { class: "toasts", "aria-live": "polite" }));
+    h("div", { class: "toasts", "aria-live": "polite" }),
+  );
   name();
 }

@@ -7,18 +7,22 @@ const [LEAST_POWER, MOST_POWER] = [-4, 5];
 /**
  * Round a value to its uncertainty: {value, u, exponent}, texts that both count in units of 10^exponent.
  * `u` is null where there is no uncertainty; the value then has four significant digits.
+ * @param {number} value
+ * @param {number | null} uncertainty
  */
 export function roundedToUncertainty(value, uncertainty) {
-  const known = uncertainty > 0 && Number.isFinite(uncertainty);
+  const known = uncertainty !== null && uncertainty > 0 && Number.isFinite(uncertainty);
   const u = known ? Number(uncertainty.toExponential(1)) : null; // two significant digits, so 0.0999 is 0.10
   const largest = Math.max(Math.abs(value), u ?? 0);
   const size = largest > 0 ? Math.floor(Math.log10(largest)) : 0;
   const exponent = size < LEAST_POWER || size > MOST_POWER ? size : 0;
-  if (!known) return { value: Number((value / 10 ** exponent).toPrecision(4)).toString(), u: null, exponent };
+  if (u === null) return { value: Number((value / 10 ** exponent).toPrecision(4)).toString(), u: null, exponent };
   const place = Number(u.toExponential(1).split("e")[1]) - exponent - 1; // of the second significant digit
   const decimals = Math.min(Math.max(-place, 0), MOST_DECIMALS);
   const unit = 10 ** Math.max(place, 0);
+  /** @param {number} number */
   const text = (number) => (Math.round(number / 10 ** exponent / unit) * unit).toFixed(0);
+  /** @param {number} number */
   const fixed = (number) => (place > 0 ? text(number) : (number / 10 ** exponent).toFixed(decimals));
   return { value: fixed(value), u: fixed(u), exponent };
 }

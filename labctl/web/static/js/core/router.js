@@ -1,40 +1,42 @@
 // Client-side router: the address determines what the page shows.
 
+import { Unreachable, isAbort } from "./http/errors.js";
+import { changedQuery, matchRoute, routeOf } from "./routes.js";
+
+/** @import { Query } from "../../../types/pages.js" */
+/** @import { Route } from "./routes.js" */
+
+/** @type {Route[]} */
 const routes = [];
 let pageAbort = new AbortController();
 let navigated = false; // focus moves to the page from the second page on
 
-/** Register the module of a pattern like `/units/:serial`. A module exports `page(context)`, which returns an element. */
-export const route = (pattern, load) => routes.push({ parts: pattern.split("/").filter(Boolean), load });
+/**
+ * Register the module of a pattern like `/units/:serial`. A module exports `page(context)`, which returns an element.
+ * @param {string} pattern
+ * @param {Route["load"]} load
+ */
+export const route = (pattern, load) => routes.push(routeOf(pattern, load));
 
-function matchRoute(path) {
-  const parts = path.split("/").filter(Boolean).map(decodeURIComponent);
-  for (const { parts: pattern, load } of routes) {
-    if (pattern.length !== parts.length) continue;
-    const params = {};
-    const fits = pattern.every((part, k) => (part.startsWith(":") ? ((params[part.slice(1)] = parts[k]), true) : part === parts[k]));
-    if (fits) return { load, params };
-  }
-  return null;
-}
-
-/** Navigate to an address as if its link had been clicked. */
+/**
+ * Navigate to an address as if its link had been clicked.
+ * @param {string} path
+ */
 export function navigate(path) {
   history.pushState(null, "", path);
   return show();
 }
 
-/** Write values into the query string without navigation; null removes one. */
+/**
+ * Write values into the query string without navigation; null removes one.
+ * @param {Record<string, string | number | null | undefined>} choice
+ */
 export function updateQuery(choice) {
-  const query = new URLSearchParams(location.search);
-  for (const [name, value] of Object.entries(choice)) {
-    if (value === null || value === undefined || value === "") query.delete(name);
-    else query.set(name, value);
-  }
-  const text = query.toString();
+  const text = changedQuery(location.search, choice);
   history.replaceState(null, "", text ? `?${text}` : location.pathname);
 }
 
+/** @returns {Query} */
 export const query = () => Object.fromEntries(new URLSearchParams(location.search));
 
 /** Show the page of the current address. */
@@ -43,7 +45,8 @@ export async function show() {
   pageAbort = new AbortController();
   const { signal } = pageAbort;
   const main = document.querySelector("main");
-  const found = matchRoute(location.pathname);
+  if (!main) return;
+  const found = matchRoute(routes, location.pathname);
   window.dispatchEvent(new CustomEvent("labctl:moved"));
   main.setAttribute("aria-busy", "true");
   try {
@@ -54,24 +57,33 @@ export async function show() {
     performance.mark("labctl:page"); // for the browser's own profiler, and benchmarks
     const heading = element.querySelector("h1");
     document.title = heading ? `${heading.textContent} · labctl` : "labctl";
-    if (navigated && (document.activeElement === document.body || main.contains(document.activeElement))) main.focus({ preventScroll: true });
+    if (navigated && (document.activeElement === document.body || main.contains(document.activeElement)))
+      main.focus({ preventScroll: true });
     navigated = true;
   } catch (error) {
-    if (signal.aborted || error.name === "AbortError") return;
+    if (signal.aborted || isAbort(error)) return;
     await showError(main, error, signal);
   } finally {
     if (!signal.aborted) main.removeAttribute("aria-busy");
   }
 }
 
-/** Show an error in place of the page. A page whose service did not answer is shown as soon as it is heard. */
+/**
+ * Show an error in place of the page. A page whose service did not answer is shown as soon as it is heard.
+ * @param {HTMLElement} main
+ * @param {unknown} error
+ * @param {AbortSignal} signal
+ */
 async function showError(main, error, signal) {
-  const [{ errorPage }, { Unreachable }] = await Promise.all([import("./components.js"), import("./api.js")]);
+  const { errorPage } = await import("./components.js");
   main.replaceChildren(errorPage(error, show));
   if (error instanceof Unreachable) window.addEventListener("labctl:heard", show, { signal, once: true });
 }
 
-/** Scroll to an anchor, and move the keyboard focus there where the element can have it. */
+/**
+ * Scroll to an anchor, and move the keyboard focus there where the element can have it.
+ * @param {string} hash
+ */
 function scrollToAnchor(hash) {
   const part = document.getElementById(hash.slice(1));
   part?.scrollIntoView();
@@ -81,12 +93,29 @@ function scrollToAnchor(hash) {
 /** Handle clicks on links between pages, and show the first page. */
 export function start() {
   document.addEventListener("click", (event) => {
-    const link = event.target.closest?.("a[href]");
-    if (!link || event.defaultPrevented || event.button || event.metaKey || event.ctrlKey || event.shiftKey || link.download || link.target) return;
+    const link = event.target instanceof Element ? event.target.closest("a[href]") : null;
+    if (
+      !(link instanceof HTMLAnchorElement) ||
+      event.defaultPrevented ||
+      event.button ||
+      event.metaKey ||
+      event.ctrlKey ||
+      event.shiftKey ||
+      link.download ||
+      link.target
+    )
+      return;
     const url = new URL(link.href);
-    if (url.origin !== location.origin || url.pathname.startsWith("/api") || url.pathname.startsWith("/static") || !matchRoute(url.pathname)) return;
+    if (
+      url.origin !== location.origin ||
+      url.pathname.startsWith("/api") ||
+      url.pathname.startsWith("/static") ||
+      !matchRoute(routes, url.pathname)
+    )
+      return;
     event.preventDefault();
-    if (url.hash && url.pathname === location.pathname && url.search === location.search) return scrollToAnchor(url.hash);
+    if (url.hash && url.pathname === location.pathname && url.search === location.search)
+      return scrollToAnchor(url.hash);
     navigate(url.pathname + url.search + url.hash).then(() => url.hash && scrollToAnchor(url.hash));
     window.scrollTo(0, 0);
   });

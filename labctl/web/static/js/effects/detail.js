@@ -7,51 +7,193 @@ import { linkButton } from "../bench/actions.js";
 import { signatureFigure } from "./signature_plot.js";
 import { CHANNELS, ORIGINS, TECHNOLOGIES, VIEWS } from "./labels.js";
 
+/** @import { Effect } from "../../../types/api.js" */
+/** @import { Child } from "../../../types/pages.js" */
+
+/** @param {Effect} effect */
 const effectLink = (effect) => h("a", { href: `/effects/${effect.id}` }, effect.term);
+/**
+ * @param {readonly Child[]} parts
+ * @returns {Child[]}
+ */
 const commaSeparated = (parts) => parts.flatMap((part, k) => (k ? [", ", part] : [part]));
 
+/**
+ * @param {Effect} effect
+ * @param {readonly Effect[]} all
+ */
 export function effectDetail(effect, all) {
   const at = all.indexOf(effect);
+  /**
+   * @param {Effect | undefined} to
+   * @param {string} text
+   */
   const turn = (to, text) => (to ? h("a", { class: "button tiny", href: `/effects/${to.id}` }, text) : null);
-  const alike = all.filter((each) => each !== effect && (effect.aliases.includes(each.id) || each.aliases.includes(effect.id)));
+  const alike = all.filter(
+    (each) => each !== effect && (effect.aliases.includes(each.id) || each.aliases.includes(effect.id)),
+  );
   const [origin, about] = ORIGINS[effect.origin] ?? [effect.origin, ""];
-  return h("div", { class: "page effect" },
-    pageHeader(effect.term, h("span", { class: "row" }, h("code", {}, effect.id), chip(origin, effect.leaves ? "accent" : ""), chip(effect.leaves ? "leaves with a calibration" : "stays on the bench", effect.leaves ? "good" : "")),
-      ...[turn(all[at - 1], "‹ Before"), turn(all[at + 1], "Next ›")].filter(Boolean)),
+  return h(
+    "div",
+    { class: "page effect" },
+    pageHeader(
+      effect.term,
+      h(
+        "span",
+        { class: "row" },
+        h("code", {}, effect.id),
+        chip(origin, effect.leaves ? "accent" : ""),
+        chip(effect.leaves ? "leaves with a calibration" : "stays on the bench", effect.leaves ? "good" : ""),
+      ),
+      ...[turn(all[at - 1], "‹ Before"), turn(all[at + 1], "Next ›")].filter(Boolean),
+    ),
     h("p", { class: "sentence" }, effect.sentence),
-    h("div", { class: "columns", style: "--column-min: 24rem" },
-      card("Its signature", signatureFigure(effect) ?? h("p", { class: "muted" }, "There is no drawing of it."), effect.draws.length ? h("p", { class: "small" }, h("strong", {}, "Look for it in "), commaSeparated(effect.draws.map((view) => VIEWS[view] ?? idText(view))), ".") : null),
-      h("div", { class: "stack", style: "gap: 1.25rem" },
-        card("The experiment", h("p", { class: "lead" }, effect.experiment ? `${effect.experiment[0].toUpperCase()}${effect.experiment.slice(1)}.` : "None is written down."),
-          h("div", { class: "row" }, linkButton("Practise on it", `/campaigns/new?hide=${effect.id}`), h("span", { class: "muted small" }, "a simulated campaign with it hidden in the unit"))),
-        card("What it is mistaken for", alike.length
-          ? [h("ul", { class: "plain" }, alike.map((each) => h("li", {}, effectLink(each), h("span", { class: "muted small secondary" }, each.sentence)))), h("p", { class: "muted small" }, "These draw the same whatever the schedule, so they are always named together.")]
-          : h("p", { class: "muted" }, "Nothing in the catalogue draws the same on every schedule. On a given schedule others may come close; the criticism says which.")),
-        card("What it needs", effect.needs.length ? h("p", {}, "Beside rate and temperature: ", commaSeparated(effect.needs.map((name) => h("span", {}, CHANNELS[name] ?? idText(name), " (", h("code", {}, name), ")"))), ".") : h("p", {}, "Rate and temperature are enough."), axesParagraph(effect)))),
+    h(
+      "div",
+      { class: "columns", style: "--column-min: 24rem" },
+      card(
+        "Its signature",
+        signatureFigure(effect) ?? h("p", { class: "muted" }, "There is no drawing of it."),
+        effect.draws.length
+          ? h(
+              "p",
+              { class: "small" },
+              h("strong", {}, "Look for it in "),
+              commaSeparated(effect.draws.map((view) => VIEWS[view] ?? idText(view))),
+              ".",
+            )
+          : null,
+      ),
+      h(
+        "div",
+        { class: "stack", style: "gap: 1.25rem" },
+        card(
+          "The experiment",
+          h(
+            "p",
+            { class: "lead" },
+            effect.experiment
+              ? `${effect.experiment[0].toUpperCase()}${effect.experiment.slice(1)}.`
+              : "None is written down.",
+          ),
+          h(
+            "div",
+            { class: "row" },
+            linkButton("Practise on it", `/campaigns/new?hide=${effect.id}`),
+            h("span", { class: "muted small" }, "a simulated campaign with it hidden in the unit"),
+          ),
+        ),
+        card(
+          "What it is mistaken for",
+          alike.length
+            ? [
+                h(
+                  "ul",
+                  { class: "plain" },
+                  alike.map((each) =>
+                    h("li", {}, effectLink(each), h("span", { class: "muted small secondary" }, each.sentence)),
+                  ),
+                ),
+                h(
+                  "p",
+                  { class: "muted small" },
+                  "These draw the same whatever the schedule, so they are always named together.",
+                ),
+              ]
+            : h(
+                "p",
+                { class: "muted" },
+                "Nothing in the catalogue draws the same on every schedule. On a given schedule others may come close; the criticism says which.",
+              ),
+        ),
+        card(
+          "What it needs",
+          effect.needs.length
+            ? h(
+                "p",
+                {},
+                "Beside rate and temperature: ",
+                commaSeparated(
+                  effect.needs.map((name) =>
+                    h("span", {}, CHANNELS[name] ?? idText(name), " (", h("code", {}, name), ")"),
+                  ),
+                ),
+                ".",
+              )
+            : h("p", {}, "Rate and temperature are enough."),
+          axesParagraph(effect),
+        ),
+      ),
+    ),
     h("div", { class: "columns" }, sizeCard(effect), shapeCard(effect)),
-    notice(effect.leaves ? "good" : "", h("strong", {}, effect.leaves ? "Exported. " : "Not exported. "), effect.leaves ? "A calibration carries it and the Compensator takes it off." : ["sensor", "package"].includes(effect.origin) ? "It belongs to the unit, but what it takes to correct it is known on the bench only." : about));
+    notice(
+      effect.leaves ? "good" : "",
+      h("strong", {}, effect.leaves ? "Exported. " : "Not exported. "),
+      effect.leaves
+        ? "A calibration carries it and the Compensator takes it off."
+        : ["sensor", "package"].includes(effect.origin)
+          ? "It belongs to the unit, but what it takes to correct it is known on the bench only."
+          : about,
+    ),
+  );
 }
 
-const AXES_TEXTS = { own: "It shows on the axis that turns.", cross: "It shows on the axes that do not turn.", all: "It shows on every axis." };
+/** @type {Record<string, string>} */
+const AXES_TEXTS = {
+  own: "It shows on the axis that turns.",
+  cross: "It shows on the axes that do not turn.",
+  all: "It shows on every axis.",
+};
+/** @param {Effect} effect */
 const axesParagraph = (effect) => h("p", { class: "muted" }, AXES_TEXTS[effect.rows] ?? "");
 
+/** @param {Effect} effect */
 function sizeCard(effect) {
   const rows = Object.entries(effect.plausible);
   if (!rows.length) return card("How large it is", h("p", { class: "muted" }, "No sizes are written down for it."));
+  /** @param {number} value */
   const sizeCell = (value) => h("span", { class: "nowrap" }, sizeText(value, effect.unit ?? ""));
-  return card("How large it is", table([
-    { title: "Technology", cell: ([name]) => TECHNOLOGIES[name] ?? name },
-    { title: "From", number: true, cell: ([, [low]]) => sizeCell(low) },
-    { title: "To", number: true, cell: ([, [, high]]) => sizeCell(high) },
-  ], rows, { label: "Plausible sizes" }), h("p", { class: "muted small" }, effect.unit === "1" ? "Shares of the rate, or of the full effect. ppm: millionths." : "Plausible sizes of its first coefficient."));
+  return card(
+    "How large it is",
+    table(
+      [
+        { title: "Technology", cell: ([name]) => TECHNOLOGIES[name] ?? name },
+        { title: "From", number: true, cell: ([, [low]]) => sizeCell(low) },
+        { title: "To", number: true, cell: ([, [, high]]) => sizeCell(high) },
+      ],
+      rows,
+      { label: "Plausible sizes" },
+    ),
+    h(
+      "p",
+      { class: "muted small" },
+      effect.unit === "1"
+        ? "Shares of the rate, or of the full effect. ppm: millionths."
+        : "Plausible sizes of its first coefficient.",
+    ),
+  );
 }
 
+/** @param {Effect} effect */
 function shapeCard(effect) {
-  const orders = effect.max_order === null ? null : h("p", {}, `A polynomial up to order ${effect.max_order}; ${effect.order} where nobody says.`);
-  if (!effect.parameters.length) return card("Its shape", orders ?? h("p", {}, "It has no shape to choose: one size says all."));
-  return card("Its shape", orders, table([
-    { title: "Parameter", cell: (each) => h("code", {}, each.name) },
-    { title: "Tried from", number: true, cell: (each) => `${plainNumber(each.low)} ${unitText(each.unit)}` },
-    { title: "to", number: true, cell: (each) => `${plainNumber(each.high)} ${unitText(each.unit)}` },
-  ], effect.parameters, { label: "Parameters" }), h("p", { class: "muted small" }, "Beside its size it has a shape, and the fit tries these ranges."));
+  const orders =
+    effect.max_order === null
+      ? null
+      : h("p", {}, `A polynomial up to order ${effect.max_order}; ${effect.order} where nobody says.`);
+  if (!effect.parameters.length)
+    return card("Its shape", orders ?? h("p", {}, "It has no shape to choose: one size says all."));
+  return card(
+    "Its shape",
+    orders,
+    table(
+      [
+        { title: "Parameter", cell: (each) => h("code", {}, each.name) },
+        { title: "Tried from", number: true, cell: (each) => `${plainNumber(each.low)} ${unitText(each.unit)}` },
+        { title: "to", number: true, cell: (each) => `${plainNumber(each.high)} ${unitText(each.unit)}` },
+      ],
+      effect.parameters,
+      { label: "Parameters" },
+    ),
+    h("p", { class: "muted small" }, "Beside its size it has a shape, and the fit tries these ranges."),
+  );
 }

@@ -1,20 +1,44 @@
 // Labels of origins, views, channels and technologies in the catalogue.
 
+/** @type {Record<string, [name: string, about: string]>} */
 export const ORIGINS = {
   sensor: ["Sensor", "What the sensing element and its electronics do."],
   package: ["Package", "How the sensing axes lie in the unit's case."],
-  fixture: ["Fixture", "How the unit sits on the table. Fitted, so that it does not hide in the gyro's coefficients; stays here."],
+  fixture: [
+    "Fixture",
+    "How the unit sits on the table. Fitted, so that it does not hide in the gyro's coefficients; stays here.",
+  ],
   bench: ["Bench", "What table and thermometer do. Reported against the bench; stays here."],
   environment: ["Environment", "The Earth, its field, and what changes from one switching-on to the next. Stays here."],
 };
 
+/** @type {Record<string, string>} */
 export const VIEWS = {
-  map: "the map over rate and temperature", time: "the course in time", angle: "the waves in the table angle", frequency: "the waves in time", time_in_set: "the mean course of a data set", legs: "from below against from above",
-  previous_rate: "against the rate before", repeats: "points measured again", worst: "the worst data sets", table_rate_dps: "against the table rate", temperature_c: "against the gyro's temperature", power_s: "against the time since power-on", supply_v: "against the supply voltage",
+  map: "the map over rate and temperature",
+  time: "the course in time",
+  angle: "the waves in the table angle",
+  frequency: "the waves in time",
+  time_in_set: "the mean course of a data set",
+  legs: "from below against from above",
+  previous_rate: "against the rate before",
+  repeats: "points measured again",
+  worst: "the worst data sets",
+  table_rate_dps: "against the table rate",
+  temperature_c: "against the gyro's temperature",
+  power_s: "against the time since power-on",
+  supply_v: "against the supply voltage",
 };
 
+/** @type {Record<string, string>} */
 export const CHANNELS = {
-  t_s: "time of each reading", power_s: "time since power-on", table_angle_deg: "table angle", supply_v: "supply voltage", raw_code: "the raw code of the converter", run: "number of the powered session", mounting: "number of the mounting",
+  t_s: "time of each reading",
+  power_s: "time since power-on",
+  table_angle_deg: "table angle",
+  supply_v: "supply voltage",
+  raw_code: "the raw code of the converter",
+  run: "number of the powered session",
+  mounting: "number of the mounting",
 };
 
+/** @type {Record<string, string>} */
 export const TECHNOLOGIES = { fog: "Fibre-optic (FOG)", mems: "MEMS", piezo: "Piezoelectric vibrating" };

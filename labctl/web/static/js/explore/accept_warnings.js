@@ -1,27 +1,45 @@
 // A fit that the service refuses: why, in its own sentences, and the question whether to do it all the same.
 
-import { post } from "../core/api.js";
+import { Problem } from "../core/http/errors.js";
 import { h } from "../core/elements.js";
-import { dialog, notice } from "../core/components.js";
+import { notice } from "../core/components.js";
+import { dialog } from "../core/dialog.js";
 
 /**
- * Post a fit or a change. Where the data or the result are certainly wrong the person decides; `confirm` is what the
- * button for that says. Return the answer, or null where the person leaves it.
+ * Make a fit or a change: `fit(accepted)` posts it. Where the data or the result are certainly wrong the person decides;
+ * `confirm` is what the button for that says. Return the answer, or null where the person leaves it.
+ * @template Answer
+ * @param {(accepted: { accept_warnings?: boolean }) => Promise<Answer>} fit
+ * @param {string} confirm
+ * @returns {Promise<Answer | null>}
  */
-export async function postFit(path, body, confirm) {
+export async function postFit(fit, confirm) {
   try {
-    return await post(path, body);
+    return await fit({});
   } catch (error) {
-    if (!error.type?.endsWith(":data-refused")) throw error;
+    if (!(error instanceof Problem) || !error.type?.endsWith(":data-refused")) throw error;
     const answers = await dialog("The fit is refused", [], {
       text: "The calibration would be wrong. A version that is made anyway keeps these warnings.",
-      body: against(error), confirm, kind: "danger",
+      body: against(error),
+      confirm,
+      kind: "danger",
     });
-    return answers && post(path, { ...body, accept_warnings: true });
+    return answers && fit({ accept_warnings: true });
   }
 }
 
+/** @param {Problem} problem */
 function against({ warnings, message }) {
-  const sentences = warnings?.length ? warnings.map((each) => `${each.severity === "certain" ? "Wrong" : "Check"}: ${each.text}`) : [message];
-  return notice("bad", h("p", {}, h("strong", {}, "This speaks against it:")), h("ul", { class: "plain" }, sentences.map((each) => h("li", {}, `${each}.`))));
+  const sentences = warnings?.length
+    ? warnings.map((each) => `${each.severity === "certain" ? "Wrong" : "Check"}: ${each.text}`)
+    : [message];
+  return notice(
+    "bad",
+    h("p", {}, h("strong", {}, "This speaks against it:")),
+    h(
+      "ul",
+      { class: "plain" },
+      sentences.map((each) => h("li", {}, `${each}.`)),
+    ),
+  );
 }

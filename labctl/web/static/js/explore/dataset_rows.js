@@ -2,21 +2,53 @@
 
 import { count, plainNumber } from "../core/format.js";
 
-/** Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length. */
+/** @import { Criticism, Preview } from "../../../types/api.js" */
+/** @typedef {Pick<Criticism, "views">} Viewed */
+
+/**
+ * Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length.
+ * @param {Viewed} criticism
+ * @param {string} axis
+ */
 export function datasetRows(criticism, axis) {
   const sets = criticism.views.sets;
-  return { n: sets.dataset.length, dataset: sets.dataset, position: sets.position, channels: sets.channels, residual: sets.residual_dps[axis], score: sets.over_floor[axis] };
+  return {
+    n: sets.dataset.length,
+    dataset: sets.dataset,
+    position: sets.position,
+    channels: sets.channels,
+    residual: sets.residual_dps[axis],
+    score: sets.over_floor[axis],
+  };
 }
 
+/** @param {Viewed} criticism */
 export const axisNames = (criticism) => Object.keys(criticism.views.sets?.residual_dps ?? {});
 
-/** "n of N data sets" where not every data set is drawn one by one, else null. */
+/**
+ * "n of N data sets" where not every data set is drawn one by one, else null.
+ * @param {Viewed} criticism
+ */
 export function shownText(criticism) {
   const { of, dataset } = criticism.views.sets;
   return dataset.length < of ? `${count(dataset.length)} of ${count(of)} data sets` : null;
 }
 
-/** Numbers as short texts that all differ, so that no two categories of an axis become one. */
+/**
+ * The values of an axis in the order of the criticism's data sets.
+ * @param {{ criticism: Viewed, axis: string }} state
+ * @param {Pick<Preview["residuals"], "dataset" | "axis" | "residual_dps">} columns
+ * @param {"residual_dps"} name
+ */
+export function inDatasetOrder(state, columns, name) {
+  const values = new Map(columns.dataset.map((set, k) => [`${set} ${columns.axis[k]}`, columns[name][k]]));
+  return datasetRows(state.criticism, state.axis).dataset.map((set) => values.get(`${set} ${state.axis}`) ?? null);
+}
+
+/**
+ * Numbers as short texts that all differ, so that no two categories of an axis become one.
+ * @param {readonly number[]} values
+ */
 export function distinctLabels(values) {
   for (let digits = 3; digits < 17; digits += 1) {
     const labels = values.map((value) => plainNumber(value, digits));
@@ -25,9 +57,13 @@ export function distinctLabels(values) {
   return values.map(String);
 }
 
-/** Data-set numbers as `1-20,35`, for the query string. */
+/**
+ * Data-set numbers as `1-20,35`, for the query string.
+ * @param {Iterable<number>} numbers
+ */
 export function toRanges(numbers) {
   const sorted = [...numbers].sort((a, b) => a - b);
+  /** @type {[number, number][]} */
   const parts = [];
   for (const number of sorted) {
     const last = parts.at(-1);
@@ -37,23 +73,48 @@ export function toRanges(numbers) {
   return parts.map(([from, to]) => (from === to ? `${from}` : `${from}-${to}`)).join(",");
 }
 
+/** @param {string | undefined} text */
 export function fromRanges(text) {
+  /** @type {Set<number>} */
   const found = new Set();
   for (const part of (text ?? "").split(",").filter(Boolean)) {
     const [from, to = from] = part.split("-").map(Number);
-    if (Number.isFinite(from) && Number.isFinite(to) && to - from < 100_000) for (let k = from; k <= to; k += 1) found.add(k);
+    if (Number.isFinite(from) && Number.isFinite(to) && to - from < 100_000)
+      for (let k = from; k <= to; k += 1) found.add(k);
   }
   return found;
 }
 
+/** @type {Record<string, string>} */
 export const UNITS = {
-  table_rate_dps: "deg/s", previous_rate_dps: "deg/s", temperature_c: "deg C", chamber_c: "deg C", t_s: "h", power_s: "h", supply_v: "V", humidity_pct: "%",
+  table_rate_dps: "deg/s",
+  previous_rate_dps: "deg/s",
+  temperature_c: "deg C",
+  chamber_c: "deg C",
+  t_s: "h",
+  power_s: "h",
+  supply_v: "V",
+  humidity_pct: "%",
 };
+/** @type {Record<string, string>} */
 const NAMES = {
-  table_rate_dps: "table rate", previous_rate_dps: "previous rate", temperature_c: "gyro temperature", chamber_c: "chamber temperature",
-  t_s: "time", power_s: "time since power-on", supply_v: "supply", humidity_pct: "humidity", order: "data sets in order",
+  table_rate_dps: "table rate",
+  previous_rate_dps: "previous rate",
+  temperature_c: "gyro temperature",
+  chamber_c: "chamber temperature",
+  t_s: "time",
+  power_s: "time since power-on",
+  supply_v: "supply",
+  humidity_pct: "humidity",
+  order: "data sets in order",
 };
-/** A channel's values in the unit that its title names: hours for times. */
+/**
+ * A channel's values in the unit that its title names: hours for times.
+ * @param {string} name
+ * @param {readonly number[]} values
+ */
 export const scaled = (name, values) => (UNITS[name] === "h" ? values.map((value) => value / 3600) : values);
+/** @param {string} name */
 export const channelName = (name) => NAMES[name] ?? name.replaceAll("_", " ");
+/** @param {string} name */
 export const channelTitle = (name) => (UNITS[name] ? `${channelName(name)}, ${UNITS[name]}` : channelName(name));

@@ -1,66 +1,184 @@
 // The error of each version down to the noise floor, and the residual maps of this version and its parent.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";
 import { cardWithHeader, loadInto, modelName, table } from "../core/components.js";
-import { residualMap, colourLimit, mapsOf } from "./residual_map.js";
+import { colourLimit, mapsOf } from "./residual_cells.js";
+import { residualMap } from "./residual_map.js";
+
+/** @import { Ladder } from "../../../types/api.js" */
+/** @import { ExploreState } from "./state.js" */
 
 /** The raw error is hidden at first where it is more than this factor above the fitted errors and would flatten their lines. */
 const RAW_ERROR_RATIO = 10;
 
+/** @param {Ladder} ladder */
 export function ladderFigure(ladder) {
   const steps = ladder.steps;
   const x = steps.map((step) => `v${step.version}`);
-  const dwarfs = Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) > RAW_ERROR_RATIO * Math.max(...steps.map((step) => step.rms_dps ?? 0));
-  const line = (key, name, line, symbol) => ({ type: "scatter", mode: "lines+markers", name, x, y: steps.map((step) => step[key]), line, marker: { size: 9, symbol }, text: steps.map((step) => `${step.model}: ${step.effects.map(idText).join(", ")}`), hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>" });
+  const dwarfs =
+    Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) >
+    RAW_ERROR_RATIO * Math.max(...steps.map((step) => step.rms_dps ?? 0));
+  /**
+   * @param {"raw_rms_dps" | "rms_dps" | "heldout_rms_dps"} key
+   * @param {string} name
+   * @param {object} line
+   * @param {string} symbol
+   */
+  const line = (key, name, line, symbol) => ({
+    type: "scatter",
+    mode: "lines+markers",
+    name,
+    x,
+    y: steps.map((step) => step[key]),
+    line,
+    marker: { size: 9, symbol },
+    text: steps.map((step) => `${step.model}: ${step.effects.map(idText).join(", ")}`),
+    hovertemplate: "%{text}<br>%{y:.4g} deg/s<extra>%{fullData.name}</extra>",
+  });
   const draw = () => ({
     data: [
-      { ...line("raw_rms_dps", "as the unit is", { color: colour("border-strong"), dash: "dot" }, "diamond-open"), visible: dwarfs ? "legendonly" : true },
+      {
+        ...line("raw_rms_dps", "as the unit is", { color: colour("border-strong"), dash: "dot" }, "diamond-open"),
+        visible: dwarfs ? "legendonly" : true,
+      },
       line("rms_dps", "after the fit", { color: colour("accent"), width: 2.5 }, "circle"),
       line("heldout_rms_dps", "at unseen temperatures", { color: colour("warn"), width: 2.5 }, "square"),
     ],
     layout: {
-      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: "D2", tickformat: "~g" }, xaxis: { type: "category" },
-      shapes: ladder.noise_floor_dps ? [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: ladder.noise_floor_dps, y1: ladder.noise_floor_dps, line: { color: colour("good"), dash: "dash" } }] : [],
-      annotations: ladder.noise_floor_dps ? [{ xref: "paper", x: 0.01, y: Math.log10(ladder.noise_floor_dps), text: "noise floor", showarrow: false, xanchor: "left", yanchor: "bottom", font: { color: colour("good"), size: 12 } }] : [],
+      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: "D2", tickformat: "~g" },
+      xaxis: { type: "category" },
+      shapes: ladder.noise_floor_dps
+        ? [
+            {
+              type: "line",
+              xref: "paper",
+              x0: 0,
+              x1: 1,
+              y0: ladder.noise_floor_dps,
+              y1: ladder.noise_floor_dps,
+              line: { color: colour("good"), dash: "dash" },
+            },
+          ]
+        : [],
+      annotations: ladder.noise_floor_dps
+        ? [
+            {
+              xref: "paper",
+              x: 0.01,
+              y: Math.log10(ladder.noise_floor_dps),
+              text: "noise floor",
+              showarrow: false,
+              xanchor: "left",
+              yanchor: "bottom",
+              font: { color: colour("good"), size: 12 },
+            },
+          ]
+        : [],
     },
   });
-  return figure("Error ladder", `The versions fitted to recording ${ladder.recording}: each one's RMS error on that data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.`, draw, { height: "19rem" });
+  return figure(
+    "Error ladder",
+    `The versions fitted to recording ${ladder.recording}: each one's RMS error on that data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.`,
+    draw,
+    { height: "19rem" },
+  );
 }
 
+/**
+ * @param {ExploreState} state
+ * @param {AbortSignal} signal
+ */
 export function errorLadder(state, signal) {
   const place = h("div", { class: "stack" });
-  const base = `/api/units/${encodeURIComponent(state.serial)}`;
+  const { serial } = state;
   loadInto(place, "Climbing down the ladder", async () => {
-    const ladder = await get(`${base}/ladder`, { signal });
+    const ladder = await get("/api/units/{serial}/ladder", { path: { serial }, signal });
     const here = ladder.steps.find((step) => step.version === state.version);
     const parts = [ladderFigure(ladder), versionTable(ladder, state)];
     if (here?.parent) parts.push(await faded(here.parent));
     return h("div", { class: "stack" }, parts);
   });
 
+  /** @param {number} parent */
   async function faded(parent) {
-    const before = await get(`${base}/calibrations/${parent}/criticism`, { query: { recording: state.recording }, signal });
+    const before = await get("/api/units/{serial}/calibrations/{version}/criticism", {
+      path: { serial, version: parent },
+      query: { recording: state.recording },
+      signal,
+    });
     const pair = () => [mapsOf(before, state.axis), mapsOf(state.criticism, state.axis)];
-    const one = (k, name) => residualMap(name, null, () => ({ maps: pair()[k], limit: colourLimit(...pair()) }), { pickable: false, height: "16rem" });
+    /**
+     * @param {number} k
+     * @param {string} name
+     */
+    const one = (k, name) =>
+      residualMap(name, null, () => ({ maps: pair()[k], limit: colourLimit(...pair()) }), {
+        pickable: false,
+        height: "16rem",
+      });
     const both = [one(0, `Version ${parent}`), one(1, `Version ${state.version}`)];
     state.onchange((what) => what === "axis" && both.forEach((each) => each.redraw()));
-    return h("div", { class: "columns" }, both.map((each, k) => h("div", {}, h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`), each)));
+    return h(
+      "div",
+      { class: "columns" },
+      both.map((each, k) =>
+        h(
+          "div",
+          {},
+          h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`),
+          each,
+        ),
+      ),
+    );
   }
 
   return cardWithHeader("Watch the error fall", null, place);
 }
 
+/**
+ * @param {Ladder} ladder
+ * @param {ExploreState} state
+ */
 function versionTable(ladder, state) {
-  return table([
-    { title: "Version", cell: (step) => (step.version === state.version ? h("strong", {}, `${step.version}`) : h("a", { href: `/explore?unit=${encodeURIComponent(state.serial)}&version=${step.version}` }, `${step.version}`)) },
-    { title: "Model", cell: (step) => h("span", {}, modelName(step.model), h("span", { class: "muted small" }, step.parent ? ` from version ${step.parent}` : "")) },
-    { title: "Effects", cell: (step) => step.effects.map(idText).join(", ") },
-    { title: "Recording", number: true, cell: (step) => `${step.recording ?? "–"}` },
-    { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
-    { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
-    ...(ladder.others.length ? [{ title: `As it is on recording ${ladder.recording}, deg/s`, number: true, cell: (step) => number(step.applied_rms_dps ?? (step.recording === ladder.recording ? step.rms_dps : null)) }] : []),
-  ], [...ladder.steps, ...ladder.others], { label: "Versions", selected: (step) => step.version === state.version });
+  return table(
+    [
+      {
+        title: "Version",
+        cell: (step) =>
+          step.version === state.version
+            ? h("strong", {}, `${step.version}`)
+            : h(
+                "a",
+                { href: `/explore?unit=${encodeURIComponent(state.serial)}&version=${step.version}` },
+                `${step.version}`,
+              ),
+      },
+      {
+        title: "Model",
+        cell: (step) =>
+          h(
+            "span",
+            {},
+            modelName(step.model),
+            h("span", { class: "muted small" }, step.parent ? ` from version ${step.parent}` : ""),
+          ),
+      },
+      { title: "Effects", cell: (step) => step.effects.map(idText).join(", ") },
+      { title: "Recording", number: true, cell: (step) => `${step.recording ?? "–"}` },
+      { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
+      { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
+      ladder.others.length
+        ? {
+            title: `As it is on recording ${ladder.recording}, deg/s`,
+            number: true,
+            cell: (step) => number(step.applied_rms_dps ?? (step.recording === ladder.recording ? step.rms_dps : null)),
+          }
+        : null,
+    ],
+    [...ladder.steps, ...ladder.others],
+    { label: "Versions", selected: (step) => step.version === state.version },
+  );
 }

@@ -1,104 +1,189 @@
 // Extend the model: preview a changed model, then save it as the next version.
 
-import { post } from "../core/api.js";
+import { post } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
-import { axisColour, colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";
-import { button, fitWarnings, selectField, labelledField, cardWithHeader, notice, table, toast } from "../core/components.js";
+import { button, fitWarnings, cardWithHeader, notice, table, toast } from "../core/components.js";
+import { labelledField, option, selectField } from "../core/fields.js";
 import { navigate } from "../core/router.js";
 import { postFit } from "./accept_warnings.js";
-import { selectedRows } from "./residual_map.js";
-import { shownText } from "./dataset_rows.js";
+import { plausibility, relativeChange, residualFigure } from "./preview_result.js";
 
-const ERRORS = [["raw_rms_dps", "As the unit is"], ["rms_dps", "Left after the fit"], ["heldout_rms_dps", "At unseen temperatures"], ["noise_floor_dps", "Noise floor"]];
+/** @import { Effect, Preview } from "../../../types/api.js" */
+/** @import { ExploreState } from "./state.js" */
 
-/** Return {element, put(effect)}: `put` adds an effect to the change and previews it. */
-export function extendModel(state, path, effects) {
+/** @typedef {{ add: Set<string>, remove: Set<string>, formula: string }} Changed */
+
+/** @type {["raw_rms_dps" | "rms_dps" | "heldout_rms_dps" | "noise_floor_dps", string][]} */
+const ERRORS = [
+  ["raw_rms_dps", "As the unit is"],
+  ["rms_dps", "Left after the fit"],
+  ["heldout_rms_dps", "At unseen temperatures"],
+  ["noise_floor_dps", "Noise floor"],
+];
+
+/**
+ * Return {element, put(effect)}: `put` adds an effect to the change and previews it.
+ * @param {ExploreState} state
+ * @param {readonly Effect[]} effects
+ */
+export function extendModel(state, effects) {
+  const path = { serial: state.serial, version: state.version };
+  /** @type {Changed} */
   const change = { add: new Set(), remove: new Set(), formula: "" };
   const has = state.calibration.model.effects;
   const chosen = h("div", { class: "row", "aria-live": "polite" });
   const result = h("div", { class: "stack" });
-  const formula = h("input", { placeholder: "wet_scale: (humidity_pct - 40) * rate_dps", oninput: () => { change.formula = formula.value.trim(); stale(); } });
-  const pick = selectField("Add an effect", [["", "choose one"], ...effects.filter((e) => !has.includes(e.id)).map((e) => [e.id, idText(e.id)])], "", (value) => { if (value) { change.add.add(value); show(); } });
-  const drop = selectField("Take one out", [["", "choose one"], ...has.map((id) => [id, idText(id)])], "", (value) => { if (value) { change.remove.add(value); show(); } });
+  /** @type {HTMLInputElement} */
+  const formula = h("input", {
+    placeholder: "wet_scale: (humidity_pct - 40) * rate_dps",
+    oninput: () => {
+      change.formula = formula.value.trim();
+      stale();
+    },
+  });
+  const pick = selectField(
+    "Add an effect",
+    [["", "choose one"], ...effects.filter((e) => !has.includes(e.id)).map((e) => option(e.id, idText(e.id)))],
+    "",
+    (value) => {
+      if (value) {
+        change.add.add(value);
+        show();
+      }
+    },
+  );
+  const drop = selectField(
+    "Take one out",
+    [["", "choose one"], ...has.map((id) => option(id, idText(id)))],
+    "",
+    (value) => {
+      if (value) {
+        change.remove.add(value);
+        show();
+      }
+    },
+  );
 
-  const tag = (set, id, sign) => h("button", { type: "button", class: "chip accent", "aria-label": `leave ${idText(id)} as it is`, onclick: () => { set.delete(id); show(); } }, `${sign} ${idText(id)} ✕`);
-  const body = () => ({ add: [...change.add], remove: [...change.remove], formula: change.formula ? [change.formula] : [], recording: state.recording });
+  /**
+   * @param {Set<string>} set
+   * @param {string} id
+   * @param {string} sign
+   */
+  const tag = (set, id, sign) =>
+    h(
+      "button",
+      {
+        type: "button",
+        class: "chip accent",
+        "aria-label": `leave ${idText(id)} as it is`,
+        onclick: () => {
+          set.delete(id);
+          show();
+        },
+      },
+      `${sign} ${idText(id)} ✕`,
+    );
+  const body = () => ({
+    add: [...change.add],
+    remove: [...change.remove],
+    formula: change.formula ? [change.formula] : [],
+    recording: state.recording,
+  });
   const isEmpty = () => !change.add.size && !change.remove.size && !change.formula;
-  const stale = () => setChildren(result, isEmpty() ? h("p", { class: "muted small" }, "Choose what to change, or press Add at a suspect.") : null);
+  const stale = () =>
+    setChildren(
+      result,
+      isEmpty() ? h("p", { class: "muted small" }, "Choose what to change, or press Add at a suspect.") : null,
+    );
   const show = () => {
-    setChildren(chosen, [...change.add].map((id) => tag(change.add, id, "+")), [...change.remove].map((id) => tag(change.remove, id, "–")));
+    setChildren(
+      chosen,
+      [...change.add].map((id) => tag(change.add, id, "+")),
+      [...change.remove].map((id) => tag(change.remove, id, "–")),
+    );
     stale();
   };
 
   async function preview() {
-    const found = await post(`${path}/preview`, body());
+    const found = await post("/api/units/{serial}/calibrations/{version}/preview", { path, body: body() });
     setChildren(result, shown(found));
   }
 
+  /** @param {Preview} found */
   function shown(found) {
     const floor = found.error.noise_floor_dps;
     return [
-      table([
-        { title: "deg/s", cell: ([, title]) => title },
-        { title: `Version ${state.version}`, number: true, cell: ([key]) => number(found.before[key]) },
-        { title: "Changed", number: true, cell: ([key]) => h("strong", {}, number(found.error[key])) },
-        { title: "", cell: ([key]) => (key === "rms_dps" || key === "heldout_rms_dps" ? relativeChange(found.before[key], found.error[key]) : null) },
-      ], ERRORS, { label: "Errors before and after" }),
+      table(
+        [
+          { title: "deg/s", cell: ([, title]) => title },
+          { title: `Version ${state.version}`, number: true, cell: ([key]) => number(found.before[key]) },
+          { title: "Changed", number: true, cell: ([key]) => h("strong", {}, number(found.error[key])) },
+          {
+            title: "",
+            cell: ([key]) =>
+              key === "rms_dps" || key === "heldout_rms_dps"
+                ? relativeChange(found.before[key], found.error[key])
+                : null,
+          },
+        ],
+        ERRORS,
+        { label: "Errors before and after" },
+      ),
       fitWarnings(found),
       residualFigure(state, found, floor),
       plausibility(state, found, change),
-      found.left_out.length ? notice("", `Fitted, but not exported with the calibration: ${found.left_out.map((line) => `${idText(line.effect)} (${line.origin ?? "bench"})`).join(", ")}.`) : null,
-      h("div", { class: "row" }, button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }), h("span", { class: "muted small" }, "Versions are never changed; this one stays as it is.")),
+      found.left_out.length
+        ? notice(
+            "",
+            `Fitted, but not exported with the calibration: ${found.left_out.map((line) => `${idText(line.effect)} (${line.origin ?? "bench"})`).join(", ")}.`,
+          )
+        : null,
+      h(
+        "div",
+        { class: "row" },
+        button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }),
+        h("span", { class: "muted small" }, "Versions are never changed; this one stays as it is."),
+      ),
     ];
   }
 
   async function make() {
-    const made = await postFit(`${path}/improve`, body(), "Make version anyway");
+    const made = await postFit(
+      (accepted) =>
+        post("/api/units/{serial}/calibrations/{version}/improve", { path, body: { ...body(), ...accepted } }),
+      "Make version anyway",
+    );
     if (!made) return;
     toast("good", `Version ${made.version} of ${state.serial} is made.`);
-    await navigate(`/explore?unit=${encodeURIComponent(state.serial)}&version=${made.version}&recording=${state.recording}&axis=${state.axis}#watch`);
+    await navigate(
+      `/explore?unit=${encodeURIComponent(state.serial)}&version=${made.version}&recording=${state.recording}&axis=${state.axis}#watch`,
+    );
   }
 
   show();
-  const element = cardWithHeader("Add it", null,
-    h("div", { class: "columns", style: "--column-min: 14rem" }, pick, drop, labelledField("A formula of your own", formula, "name: expression over channels")),
-    chosen, h("div", { class: "row" }, button("Preview", preview, { kind: "primary" })), result);
-  return { element, put: async (effect) => { change.add.add(effect); show(); element.scrollIntoView({ behavior: "smooth", block: "start" }); await preview(); } };
-}
-
-function relativeChange(before, after) {
-  if (!before || !after) return null;
-  const share = after / before - 1;
-  return h("span", { class: share < -0.02 ? "good-text" : share > 0.02 ? "bad-text" : "muted" }, `${share < 0 ? "–" : "+"}${Math.abs(Math.round(100 * share))} %`);
-}
-
-/** The values of an axis in the order of the criticism's data sets. */
-export function inDatasetOrder(state, columns, name) {
-  const values = new Map(columns.dataset.map((set, k) => [`${set} ${columns.axis[k]}`, columns[name][k]]));
-  return selectedRows(state).dataset.map((set) => values.get(`${set} ${state.axis}`) ?? null);
-}
-
-function residualFigure(state, found, floor) {
-  const draw = () => {
-    const rows = selectedRows(state);
-    const x = rows.channels.table_rate_dps;
-    const after = inDatasetOrder(state, found.residuals, "residual_dps");
-    const dots = (y, name, marker) => ({ type: "scatter", mode: "markers", name, x, y, marker, customdata: rows.dataset, hovertemplate: `data set %{customdata}<br>%{x:.5g} deg/s: %{y:.3g} deg/s<extra>${name}</extra>` });
-    const line = (y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: colour("border-strong"), dash: "dash", width: 1 } });
-    return {
-      data: [dots(rows.residual, "before", { size: 5, color: colour("border-strong"), symbol: "circle-open" }), dots(after, "after", { size: 6, color: axisColour(state.axis) })],
-      layout: { title: shownText(state.criticism) ? { text: shownText(state.criticism), font: { size: 11 } } : undefined, xaxis: { title: { text: "table rate, deg/s" } }, yaxis: { title: { text: "residual, deg/s" } }, shapes: floor ? [line(2 * floor), line(-2 * floor)] : [] },
-    };
+  const element = cardWithHeader(
+    "Add it",
+    null,
+    h(
+      "div",
+      { class: "columns", style: "--column-min: 14rem" },
+      pick,
+      drop,
+      labelledField("A formula of your own", formula, "name: expression over channels"),
+    ),
+    chosen,
+    h("div", { class: "row" }, button("Preview", preview, { kind: "primary" })),
+    result,
+  );
+  return {
+    element,
+    /** @param {string} effect */
+    put: async (effect) => {
+      change.add.add(effect);
+      show();
+      element.scrollIntoView({ behavior: "smooth", block: "start" });
+      await preview();
+    },
   };
-  return figure("Residual before and after", "Dashed: two noise floors.", draw, { height: "18rem" });
-}
-
-function plausibility(state, found, change) {
-  const own = found.axes[state.axis]?.coefficients;
-  const added = [...change.add].map((id) => id.split(":")[0]);
-  if (!own || !added.length) return null;
-  const ranges = added.map((id) => [id, found.plausible[id]]).filter(([, range]) => range);
-  return ranges.length ? h("ul", { class: "plain" }, ranges.map(([id, range]) =>
-    h("li", {}, `${idText(id)}: `, range.inside ? h("span", { class: "good-text" }, "of a usual size") : h("span", { class: "bad-text" }, "larger than is usual"), h("span", { class: "muted" }, ` (${number(range.from, 2)} to ${number(range.to, 2)})`)))) : null;
 }

@@ -3,31 +3,49 @@
 import { setChildren, h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number } from "../core/format.js";
-import { selectField, cardWithHeader, table } from "../core/components.js";
+import { cardWithHeader, table } from "../core/components.js";
+import { option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
-import { cellsText, residualMap, selectedRows, colourLimit, datasetsUnder, mapsOf } from "./residual_map.js";
+import { cellsText, colourLimit, mapsOf } from "./residual_cells.js";
+import { residualMap, selectedRows, datasetsUnder } from "./residual_map.js";
 import { channelName, channelTitle, scaled, shownText } from "./dataset_rows.js";
+
+/** @import { Figure, PlotEvent, PlotTrace } from "../../../types/pages.js" */
+/** @import { ExploreState } from "./state.js" */
 
 /** What there is of these is drawn at first: time where it is known, else the order of the data sets. */
 const DEFAULT_CHANNELS = ["table_rate_dps", "temperature_c", "t_s", "order"];
 const MAX_LISTED = 12;
 
+/** @param {ExploreState} state */
 export function residualDiagnostics(state) {
   const rows = () => selectedRows(state);
-  const picture = residualMap("Residual over floor", `Every measured cell: the mean residual of its data sets over the noise floor. ${cellsText(state.criticism)} Faded cells are within two floors of zero: by themselves they mean nothing. Drag over cells to pick them, press one to pick it.`,
-    () => ({ maps: mapsOf(state.criticism, state.axis), limit: colourLimit(mapsOf(state.criticism, state.axis)), pick: state.pick }));
+  const picture = residualMap(
+    "Residual over floor",
+    `Every measured cell: the mean residual of its data sets over the noise floor. ${cellsText(state.criticism)} Faded cells are within two floors of zero: by themselves they mean nothing. Drag over cells to pick them, press one to pick it.`,
+    () => ({
+      maps: mapsOf(state.criticism, state.axis),
+      limit: colourLimit(mapsOf(state.criticism, state.axis)),
+      pick: state.pick,
+    }),
+  );
   bindSelection(picture, datasetsUnder, state);
 
   const channels = Object.keys(rows().channels);
   const shown = (query().channels?.split(",") ?? DEFAULT_CHANNELS).filter((name) => channels.includes(name));
-  while (shown.length < Math.min(3, channels.length)) shown.push(channels.find((name) => !shown.includes(name)));
+  shown.push(...channels.filter((name) => !shown.includes(name)).slice(0, Math.max(3 - shown.length, 0)));
   const against = shown.map((name, k) => {
     const drawn = residualScatter(state, () => shown[k]);
-    const select = selectField("Residual against", channels.map((each) => [each, channelName(each)]), name, (value) => {
-      shown[k] = value;
-      updateQuery({ channels: shown.join(",") });
-      drawn.update();
-    });
+    const select = selectField(
+      "Residual against",
+      channels.map((each) => option(each, channelName(each))),
+      name,
+      (value) => {
+        shown[k] = value;
+        updateQuery({ channels: shown.join(",") });
+        drawn.update();
+      },
+    );
     return h("div", { class: "stack" }, select, drawn);
   });
 
@@ -40,12 +58,26 @@ export function residualDiagnostics(state) {
       picture.redraw();
     }
   });
-  return cardWithHeader("See where it fails", h("span", { class: "muted small" }, "a pick in one picture shows in all"),
-    h("p", { class: "muted small" }, `Judged: the model of version ${state.version} refitted to recording ${state.recording}, so that only what it cannot describe remains. The version as it is stands under Compare.`),
-    picture, h("div", { class: "columns", style: "--column-min: 19rem" }, against), list);
+  return cardWithHeader(
+    "See where it fails",
+    h("span", { class: "muted small" }, "a pick in one picture shows in all"),
+    h(
+      "p",
+      { class: "muted small" },
+      `Judged: the model of version ${state.version} refitted to recording ${state.recording}, so that only what it cannot describe remains. The version as it is stands under Compare.`,
+    ),
+    picture,
+    h("div", { class: "columns", style: "--column-min: 19rem" }, against),
+    list,
+  );
 }
 
-/** Connect the selection of a figure to the state once it is drawn. */
+/**
+ * Connect the selection of a figure to the state once it is drawn.
+ * @param {Figure} element
+ * @param {(event: PlotEvent) => number[]} setsOf
+ * @param {ExploreState} state
+ */
 function bindSelection(element, setsOf, state) {
   element.ondrawn = (plot) => {
     // a redraw ends the selection once more with no points in it
@@ -55,22 +87,71 @@ function bindSelection(element, setsOf, state) {
   };
 }
 
+/**
+ * @param {ExploreState} state
+ * @param {() => string} channel
+ */
 function residualScatter(state, channel) {
   const draw = () => {
     const rows = selectedRows(state);
     const x = scaled(channel(), rows.channels[channel()]);
     const picked = state.pick.size ? rows.dataset.flatMap((set, k) => (state.pick.has(set) ? [k] : [])) : null;
-    const data = [{
-      type: "scatter", mode: "markers", name: "residual", x, y: rows.residual, customdata: rows.dataset, selectedpoints: picked,
-      marker: { size: 6, color: axisColour(state.axis), opacity: 0.75 }, selected: { marker: { opacity: 1, size: 8 } }, unselected: { marker: { opacity: 0.15 } },
-      text: rows.dataset.map((set, k) => `data set ${set}: ${number(rows.score[k], 2)} floors`), hovertemplate: "%{text}<br>%{x:.5g}: %{y:.3g} deg/s<extra></extra>",
-    }];
+    /** @type {PlotTrace[]} */
+    const data = [
+      {
+        type: "scatter",
+        mode: "markers",
+        name: "residual",
+        x,
+        y: rows.residual,
+        customdata: rows.dataset,
+        selectedpoints: picked,
+        marker: { size: 6, color: axisColour(state.axis), opacity: 0.75 },
+        selected: { marker: { opacity: 1, size: 8 } },
+        unselected: { marker: { opacity: 0.15 } },
+        text: rows.dataset.map((set, k) => `data set ${set}: ${number(rows.score[k], 2)} floors`),
+        hovertemplate: "%{text}<br>%{x:.5g}: %{y:.3g} deg/s<extra></extra>",
+      },
+    ];
     if (state.overlay) {
-      data.push({ type: "scatter", mode: "markers", name: "explained", x, y: state.overlay.values, customdata: rows.dataset, marker: { size: 5, symbol: "diamond", color: colour("text") }, hovertemplate: "%{y:.3g} deg/s<extra></extra>" });
+      data.push({
+        type: "scatter",
+        mode: "markers",
+        name: "explained",
+        x,
+        y: state.overlay.values,
+        customdata: rows.dataset,
+        marker: { size: 5, symbol: "diamond", color: colour("text") },
+        hovertemplate: "%{y:.3g} deg/s<extra></extra>",
+      });
     }
     const shown = shownText(state.criticism);
-    const annotations = shown ? [{ text: shown, showarrow: false, xref: "paper", yref: "paper", x: 1, y: 1, xanchor: "right", yanchor: "bottom", font: { size: 11 } }] : [];
-    return { data, layout: { annotations, dragmode: "select", xaxis: { title: { text: channelTitle(channel()) } }, yaxis: { title: { text: "residual, deg/s" } }, showlegend: Boolean(state.overlay), margin: { l: 62, r: 8, t: state.overlay ? 34 : shown ? 20 : 8, b: 44 } } };
+    const annotations = shown
+      ? [
+          {
+            text: shown,
+            showarrow: false,
+            xref: "paper",
+            yref: "paper",
+            x: 1,
+            y: 1,
+            xanchor: "right",
+            yanchor: "bottom",
+            font: { size: 11 },
+          },
+        ]
+      : [];
+    return {
+      data,
+      layout: {
+        annotations,
+        dragmode: "select",
+        xaxis: { title: { text: channelTitle(channel()) } },
+        yaxis: { title: { text: "residual, deg/s" } },
+        showlegend: Boolean(state.overlay),
+        margin: { l: 62, r: 8, t: state.overlay ? 34 : shown ? 20 : 8, b: 44 },
+      },
+    };
   };
   const element = figure("Residual against a channel", null, draw, { height: "16rem" });
   bindSelection(element, (event) => (event.points ?? []).map((point) => point.customdata), state);
@@ -78,22 +159,42 @@ function residualScatter(state, channel) {
   return element;
 }
 
+/** @param {ExploreState} state */
 function pickedDatasets(state) {
   const rows = selectedRows(state);
   if (!state.pick.size) return h("p", { class: "muted small" }, "Nothing is picked.");
-  const chosen = rows.dataset.map((_, k) => k).filter((k) => state.pick.has(rows.dataset[k])).sort((a, b) => Math.abs(rows.score[b]) - Math.abs(rows.score[a]));
+  const chosen = rows.dataset
+    .map((_, k) => k)
+    .filter((k) => state.pick.has(rows.dataset[k]))
+    .sort((a, b) => Math.abs(rows.score[b]) - Math.abs(rows.score[a]));
   const rms = Math.sqrt(chosen.reduce((sum, k) => sum + rows.residual[k] ** 2, 0) / Math.max(chosen.length, 1));
   return [
-    h("div", { class: "row space-between" },
-      h("p", {}, h("strong", {}, `${chosen.length} data sets picked`), `: RMS ${number(rms)} deg/s${chosen.length > MAX_LISTED ? `; the ${MAX_LISTED} furthest off are listed` : ""}.`),
-      h("button", { class: "button tiny", type: "button", onclick: () => state.select([]) }, "Let go")),
-    table([
-      { title: "Data set", cell: (k) => h("a", { href: `/recordings/${state.recording}?dataset=${rows.dataset[k]}` }, `${rows.dataset[k]}`) },
-      { title: "Table rate, deg/s", number: true, cell: (k) => number(rows.channels.table_rate_dps[k], 4) },
-      { title: "Temperature, deg C", number: true, cell: (k) => number(rows.channels.temperature_c[k], 4) },
-      { title: "Up", cell: (k) => rows.position[k] },
-      { title: "Residual, deg/s", number: true, cell: (k) => number(rows.residual[k]) },
-      { title: "Over floor", number: true, cell: (k) => number(rows.score[k], 2) },
-    ], chosen.slice(0, MAX_LISTED), { dense: true, label: "Picked data sets" }),
+    h(
+      "div",
+      { class: "row space-between" },
+      h(
+        "p",
+        {},
+        h("strong", {}, `${chosen.length} data sets picked`),
+        `: RMS ${number(rms)} deg/s${chosen.length > MAX_LISTED ? `; the ${MAX_LISTED} furthest off are listed` : ""}.`,
+      ),
+      h("button", { class: "button tiny", type: "button", onclick: () => state.select([]) }, "Let go"),
+    ),
+    table(
+      [
+        {
+          title: "Data set",
+          cell: (k) =>
+            h("a", { href: `/recordings/${state.recording}?dataset=${rows.dataset[k]}` }, `${rows.dataset[k]}`),
+        },
+        { title: "Table rate, deg/s", number: true, cell: (k) => number(rows.channels.table_rate_dps[k], 4) },
+        { title: "Temperature, deg C", number: true, cell: (k) => number(rows.channels.temperature_c[k], 4) },
+        { title: "Up", cell: (k) => rows.position[k] },
+        { title: "Residual, deg/s", number: true, cell: (k) => number(rows.residual[k]) },
+        { title: "Over floor", number: true, cell: (k) => number(rows.score[k], 2) },
+      ],
+      chosen.slice(0, MAX_LISTED),
+      { dense: true, label: "Picked data sets" },
+    ),
   ];
 }

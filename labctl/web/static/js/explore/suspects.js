@@ -5,6 +5,11 @@ import { withUncertainty, number, percent, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { axisNames } from "./dataset_rows.js";
 
+/** @import { Criticism, Suspect } from "../../../types/api.js" */
+/** @import { Child } from "../../../types/pages.js" */
+/** @import { ExploreState } from "./state.js" */
+
+/** @type {Record<Criticism["verdict"], [title: string, kind: string]>} */
 const VERDICTS = {
   adequate: ["Nothing is missing", "good"],
   missing: ["Missing", "warn"],
@@ -15,93 +20,256 @@ const VERDICTS = {
 /** Evidence at which the meter is full, nats; its length is the logarithm, so that 70 and 20 000 differ. */
 const FULL_NATS = 1e5;
 
+/** @param {ExploreState} state */
 export function verdictCard(state) {
   const { criticism } = state;
   const [title, kind] = VERDICTS[criticism.verdict];
   const [first, ...others] = criticism.text;
   const { error, noise } = criticism;
   const ratio = error.rms_dps / error.noise_floor_dps;
-  return h("section", { class: `card stack verdict ${kind}`, "aria-label": "Verdict" },
-    h("div", { class: "row" }, chip(title, kind), h("span", { class: "muted small" }, `version ${state.version} held against recording ${state.recording}`)),
+  return h(
+    "section",
+    { class: `card stack verdict ${kind}`, "aria-label": "Verdict" },
+    h(
+      "div",
+      { class: "row" },
+      chip(title, kind),
+      h("span", { class: "muted small" }, `version ${state.version} held against recording ${state.recording}`),
+    ),
     fitWarnings({ warnings: state.calibration.warnings?.filter((each) => each.what === "worse") }),
-    h("p", { class: "verdict-statement" }, first), others.map((line) => h("p", { class: "muted" }, line)),
+    h("p", { class: "verdict-statement" }, first),
+    others.map((line) => h("p", { class: "muted" }, line)),
     factList([
-      ["Left after the fit, RMS", number(error.rms_dps), "deg/s", Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null],
+      [
+        "Left after the fit, RMS",
+        number(error.rms_dps),
+        "deg/s",
+        Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null,
+      ],
       ["At unseen temperatures", number(error.heldout_rms_dps), "deg/s"],
       ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s"],
-      noise.vs_datasheet ? ["Drift", number(noise.drift_dps), "deg/s", `${number(noise.vs_datasheet, 2)} times the data sheet's`] : ["Drift", number(noise.drift_dps), "deg/s"],
+      noise.vs_datasheet
+        ? ["Drift", number(noise.drift_dps), "deg/s", `${number(noise.vs_datasheet, 2)} times the data sheet's`]
+        : ["Drift", number(noise.drift_dps), "deg/s"],
       ["Lack of fit", number(criticism.lack_of_fit.statistic), null, chanceText(criticism.lack_of_fit.p_value)],
-    ]));
+    ]),
+  );
 }
 
-const chanceText = (p) => (p === null || p === undefined ? null : p < 1e-6 ? "chance below 10⁻⁶" : `chance ${number(p, 2)}`);
+/** @param {number | null | undefined} p */
+const chanceText = (p) =>
+  p === null || p === undefined ? null : p < 1e-6 ? "chance below 10⁻⁶" : `chance ${number(p, 2)}`;
 
+/**
+ * @param {ExploreState} state
+ * @param {{ onadd: (effect: string) => unknown, explain: (effect: string) => Promise<(number | null)[]> }} acts
+ */
 export function suspectList(state, { onadd, explain }) {
   const { criticism } = state;
   const named = new Set(criticism.named);
-  const drawnNow = h("p", { class: "muted small", "aria-live": "polite" }, "Draw a suspect over the residual to see what it would explain.");
-  const draw = (suspect) => button(state.overlay?.effect === suspect.effect ? "Hide" : "Draw", async () => {
-    if (state.overlay?.effect === suspect.effect) return state.setOverlay(null);
-    const values = await explain(suspect.effect);
-    state.setOverlay({ effect: suspect.effect, name: idText(suspect.effect), values });
-    return setChildren(drawnNow, `Diamonds in the pictures above: what ${idText(suspect.effect)} would explain of the residual.`);
-  }, { kind: "tiny" });
+  const drawnNow = h(
+    "p",
+    { class: "muted small", "aria-live": "polite" },
+    "Draw a suspect over the residual to see what it would explain.",
+  );
+  /** @param {Suspect} suspect */
+  const draw = (suspect) =>
+    button(
+      state.overlay?.effect === suspect.effect ? "Hide" : "Draw",
+      async () => {
+        if (state.overlay?.effect === suspect.effect) return state.setOverlay(null);
+        const values = await explain(suspect.effect);
+        state.setOverlay({ effect: suspect.effect, name: idText(suspect.effect), values });
+        return setChildren(
+          drawnNow,
+          `Diamonds in the pictures above: what ${idText(suspect.effect)} would explain of the residual.`,
+        );
+      },
+      { kind: "tiny" },
+    );
   const speaking = criticism.suspects.filter((s) => s.log_bayes_factor > 0);
   const list = h("ol", { class: "suspects", "aria-label": "Suspects" });
-  const fillList = () => setChildren(list, speaking.map((s) => h("li", { class: "suspect" },
-    h("div", { class: "stack", style: "gap: .3rem" },
-      h("div", { class: "row tight" }, h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, idText(s.effect)), named.has(s.effect) ? chip("named", "warn") : null, s.physical !== false ? null : chip("not physical here")),
-      h("div", { class: "muted small" }, s.explanation),
-      h("div", { class: "row tight" }, button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "primary" : ""}` }), draw(s))),
-    evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
-    evidenceItem("Takes off", h("span", { class: "number" }, percent(s.share_removed)), h("span", { class: "muted small" }, "of the excess")),
-    evidenceItem("Error with it, deg/s", h("span", { class: "number" }, number(s.rms_after_dps)), h("span", { class: "muted small" }, `${number(s.heldout_rms_after_dps)} at unseen temperatures`)),
-    evidenceItem(`Coefficient, k = 2${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`, coefficientText(s, state.axis)))));
+  const fillList = () =>
+    setChildren(
+      list,
+      speaking.map((s) =>
+        h(
+          "li",
+          { class: "suspect" },
+          h(
+            "div",
+            { class: "stack", style: "gap: .3rem" },
+            h(
+              "div",
+              { class: "row tight" },
+              h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, idText(s.effect)),
+              named.has(s.effect) ? chip("named", "warn") : null,
+              s.physical !== false ? null : chip("not physical here"),
+            ),
+            h("div", { class: "muted small" }, s.explanation),
+            h(
+              "div",
+              { class: "row tight" },
+              button("Add", () => onadd(s.effect), { kind: `tiny ${named.has(s.effect) ? "primary" : ""}` }),
+              draw(s),
+            ),
+          ),
+          evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
+          evidenceItem(
+            "Takes off",
+            h("span", { class: "number" }, percent(s.share_removed)),
+            h("span", { class: "muted small" }, "of the excess"),
+          ),
+          evidenceItem(
+            "Error with it, deg/s",
+            h("span", { class: "number" }, number(s.rms_after_dps)),
+            h("span", { class: "muted small" }, `${number(s.heldout_rms_after_dps)} at unseen temperatures`),
+          ),
+          evidenceItem(
+            `Coefficient, k = 2${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
+            coefficientText(s, state.axis),
+          ),
+        ),
+      ),
+    );
   fillList();
   state.onchange((what) => {
     fillList();
-    if (what === "overlay" && !state.overlay) setChildren(drawnNow, "Draw a suspect over the residual to see what it would explain.");
+    if (what === "overlay" && !state.overlay)
+      setChildren(drawnNow, "Draw a suspect over the residual to see what it would explain.");
   });
-  return cardWithHeader("Learn what is missing", null,
-    speaking.length ? [drawnNow, list] : h("p", { class: "muted" }, "No effect of the catalogue speaks for itself here: each would explain less than its coefficients cost."),
-    aliasNotice(criticism), experimentList(criticism), untestableEffects(criticism));
+  return cardWithHeader(
+    "Learn what is missing",
+    null,
+    speaking.length
+      ? [drawnNow, list]
+      : h(
+          "p",
+          { class: "muted" },
+          "No effect of the catalogue speaks for itself here: each would explain less than its coefficients cost.",
+        ),
+    aliasNotice(criticism),
+    experimentList(criticism),
+    untestableEffects(criticism),
+  );
 }
 
-const evidenceItem = (title, ...children) => h("div", { class: "suspect-value" }, h("span", { class: "muted small" }, title), ...children);
+/**
+ * @param {string} title
+ * @param {...Child} children
+ */
+const evidenceItem = (title, ...children) =>
+  h("div", { class: "suspect-value" }, h("span", { class: "muted small" }, title), ...children);
 
+/** @param {number} nats */
 function evidenceMeter(nats) {
   const share = Math.max(0, Math.min(Math.log1p(Math.max(nats, 0)) / Math.log1p(FULL_NATS), 1));
-  return h("div", { class: "evidence" }, h("span", { class: "number" }, `${nats < 1000 ? nats.toFixed(1) : Math.round(nats)} nats`),
-    h("div", { class: "meter", role: "img", "aria-label": `evidence ${nats.toFixed(1)} nats, on a logarithmic scale` }, h("i", { style: `width: ${100 * share}%` })));
+  return h(
+    "div",
+    { class: "evidence" },
+    h("span", { class: "number" }, `${nats < 1000 ? nats.toFixed(1) : Math.round(nats)} nats`),
+    h(
+      "div",
+      { class: "meter", role: "img", "aria-label": `evidence ${nats.toFixed(1)} nats, on a logarithmic scale` },
+      h("i", { style: `width: ${100 * share}%` }),
+    ),
+  );
 }
 
+/**
+ * @param {Suspect} suspect
+ * @param {string} axis
+ */
 function coefficientText(suspect, axis) {
   const own = suspect.coefficients[axis] ?? Object.values(suspect.coefficients)[0] ?? {};
-  return Object.entries(own).map(([name, { value, u, unit }]) =>
-    h("div", { class: "small" }, h("span", { class: "muted" }, idText(name)), " ", unbroken(withUncertainty(value, u === null ? null : 2 * u, unit))))
-    .concat(h("div", { class: "muted small" }, suspect.coefficients_from === "comparison" ? "beside the judged model; no fit with it was made" : "as a version with it would have"));
+  return Object.entries(own)
+    .map(([name, { value, u, unit }]) =>
+      h(
+        "div",
+        { class: "small" },
+        h("span", { class: "muted" }, idText(name)),
+        " ",
+        unbroken(withUncertainty(value, u === null ? null : 2 * u, unit)),
+      ),
+    )
+    .concat(
+      h(
+        "div",
+        { class: "muted small" },
+        suspect.coefficients_from === "comparison"
+          ? "beside the judged model; no fit with it was made"
+          : "as a version with it would have",
+      ),
+    );
 }
 
-/** A value with no line break before its uncertainty and its power of ten; only the unit may wrap. */
+/**
+ * A value with no line break before its uncertainty and its power of ten; only the unit may wrap.
+ * @param {string} text
+ */
 const unbroken = (text) => text.replaceAll(/ ([±×]) /g, "\u00a0$1\u00a0");
 
+/** @param {Criticism} criticism */
 function aliasNotice(criticism) {
-  const group = criticism.suspects.find((s) => s.alias_group.length > 1 && criticism.named.includes(s.effect))?.alias_group;
+  const group = criticism.suspects.find(
+    (s) => s.alias_group.length > 1 && criticism.named.includes(s.effect),
+  )?.alias_group;
   if (!group || criticism.verdict !== "ambiguous") return null;
-  return notice("warn", h("p", {}, h("strong", {}, "This recording cannot tell them apart: "), group.map(idText).join(", "), "."), h("p", {}, "Adding one of them lowers the error whichever is true; only another experiment says which."));
+  return notice(
+    "warn",
+    h("p", {}, h("strong", {}, "This recording cannot tell them apart: "), group.map(idText).join(", "), "."),
+    h("p", {}, "Adding one of them lowers the error whichever is true; only another experiment says which."),
+  );
 }
 
+/** @param {Criticism} criticism */
 function experimentList(criticism) {
   if (!criticism.experiments.length) return null;
-  return h("div", { class: "stack" }, h("h3", {}, "The experiment that would tell"), criticism.experiments.slice(0, 3).map((each) =>
-    h("div", { class: "notice" }, h("p", {}, each.do, each.hours ? ` (${number(each.hours, 2)} h)` : ""),
-      h("p", { class: "muted small" }, `Separates ${each.separates.map(idText).join(", ")} with a probability of ${percent(each.power)}.`),
-      each.toml ? h("a", { class: "button tiny", href: `/campaigns/new?toml=${encodeURIComponent(each.toml)}` }, "Plan it") : null)));
+  return h(
+    "div",
+    { class: "stack" },
+    h("h3", {}, "The experiment that would tell"),
+    criticism.experiments
+      .slice(0, 3)
+      .map((each) =>
+        h(
+          "div",
+          { class: "notice" },
+          h("p", {}, each.do, each.hours ? ` (${number(each.hours, 2)} h)` : ""),
+          h(
+            "p",
+            { class: "muted small" },
+            `Separates ${each.separates.map(idText).join(", ")} with a probability of ${percent(each.power)}.`,
+          ),
+          each.toml
+            ? h("a", { class: "button tiny", href: `/campaigns/new?toml=${encodeURIComponent(each.toml)}` }, "Plan it")
+            : null,
+        ),
+      ),
+  );
 }
 
+/** @param {Criticism} criticism */
 function untestableEffects(criticism) {
   if (!criticism.not_testable.length) return null;
-  const why = (line) => (line.why === "channel" ? `not recorded: ${line.needs.map(idText).join(", ")}` : "this schedule hides it");
-  return h("details", {}, h("summary", {}, `What this recording cannot say anything about (${criticism.not_testable.length})`),
-    h("ul", { class: "two-columns" }, criticism.not_testable.map((line) => h("li", {}, h("a", { href: `/effects/${line.effect}` }, idText(line.effect)), h("span", { class: "muted small" }, ` ${why(line)}`)))));
+  /** @param {Criticism["not_testable"][number]} line */
+  const why = (line) =>
+    line.why === "channel" ? `not recorded: ${line.needs.map(idText).join(", ")}` : "this schedule hides it";
+  return h(
+    "details",
+    {},
+    h("summary", {}, `What this recording cannot say anything about (${criticism.not_testable.length})`),
+    h(
+      "ul",
+      { class: "two-columns" },
+      criticism.not_testable.map((line) =>
+        h(
+          "li",
+          {},
+          h("a", { href: `/effects/${line.effect}` }, idText(line.effect)),
+          h("span", { class: "muted small" }, ` ${why(line)}`),
+        ),
+      ),
+    ),
+  );
 }

@@ -1,9 +1,10 @@
 // The bench page: the running campaign, or what ran last and what comes next.
 
-import { get, Problem } from "../core/api.js";
+import { get } from "../core/http/api.js";
+import { Problem } from "../core/http/errors.js";
 import { h } from "../core/elements.js";
 import { chip, pageHeader, notice } from "../core/components.js";
-import { setTrouble } from "../core/freshness.js";
+import { setTrouble } from "../core/freshness/line.js";
 import { show } from "../core/router.js";
 import { clearButton } from "../bench/actions.js";
 import { campaignInstant } from "../campaigns/campaign_time.js";
@@ -11,32 +12,78 @@ import { idleBench, noBenchCard } from "../bench/idle_bench.js";
 import { runningCampaign } from "../bench/running_campaign.js";
 import { canResume, isRunning } from "../campaigns/states.js";
 
+/** @import { BenchStatus } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
 const POLL_MS = 5000;
 const AFTER_END_MS = 1500;
 
+/** @param {PageContext} context */
 export async function page({ signal }) {
-  const [benches, states, campaigns, schedule] = await Promise.all(["/api/benches", "/api/benches/status", "/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })));
+  const [benches, states, campaigns, schedule] = await Promise.all([
+    get("/api/benches", { signal }),
+    get("/api/benches/status", { signal }),
+    get("/api/campaigns", { signal }),
+    get("/api/schedule", { signal }),
+  ]);
   const bench = benches[0];
   if (!bench) return h("div", { class: "page" }, pageHeader("Bench"), noBenchCard());
-  const now = campaigns.find((campaign) => campaign.id === bench.campaign) ?? campaigns.find((campaign) => campaign.bench === bench.name && isRunning(campaign));
+  const now =
+    campaigns.find((campaign) => campaign.id === bench.campaign) ??
+    campaigns.find((campaign) => campaign.bench === bench.name && isRunning(campaign));
+  /** @param {{ serial: string }} each */
   const unit = (each) => h("a", { href: `/units/${encodeURIComponent(each.serial)}` }, each.serial);
-  const element = h("div", { class: "page bench" },
-    pageHeader("Bench", h("span", { class: "row" }, h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null, h("span", {}, "with ", bench.units.flatMap((each, k) => (k ? [", ", unit(each)] : [unit(each)]))), now ? h("span", {}, "runs ", h("a", { href: `/campaigns/${now.id}` }, `campaign ${now.id}`), `, ${now.recipe}`) : null)));
+  const element = h(
+    "div",
+    { class: "page bench" },
+    pageHeader(
+      "Bench",
+      h(
+        "span",
+        { class: "row" },
+        h("strong", {}, bench.name),
+        bench.simulated ? chip("simulated", "accent") : null,
+        h(
+          "span",
+          {},
+          "with ",
+          bench.units.flatMap((each, k) => (k ? [", ", unit(each)] : [unit(each)])),
+        ),
+        now
+          ? h("span", {}, "runs ", h("a", { href: `/campaigns/${now.id}` }, `campaign ${now.id}`), `, ${now.recipe}`)
+          : null,
+      ),
+    ),
+  );
   const unsafe = states.filter((each) => each.unconfirmed);
   for (const each of unsafe) element.append(unconfirmedNotice(each, each.name === bench.name && bench.simulated));
   if (now) {
-    const plan = await get(`/api/campaigns/${now.id}/plan`, { signal });
-    element.append(...runningCampaign(now, plan, { signal, over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS) }));
+    const plan = await get("/api/campaigns/{campaign}/plan", { path: { campaign: now.id }, signal });
+    element.append(
+      ...runningCampaign(now, plan, { signal, over: () => setTimeout(() => signal.aborted || show(), AFTER_END_MS) }),
+    );
   } else {
     const last = campaigns.find((campaign) => campaign.bench === bench.name);
-    const whole = last && canResume(last) ? await get(`/api/campaigns/${last.id}`, { signal }) : last;
-    element.append(idleBench(bench, whole, schedule.find((each) => each.bench === bench.name)));
+    const whole =
+      last && canResume(last) ? await get("/api/campaigns/{campaign}", { path: { campaign: last.id }, signal }) : last;
+    element.append(
+      idleBench(
+        bench,
+        whole,
+        schedule.find((each) => each.bench === bench.name),
+      ),
+    );
     watchForChange(Boolean(bench.unconfirmed), signal);
   }
   return element;
 }
 
-/** While no campaign runs, poll for one that the schedule or another person has started, and for the safe state. */
+/**
+ * While no campaign runs, poll for one that the schedule or another person has started, and for the safe state.
+ * @param {boolean} unconfirmed
+ * @param {AbortSignal} signal
+ */
 function watchForChange(unconfirmed, signal) {
   const looking = setInterval(async () => {
     try {
@@ -51,9 +98,28 @@ function watchForChange(unconfirmed, signal) {
   window.addEventListener("labctl:fresh", show, { signal });
 }
 
+/**
+ * @param {BenchStatus} bench
+ * @param {boolean} simulated_time
+ */
 function unconfirmedNotice(bench, simulated_time) {
-  return notice("bad", h("p", { class: "lead" }, `Bench ${bench.name} was not confirmed safe`),
-    h("p", {}, `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`),
-    bench.attempts ? h("p", {}, bench.confirmed_at ? `labctl confirmed the safe state at ${campaignInstant({ simulated_time }, bench.confirmed_at)}, at attempt ${bench.attempts}. Look all the same before you clear it.` : `The safe state was tried again ${bench.attempts} times, last at ${campaignInstant({ simulated_time }, bench.attempted_at)}; it is tried every 30 s.`) : null,
-    h("div", { class: "row" }, clearButton(bench.name, show)));
+  return notice(
+    "bad",
+    h("p", { class: "lead" }, `Bench ${bench.name} was not confirmed safe`),
+    h(
+      "p",
+      {},
+      `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`,
+    ),
+    bench.attempts
+      ? h(
+          "p",
+          {},
+          bench.confirmed_at
+            ? `labctl confirmed the safe state at ${campaignInstant({ simulated_time }, bench.confirmed_at)}, at attempt ${bench.attempts}. Look all the same before you clear it.`
+            : `The safe state was tried again ${bench.attempts} times, last at ${campaignInstant({ simulated_time }, bench.attempted_at)}; it is tried every 30 s.`,
+        )
+      : null,
+    h("div", { class: "row" }, clearButton(bench.name, show)),
+  );
 }

@@ -1,35 +1,62 @@
 // The page of one campaign: its plan and progress, its events, and why it ended.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, percent } from "../core/format.js";
-import { card, chip, factList, pageHeader, cardWithHeader, notice, toggleGroup } from "../core/components.js";
+import { card, chip, factList, pageHeader, cardWithHeader, notice } from "../core/components.js";
+import { toggleGroup } from "../core/fields.js";
 import { navigate, updateQuery, show as showAgain } from "../core/router.js";
 import { linkButton, resumeControl, stopButton } from "../bench/actions.js";
 import { eventList } from "../bench/event_list.js";
-import { FINAL_STATES, followCampaign } from "../bench/campaign_stream.js";
+import { followCampaign } from "../bench/campaign_stream.js";
 import { remainingSeconds } from "../bench/campaign_history.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { adviceNotice } from "../campaigns/advice.js";
 import { campaignDuration, campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
-import { isRunning, stateChip } from "../campaigns/states.js";
+import { hasEnded, isRunning, stateKind } from "../campaigns/states.js";
+import { stateChip } from "../campaigns/state_chip.js";
 
-const LEVELS = [["info", "all"], ["warning", "warnings and errors"], ["error", "errors"]];
+/** @import { Campaign, CampaignPlan } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @type {[level: string, text: string][]} */
+const LEVELS = [
+  ["info", "all"],
+  ["warning", "warnings and errors"],
+  ["error", "errors"],
+];
 const MAX_EVENTS = 200;
 const PLAN_REFRESH_MS = 2500;
 
+/** @param {PageContext} context */
 export async function page({ params, query, signal }) {
-  const path = `/api/campaigns/${encodeURIComponent(params.id)}`;
-  let [now, plan, benches] = await Promise.all([get(path, { signal }), get(`${path}/plan`, { signal }), get("/api/benches", { signal })]);
+  const path = { campaign: params.id };
+  const answers = await Promise.all([
+    get("/api/campaigns/{campaign}", { path, signal }),
+    get("/api/campaigns/{campaign}/plan", { path, signal }),
+    get("/api/benches", { signal }),
+  ]);
+  let [now, plan] = answers;
+  const benches = answers[2];
   const here = benches[0]?.name === now.bench;
-  const level = LEVELS.some(([each]) => each === query.level) ? query.level : "info";
+  const level = LEVELS.find(([each]) => each === query.level)?.[0] ?? "info";
   const events = eventList(MAX_EVENTS, level, now);
   const [about, reason, connection] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
-  const picture = planChart(`Campaign ${now.id} plan`, () => ({ timeline: plan.timeline, now_s: isRunning(now) ? now.t_s : null, live: true }), { pick: (dataset) => Object.values(now.recordings)[0] && navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`) });
+  const picture = planChart(
+    `Campaign ${now.id} plan`,
+    () => ({ timeline: plan.timeline, now_s: isRunning(now) ? now.t_s : null, live: true }),
+    {
+      pick: (dataset) =>
+        Object.values(now.recordings)[0] &&
+        navigate(`/recordings/${Object.values(now.recordings)[0]}?dataset=${dataset}`),
+    },
+  );
   let asked = Date.now();
 
+  /** @param {Campaign} next */
   function show(next) {
-    const ended = FINAL_STATES.has(next.state) && !FINAL_STATES.has(now.state);
+    const ended = hasEnded(next) && !hasEnded(now);
     now = next;
     setChildren(about, summary(now, plan));
     setChildren(reason, reasonNotices(now));
@@ -38,58 +65,160 @@ export async function page({ params, query, signal }) {
   }
   async function again() {
     asked = Date.now();
-    plan = await get(`${path}/plan`, { signal }).catch(() => plan);
+    plan = await get("/api/campaigns/{campaign}/plan", { path, signal }).catch(() => plan);
     picture.redraw();
   }
   show(now);
-  followCampaign(now.id, {
-    progress: show,
-    event: (event) => events.add(event),
-    link: ({ stale, since, why }) => setChildren(connection, stale ? notice("bad", h("strong", {}, `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `), `${why}. Trying again.`) : null),
-  }, signal);
+  followCampaign(
+    now.id,
+    {
+      progress: show,
+      event: (event) => events.add(event),
+      link: ({ stale, since, why }) =>
+        setChildren(
+          connection,
+          stale
+            ? notice(
+                "bad",
+                h(
+                  "strong",
+                  {},
+                  `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `,
+                ),
+                `${why}. Trying again.`,
+              )
+            : null,
+        ),
+    },
+    signal,
+  );
 
-  const acts = isRunning(now) ? [linkButton("To the bench", "/bench"), here ? stopButton(now.id) : null] : endedActions(now, plan, here);
-  return h("div", { class: "page" },
-    pageHeader(`Campaign ${now.id}`, h("span", {}, h("strong", {}, now.recipe), ` on bench ${now.bench}`), ...acts.filter(Boolean)),
-    connection, reason, about,
+  const acts = isRunning(now)
+    ? [linkButton("To the bench", "/bench"), here ? stopButton(now.id) : null]
+    : endedActions(now, plan, here);
+  return h(
+    "div",
+    { class: "page" },
+    pageHeader(
+      `Campaign ${now.id}`,
+      h("span", {}, h("strong", {}, now.recipe), ` on bench ${now.bench}`),
+      ...acts.filter(Boolean),
+    ),
+    connection,
+    reason,
+    about,
     cardWithHeader("Plan", h("span", { class: "muted small" }, "A press on a data set opens its readings."), picture),
     recordingsCard(now),
-    Object.assign(cardWithHeader("Events", toggleGroup("Events to show", LEVELS, level, (value) => {
-      updateQuery({ level: value === "info" ? null : value });
-      events.from(value);
-    }), events), { id: "events" }));
+    Object.assign(
+      cardWithHeader(
+        "Events",
+        toggleGroup("Events to show", LEVELS, level, (value) => {
+          updateQuery({ level: value === "info" ? null : value });
+          events.from(value);
+        }),
+        events,
+      ),
+      { id: "events" },
+    ),
+  );
 }
 
-/** Resume comes first only where it would be accepted and nothing speaks against it. */
+/**
+ * Resume comes first only where it would be accepted and nothing speaks against it.
+ * @param {Campaign} now
+ * @param {CampaignPlan} plan
+ * @param {boolean} here
+ */
 function endedActions(now, plan, here) {
-  const again = linkButton("Plan the same again", `/campaigns/new?${plan.text ? `toml=${encodeURIComponent(plan.text)}` : `recipe=${encodeURIComponent(now.recipe)}`}`);
+  const again = linkButton(
+    "Plan the same again",
+    `/campaigns/new?${plan.text ? `toml=${encodeURIComponent(plan.text)}` : `recipe=${encodeURIComponent(now.recipe)}`}`,
+  );
   const resume = here ? resumeControl(now) : [];
   return now.resumable && !now.resume_reason ? [...resume, again] : [again, ...resume];
 }
 
+/**
+ * @param {Campaign} now
+ * @param {CampaignPlan} plan
+ */
 function summary(now, plan) {
-  const states = plan.timeline.dataset.map((dataset, k) => (dataset === null ? null : plan.timeline.state[k])).filter(Boolean);
+  const states = plan.timeline.dataset
+    .map((dataset, k) => (dataset === null ? null : plan.timeline.state?.[k]))
+    .filter(Boolean);
   const done = states.filter((state) => state === "done").length;
-  return h("div", { class: "card" }, factList([
-    ["State", stateChip(now), "", percent(now.progress)],
-    ["Data sets", `${count(done)} of ${count(states.length)}`, "", `step ${now.step ?? "–"} of ${now.steps}`],
-    ["Begun", campaignInstant(now, now.started_at)],
-    isRunning(now) ? ["Expected end", campaignInstant(now, now.expected_end), "", `${campaignDuration(now, remainingSeconds(now, plan.expected_s))} left`] : ["Ended", campaignInstant(now, now.ended_at), "", durationTaken(now)],
-    ["Expected", campaignDuration(now, plan.expected_s), "", "as planned, without interruptions"],
-  ]));
+  return h(
+    "div",
+    { class: "card" },
+    factList([
+      ["State", stateChip(now), "", percent(now.progress)],
+      ["Data sets", `${count(done)} of ${count(states.length)}`, "", `step ${now.step ?? "–"} of ${now.steps}`],
+      ["Begun", campaignInstant(now, now.started_at)],
+      isRunning(now)
+        ? [
+            "Expected end",
+            campaignInstant(now, now.expected_end),
+            "",
+            `${campaignDuration(now, remainingSeconds(now, plan.expected_s))} left`,
+          ]
+        : ["Ended", campaignInstant(now, now.ended_at), "", durationTaken(now)],
+      ["Expected", campaignDuration(now, plan.expected_s), "", "as planned, without interruptions"],
+    ]),
+  );
 }
 
-/** The reason of the present state, as the service gives it. */
+/**
+ * The reason of the present state, as the service gives it.
+ * @param {Campaign} now
+ */
 function reasonNotices(now) {
-  const kind = { done: "good", failed: "bad", aborted: "bad" }[now.state] ?? "warn";
-  return [isRunning(now) && now.state === "running" ? null : adviceNotice(now) ?? notice(kind, h("p", { class: "lead" }, now.reason || `It is ${now.state}.`), now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null),
-    ...Object.entries(now.dropped).map(([unit, why]) => notice("warn", h("strong", {}, unit), ` took no further part: ${why}`))].filter(Boolean);
+  const kind = stateKind(now);
+  return [
+    isRunning(now) && now.state === "running"
+      ? null
+      : (adviceNotice(now) ??
+        notice(
+          kind,
+          h("p", { class: "lead" }, now.reason || `It is ${now.state}.`),
+          now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null,
+        )),
+    ...Object.entries(now.dropped).map(([unit, why]) =>
+      notice("warn", h("strong", {}, unit), ` took no further part: ${why}`),
+    ),
+  ].filter(Boolean);
 }
 
+/** @param {Campaign} now */
 function recordingsCard(now) {
   const rows = Object.entries(now.recordings);
   if (!rows.length) return card("Units and recordings", h("p", { class: "muted" }, "Nothing was recorded."));
-  return card("Units and recordings", h("ul", { class: "plain" }, rows.map(([serial, recording]) => h("li", { class: "row space-between" },
-    h("span", { class: "row" }, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), now.dropped[serial] ? chip("dropped", "warn") : null),
-    h("span", { class: "row" }, linkButton(`Recording ${recording}`, `/recordings/${recording}`, "tiny"), linkButton("Fit and explore", `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`, "tiny primary"))))));
+  return card(
+    "Units and recordings",
+    h(
+      "ul",
+      { class: "plain" },
+      rows.map(([serial, recording]) =>
+        h(
+          "li",
+          { class: "row space-between" },
+          h(
+            "span",
+            { class: "row" },
+            h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial),
+            now.dropped[serial] ? chip("dropped", "warn") : null,
+          ),
+          h(
+            "span",
+            { class: "row" },
+            linkButton(`Recording ${recording}`, `/recordings/${recording}`, "tiny"),
+            linkButton(
+              "Fit and explore",
+              `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`,
+              "tiny primary",
+            ),
+          ),
+        ),
+      ),
+    ),
+  );
 }

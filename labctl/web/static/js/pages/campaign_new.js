@@ -1,6 +1,7 @@
 // The page that plans a campaign: recipe, plan, visibility of effects, start.
 
-import { get, post } from "../core/api.js";
+import { get, post } from "../core/http/api.js";
+import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, duration } from "../core/format.js";
 import { busyIndicator, card, chip, factList, pageHeader, notice } from "../core/components.js";
@@ -13,17 +14,34 @@ import { planChart } from "../campaigns/plan_chart.js";
 import { recipeChoice } from "../campaigns/recipe_choice.js";
 import { visibilityReport } from "../campaigns/visibility.js";
 
+/** @import { Bench, Plan, Recipe } from "../../../types/api.js" */
+/** @import { Choice } from "../campaigns/recipe_choice.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @param {PageContext} context */
 export async function page({ query, signal }) {
-  const [all, benches, catalogue] = await Promise.all(["/api/recipes", "/api/benches", "/api/effects"].map((path) => get(path, { signal })));
+  const [all, benches, catalogue] = await Promise.all([
+    get("/api/recipes", { signal }),
+    get("/api/benches", { signal }),
+    get("/api/effects", { signal }),
+  ]);
   const bench = benches[0] ?? null;
   const named = all.find((each) => each.name === query.recipe) ?? shortestRecipe(all);
   // the user's own recipe is in the address too, so that the plan has a link
+  /** @type {Choice} */
   const choice = query.toml ? { name: "own", text: query.toml } : { name: named.name, text: null };
-  let [clip, hide, asked] = [query.clip === "1", [], new AbortController()];
+  let [clip, asked] = [query.clip === "1", new AbortController()];
+  /** @type {string[]} */
+  let hide = [];
   const [planned, found] = [h("div", { "aria-live": "polite" }), h("div", { class: "stack" })];
   const simulated = !bench || bench.simulated;
-  const hider = simulated ? hiddenEffectForm(catalogue.effects, query.hide, (list) => { hide = list; }) : null;
-  const source = () => (choice.name === "own" ? `${choice.text.trimEnd()}\n` : choice.name);
+  const hider = simulated
+    ? hiddenEffectForm(catalogue.effects, query.hide, (list) => {
+        hide = list;
+      })
+    : null;
+  const source = () => (choice.name === "own" ? `${(choice.text ?? "").trimEnd()}\n` : choice.name);
 
   async function plan() {
     asked.abort();
@@ -31,66 +49,145 @@ export async function page({ query, signal }) {
     const given = AbortSignal.any([signal, asked.signal]);
     setChildren(found, busyIndicator("Working out what it could find; for a long plan that takes some seconds."));
     try {
-      const answer = await post("/api/plans", { recipe: source(), clip }, { signal: given });
+      const answer = await post("/api/plans", { body: { recipe: source(), clip }, signal: given });
       setChildren(planned, planCard(answer, bench));
       starting.look();
     } catch (error) {
-      if (error.name === "AbortError") return;
+      if (isAbort(error)) return;
       setChildren(planned, refusalCard(error));
       setChildren(found, h("p", { class: "muted" }, "There is no plan to look at."));
       return;
     }
     try {
-      const answer = await post("/api/plans", { recipe: source(), clip, visibility: true }, { signal: given });
-      setChildren(found, visibilityReport(answer.visibility));
-      hider?.sizes(answer.visibility);
+      const answer = await post("/api/plans", { body: { recipe: source(), clip, visibility: true }, signal: given });
+      const visibility = answer.visibility ?? [];
+      setChildren(found, visibilityReport(visibility));
+      hider?.sizes(visibility);
     } catch (error) {
-      if (error.name !== "AbortError") setChildren(found, notice("", error.message));
+      if (!isAbort(error)) setChildren(found, notice("", messageOf(error)));
     }
   }
-  const clipping = h("label", { class: "row tight" }, h("input", { type: "checkbox", checked: clip, onchange: (event) => {
-    clip = event.target.checked;
-    updateQuery({ clip: clip ? 1 : null });
-    plan();
-  } }), h("span", {}, "Leave out what the bench or the unit cannot do"));
+  /** @type {HTMLInputElement} */
+  const clipBox = h("input", {
+    type: "checkbox",
+    checked: clip,
+    onchange: () => {
+      clip = clipBox.checked;
+      updateQuery({ clip: clip ? 1 : null });
+      plan();
+    },
+  });
+  const clipping = h(
+    "label",
+    { class: "row tight" },
+    clipBox,
+    h("span", {}, "Leave out what the bench or the unit cannot do"),
+  );
   const starting = startForm(bench, () => ({ recipe: source(), clip, hide }));
   plan();
-  return h("div", { class: "page" },
-    pageHeader("Plan a campaign", bench ? h("span", { class: "row" }, "On bench ", h("strong", {}, bench.name), bench.simulated ? chip("simulated", "accent") : null) : "For the simulated bench that fits the recipe best.",
-      h("a", { class: "button primary", href: "#begin" }, "Begin …")),
-    query.recipe && named.name !== query.recipe && !query.toml ? notice("warn", `No recipe ${query.recipe} comes with labctl; ${named.name} is shown. Its text can be pasted under "Your own".`) : null,
-    h("div", { class: "planning" },
-      h("div", { class: "stack" }, recipeChoice(all, choice, (next) => {
-        Object.assign(choice, next);
-        updateQuery({ recipe: next.name === "own" ? null : next.name, toml: next.name === "own" ? next.text : null });
-        plan();
-      }), h("div", { class: "card" }, clipping)),
-      h("div", { class: "page" }, planned,
+  return h(
+    "div",
+    { class: "page" },
+    pageHeader(
+      "Plan a campaign",
+      bench
+        ? h(
+            "span",
+            { class: "row" },
+            "On bench ",
+            h("strong", {}, bench.name),
+            bench.simulated ? chip("simulated", "accent") : null,
+          )
+        : "For the simulated bench that fits the recipe best.",
+      h("a", { class: "button primary", href: "#begin" }, "Begin …"),
+    ),
+    query.recipe && named.name !== query.recipe && !query.toml
+      ? notice(
+          "warn",
+          `No recipe ${query.recipe} comes with labctl; ${named.name} is shown. Its text can be pasted under "Your own".`,
+        )
+      : null,
+    h(
+      "div",
+      { class: "planning" },
+      h(
+        "div",
+        { class: "stack" },
+        recipeChoice(all, choice, (next) => {
+          Object.assign(choice, next);
+          updateQuery({ recipe: next.name === "own" ? null : next.name, toml: next.name === "own" ? next.text : null });
+          plan();
+        }),
+        h("div", { class: "card" }, clipping),
+      ),
+      h(
+        "div",
+        { class: "page" },
+        planned,
         card("What it could find", found),
-        hider ? card("Hide an effect", h("p", { class: "muted" }, "The simulated unit then has it, and nothing tells: a case to practise on."), hider) : null,
-        starting)));
+        hider
+          ? card(
+              "Hide an effect",
+              h("p", { class: "muted" }, "The simulated unit then has it, and nothing tells: a case to practise on."),
+              hider,
+            )
+          : null,
+        starting,
+      ),
+    ),
+  );
 }
 
-/** The shortest campaign that the bench can run. */
+/**
+ * The shortest campaign that the bench can run.
+ * @param {readonly Recipe[]} all
+ */
 function shortestRecipe(all) {
   const able = all.filter((each) => !each.refused && !each.remark);
-  return able.sort((a, b) => a.expected_s - b.expected_s)[0] ?? all[0];
+  return able.sort((a, b) => (a.expected_s ?? 0) - (b.expected_s ?? 0))[0] ?? all[0];
 }
 
+/**
+ * @param {Plan} answer
+ * @param {Bench | null} bench
+ */
 function planCard(answer, bench) {
   const ends = new Date(Date.now() + 1000 * answer.expected_s);
   const simulated = !bench || bench.simulated;
   const clock = simulated ? SIMULATED : "on the bench's own clock";
-  return card("What it would do",
+  return card(
+    "What it would do",
     factList([
       ["Data sets", count(answer.datasets), "", `in ${count(answer.steps)} steps`],
       ["Expected time", duration(answer.expected_s), "", clock],
-      ["Begun now it ends", ends.toLocaleString("en-GB", { weekday: "short", hour: "2-digit", minute: "2-digit" }), "", `${ends.toLocaleDateString("en-GB", { day: "numeric", month: "short" })}${simulated ? `, ${SIMULATED}` : ""}`],
+      [
+        "Begun now it ends",
+        ends.toLocaleString("en-GB", { weekday: "short", hour: "2-digit", minute: "2-digit" }),
+        "",
+        `${ends.toLocaleDateString("en-GB", { day: "numeric", month: "short" })}${simulated ? `, ${SIMULATED}` : ""}`,
+      ],
       answer.bench === bench?.name ? null : ["Bench", answer.bench],
     ]),
     attendanceNotice(answer.attendance),
     planChart(`Plan of ${answer.recipe}`, () => ({ timeline: answer.timeline })),
-    answer.clipped.length ? notice("warn", h("strong", {}, `${answer.clipped.length} points are left out`), h("details", {}, h("summary", {}, "Which, and why"), h("ul", {}, answer.clipped.map((each) => h("li", { class: "small" }, each))))) : null);
+    answer.clipped.length
+      ? notice(
+          "warn",
+          h("strong", {}, `${answer.clipped.length} points are left out`),
+          h(
+            "details",
+            {},
+            h("summary", {}, "Which, and why"),
+            h(
+              "ul",
+              {},
+              answer.clipped.map((each) => h("li", { class: "small" }, each)),
+            ),
+          ),
+        )
+      : null,
+  );
 }
 
-const refusalCard = (error) => card("It cannot be done so", notice("bad", h("p", { class: "lead" }, error.message)));
+/** @param {unknown} error */
+const refusalCard = (error) => card("It cannot be done so", notice("bad", h("p", { class: "lead" }, messageOf(error))));

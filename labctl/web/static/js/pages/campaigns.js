@@ -1,25 +1,44 @@
 // The page of all campaigns and of the schedule.
 
-import { get, Problem, remove } from "../core/api.js";
+import { get, remove } from "../core/http/api.js";
+import { Problem } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
 import { button, card, chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
-import { setTrouble } from "../core/freshness.js";
+import { setTrouble } from "../core/freshness/line.js";
 import { linkButton } from "../bench/actions.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
 import { campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
-import { isRunning, stateChip } from "../campaigns/states.js";
+import { isRunning } from "../campaigns/states.js";
+import { stateChip } from "../campaigns/state_chip.js";
 import { startTime } from "../campaigns/start_time.js";
+
+/** @import { Campaign, Scheduled, StartEvent } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
 
 const POLL_MS = 4000;
 
+/** @param {PageContext} context */
 export async function page({ signal }) {
   const place = h("div", { class: "page" });
-  const ask = () => Promise.all(["/api/campaigns", "/api/schedule"].map((path) => get(path, { signal })));
+  const ask = () => Promise.all([get("/api/campaigns", { signal }), get("/api/schedule", { signal })]);
   async function show() {
     const [campaigns, schedule] = await ask();
-    setChildren(place, schedule.length ? scheduleCard(schedule, show) : null,
-      cardWithHeader(campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`, null, campaigns.length ? campaignTable(campaigns) : emptyState(h("p", {}, "No campaign has been run yet."), h("p", {}, linkButton("Plan the first", "/campaigns/new", "primary")))));
+    setChildren(
+      place,
+      schedule.length ? scheduleCard(schedule, show) : null,
+      cardWithHeader(
+        campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`,
+        null,
+        campaigns.length
+          ? campaignTable(campaigns)
+          : emptyState(
+              h("p", {}, "No campaign has been run yet."),
+              h("p", {}, linkButton("Plan the first", "/campaigns/new", "primary")),
+            ),
+      ),
+    );
     return campaigns.some(isRunning);
   }
   let moving = await show();
@@ -34,34 +53,154 @@ export async function page({ signal }) {
   }, POLL_MS);
   signal.addEventListener("abort", () => clearInterval(looking));
   window.addEventListener("labctl:fresh", () => show().catch(() => {}), { signal });
-  return h("div", { class: "page" }, pageHeader("Campaigns", "One run of a recipe on a bench.", linkButton("Plan a campaign", "/campaigns/new", "primary")), place);
+  return h(
+    "div",
+    { class: "page" },
+    pageHeader(
+      "Campaigns",
+      "One run of a recipe on a bench.",
+      linkButton("Plan a campaign", "/campaigns/new", "primary"),
+    ),
+    place,
+  );
 }
 
+/** @param {readonly Campaign[]} rows */
 function campaignTable(rows) {
-  return table([
-    { title: "Campaign", cell: (row) => [h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`), h("span", { class: "muted small secondary" }, `${row.recipe} on ${row.bench}`)] },
-    { title: "State", cell: (row) => [stateChip(row), row.state !== "done" && row.state !== "running" && row.reason ? h("span", { class: "muted small secondary two-lines", title: row.reason }, row.reason) : null] },
-    { title: "Progress", cell: (row) => h("div", { class: "progress-cell" }, h("div", { class: "meter", role: "img", "aria-label": percent(row.progress) }, h("i", { style: `width: ${100 * row.progress}%` })), h("span", { class: "small" }, percent(row.progress))) },
-    { title: "Begun", cell: (row) => [h("span", { class: "nowrap" }, campaignInstant(row, row.started_at)), h("span", { class: "muted small secondary nowrap" }, isRunning(row) ? `ends ${campaignInstant(row, row.expected_end)}` : durationTaken(row))] },
-    { title: "Units and recordings", cell: (row) => Object.entries(row.recordings).map(([serial, recording]) => h("div", {}, h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial), h("span", { class: "small secondary" }, h("a", { href: `/recordings/${recording}` }, `Recording ${recording}`)))) },
-  ], rows, { label: "Every campaign", first: "8rem" });
+  return table(
+    [
+      {
+        title: "Campaign",
+        cell: (row) => [
+          h("a", { href: `/campaigns/${row.id}`, class: "nowrap" }, `Campaign ${row.id}`),
+          h("span", { class: "muted small secondary" }, `${row.recipe} on ${row.bench}`),
+        ],
+      },
+      {
+        title: "State",
+        cell: (row) => [
+          stateChip(row),
+          row.state !== "done" && row.state !== "running" && row.reason
+            ? h("span", { class: "muted small secondary two-lines", title: row.reason }, row.reason)
+            : null,
+        ],
+      },
+      {
+        title: "Progress",
+        cell: (row) =>
+          h(
+            "div",
+            { class: "progress-cell" },
+            h(
+              "div",
+              { class: "meter", role: "img", "aria-label": percent(row.progress) },
+              h("i", { style: `width: ${100 * row.progress}%` }),
+            ),
+            h("span", { class: "small" }, percent(row.progress)),
+          ),
+      },
+      {
+        title: "Begun",
+        cell: (row) => [
+          h("span", { class: "nowrap" }, campaignInstant(row, row.started_at)),
+          h(
+            "span",
+            { class: "muted small secondary nowrap" },
+            isRunning(row) ? `ends ${campaignInstant(row, row.expected_end)}` : durationTaken(row),
+          ),
+        ],
+      },
+      {
+        title: "Units and recordings",
+        cell: (row) =>
+          Object.entries(row.recordings).map(([serial, recording]) =>
+            h(
+              "div",
+              {},
+              h("a", { href: `/units/${encodeURIComponent(serial)}` }, serial),
+              h(
+                "span",
+                { class: "small secondary" },
+                h("a", { href: `/recordings/${recording}` }, `Recording ${recording}`),
+              ),
+            ),
+          ),
+      },
+    ],
+    rows,
+    { label: "Every campaign", first: "8rem" },
+  );
 }
 
 const OUTCOMES = { started: "good", refused: "bad", missed: "warn", claimed: "accent" };
 
+/**
+ * @param {readonly Scheduled[]} rows
+ * @param {() => unknown} again
+ */
 function scheduleCard(rows, again) {
-  const came = (event) => h("span", { class: "small secondary" }, chip(event.outcome, OUTCOMES[event.outcome] ?? ""), ` ${instant(event.at)} `, event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message);
-  return card("Schedule", table([
-    { title: "Begins", cell: (row) => [startTime(row), row.confirmed_by ? h("span", { class: "muted small secondary" }, `${row.confirmed_by} makes sure that the bench is clear`) : null] },
-    ...(rows.some((row) => row.attendance) ? [{ title: "Needs a person", prose: true, cell: (row) => (row.attendance ? attendanceNotice(row.attendance) : h("span", { class: "muted" }, "no")) }] : []),
-    { title: "Recipe", cell: (row) => [row.recipe, row.clip ? h("span", { class: "muted small secondary" }, "without what the bench cannot do") : null] },
-    { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
-    { title: "Priority", number: true, cell: (row) => row.priority },
-    { title: "May be late by", number: true, cell: (row) => (row.late_limit_s === null ? "any time" : duration(row.late_limit_s)) },
-    { title: "Before", cell: (row) => (row.history.length ? row.history.slice(-2).map(came) : h("span", { class: "muted" }, "–")) },
-    { title: h("span", { class: "visually-hidden" }, "Cancel"), cell: (row) => button("Cancel", async () => {
-      await remove(`/api/schedule/${row.id}`);
-      await again();
-    }, { kind: "tiny", done: "Taken out of the schedule." }) },
-  ], rows, { label: "What begins when", first: "9rem" }));
+  /** @param {StartEvent} event */
+  const came = (event) =>
+    h(
+      "span",
+      { class: "small secondary" },
+      chip(event.outcome, OUTCOMES[event.outcome] ?? ""),
+      ` ${instant(event.at)} `,
+      event.campaign ? h("a", { href: `/campaigns/${event.campaign}` }, `campaign ${event.campaign}`) : event.message,
+    );
+  return card(
+    "Schedule",
+    table(
+      [
+        {
+          title: "Begins",
+          cell: (row) => [
+            startTime(row),
+            row.confirmed_by
+              ? h("span", { class: "muted small secondary" }, `${row.confirmed_by} makes sure that the bench is clear`)
+              : null,
+          ],
+        },
+        rows.some((row) => row.attendance)
+          ? {
+              title: "Needs a person",
+              prose: true,
+              cell: (row) => (row.attendance ? attendanceNotice(row.attendance) : h("span", { class: "muted" }, "no")),
+            }
+          : null,
+        {
+          title: "Recipe",
+          cell: (row) => [
+            row.recipe,
+            row.clip ? h("span", { class: "muted small secondary" }, "without what the bench cannot do") : null,
+          ],
+        },
+        { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
+        { title: "Priority", number: true, cell: (row) => row.priority },
+        {
+          title: "May be late by",
+          number: true,
+          cell: (row) => (row.late_limit_s === null ? "any time" : duration(row.late_limit_s)),
+        },
+        {
+          title: "Before",
+          cell: (row) => (row.history.length ? row.history.slice(-2).map(came) : h("span", { class: "muted" }, "–")),
+        },
+        {
+          title: h("span", { class: "visually-hidden" }, "Cancel"),
+          cell: (row) =>
+            button(
+              "Cancel",
+              async () => {
+                await remove("/api/schedule/{start}", { path: { start: row.id } });
+                await again();
+              },
+              { kind: "tiny", done: "Taken out of the schedule." },
+            ),
+        },
+      ],
+      rows,
+      { label: "What begins when", first: "9rem" },
+    ),
+  );
 }

@@ -4,5 +4,10 @@ import { h } from "../core/elements.js";
 import { pageHeader } from "../core/components.js";
 
 export function page() {
-  return h("div", { class: "page" }, pageHeader("No such page", `Nothing is at ${location.pathname}.`), h("p", {}, h("a", { href: "/" }, "To the start")));
+  return h(
+    "div",
+    { class: "page" },
+    pageHeader("No such page", `Nothing is at ${location.pathname}.`),
+    h("p", {}, h("a", { href: "/" }, "To the start")),
+  );
 }

@@ -1,6 +1,6 @@
 // The page of one recording: conditions, trace, data sets, readings, noise, and the file to download.
 
-import { download, get } from "../core/api.js";
+import { download, get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { count, day, number, plainNumber } from "../core/format.js";
 import { button, card, factList, pageHeader, notice } from "../core/components.js";
@@ -13,52 +13,122 @@ import { datasetTable } from "../recordings/dataset_table.js";
 import { trace } from "../recordings/trace.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
 
-const KIND_TEXTS = { samples: "every reading", points: "one mean per data set", coefficients: "a published table, no readings" };
+/** @import { DataSets, Recording } from "../../../types/api.js" */
 
+/** @import { PageContext, Part, RecordingState } from "../../../types/pages.js" */
+
+/** @type {Record<string, string>} */
+const KIND_TEXTS = {
+  samples: "every reading",
+  points: "one mean per data set",
+  coefficients: "a published table, no readings",
+};
+
+/** @param {PageContext} context */
 export async function page({ params, query, signal }) {
-  const path = `/api/recordings/${encodeURIComponent(params.id)}`;
-  const [about, sets] = await Promise.all([get(path, { query: { points: false }, signal }), get(`${path}/datasets`, { signal })]);
+  const path = { recording: params.id };
+  const [about, sets] = await Promise.all([
+    get("/api/recordings/{recording}", { path, query: { points: false }, signal }),
+    get("/api/recordings/{recording}/datasets", { path, signal }),
+  ]);
   const { info } = about;
-  const number_ = (text) => (text && Number.isFinite(Number(text)) ? Number(text) : null);
-  const state = { id: about.id, kind: about.kind, sets, output: info.output ?? {}, channel: query.channel ?? `gyro_${info.axes[0]}`, from: number_(query.from), until: number_(query.until), dataset: number_(query.dataset) };
-  const element = h("div", { class: "page" }, recordingHeader(about, path), conditionsCard(about, sets));
+  /** @param {string | undefined} text */
+  const numberIn = (text) => (text && Number.isFinite(Number(text)) ? Number(text) : null);
+  /** @type {RecordingState} */
+  const state = {
+    id: about.id,
+    kind: about.kind,
+    sets,
+    output: info.output ?? {},
+    channel: query.channel ?? `gyro_${info.axes[0]}`,
+    from: numberIn(query.from),
+    until: numberIn(query.until),
+    dataset: numberIn(query.dataset),
+    pick: (dataset) => {
+      state.dataset = dataset === state.dataset ? null : dataset;
+      updateQuery({ dataset: state.dataset });
+      for (const part of parts) part.redraw();
+      if (state.dataset !== null) readings.scrollIntoView({ block: "nearest", behavior: "smooth" });
+    },
+  };
+  const element = h("div", { class: "page" }, recordingHeader(about), conditionsCard(about, sets));
   if (about.kind === "coefficients") {
-    element.append(notice("", "This recording is a table that somebody published: scale factors and offsets over temperature. It has no data sets and no readings to look at; it can be fitted."));
+    element.append(
+      notice(
+        "",
+        "This recording is a table that somebody published: scale factors and offsets over temperature. It has no data sets and no readings to look at; it can be fitted.",
+      ),
+    );
     return element;
   }
   const timed = sets.t_from_s.some((t) => t !== null);
-  const parts = { raw: datasetReadings(state, signal), table: datasetTable(state, query) };
-  if (timed) {
-    parts.trace = trace(state, signal);
-    state.showInTrace = (k) => {
-      const about_ = 0.5 * (sets.t_until_s[k] - sets.t_from_s[k]);
-      parts.trace.show({ from: sets.t_from_s[k] - about_, until: sets.t_until_s[k] + about_ });
-      parts.trace.scrollIntoView({ block: "start", behavior: "smooth" });
-    };
-  }
-  if (!timed && sets.number.length) parts.means = meanPlots(state);
-  if (about.kind === "samples") parts.allan = allan(state, signal);
-  state.pick = (dataset) => {
-    state.dataset = dataset === state.dataset ? null : dataset;
-    updateQuery({ dataset: state.dataset });
-    for (const part of Object.values(parts)) part.redraw();
-    if (state.dataset !== null) parts.raw.scrollIntoView({ block: "nearest", behavior: "smooth" });
-  };
-  element.append(...[parts.trace, parts.means, parts.raw, parts.table, parts.allan].filter(Boolean));
+  const readings = datasetReadings(state, signal);
+  /** @type {Part[]} */
+  const parts = [readings, datasetTable(state, query)];
+  if (!timed && sets.number.length) parts.unshift(meanPlots(state));
+  if (timed) parts.unshift(shownTrace(state, signal));
+  if (about.kind === "samples") parts.push(allan(state, signal));
+  element.append(...parts);
   return element;
 }
 
-function recordingHeader(about, path) {
-  const unit = encodeURIComponent(about.serial);
-  const file = (format, text) => button(text, () => download(`${path}/file?format=${format}`, `recording-${about.id}-${format}.zip`));
-  const from = about.campaign ? h("a", { href: `/campaigns/${about.campaign}` }, `campaign ${about.campaign}`) : "an import";
-  const made = [about.info.model, about.info.technology?.toUpperCase()].filter(Boolean);
-  return pageHeader(`Recording ${about.id}`, h("span", {}, "Of ", h("a", { href: `/units/${unit}` }, about.serial), made.length ? ` (${made.join(", ")})` : "", ", from ", from, `, ${day(about.created_at)}${about.simulated_time ? ` (${SIMULATED})` : ""}. Holds ${KIND_TEXTS[about.kind] ?? about.kind}.`),
-    h("a", { class: "button primary", href: `/explore?unit=${unit}&recording=${about.id}` }, "Explore"),
-    ...(about.kind === "coefficients" ? [] : [file("parquet", "Save as Parquet"), file("csv", "Save as CSV")]));
+/**
+ * The trace, and in the state how to show a data set in it.
+ * @param {RecordingState} state
+ * @param {AbortSignal} signal
+ */
+function shownTrace(state, signal) {
+  const found = trace(state, signal);
+  state.showInTrace = (k) => {
+    const [from, until] = [state.sets.t_from_s[k] ?? 0, state.sets.t_until_s[k] ?? 0];
+    const beside = 0.5 * (until - from);
+    found.show({ from: from - beside, until: until + beside });
+    found.scrollIntoView({ block: "start", behavior: "smooth" });
+  };
+  return found;
 }
 
+/** @param {Recording} about */
+function recordingHeader(about) {
+  const unit = encodeURIComponent(about.serial);
+  /**
+   * @param {"csv" | "parquet"} format
+   * @param {string} text
+   */
+  const file = (format, text) =>
+    button(text, () =>
+      download("/api/recordings/{recording}/file", `recording-${about.id}-${format}.zip`, {
+        path: { recording: about.id },
+        query: { format },
+      }),
+    );
+  const from = about.campaign
+    ? h("a", { href: `/campaigns/${about.campaign}` }, `campaign ${about.campaign}`)
+    : "an import";
+  const made = [about.info.model, about.info.technology?.toUpperCase()].filter(Boolean);
+  return pageHeader(
+    `Recording ${about.id}`,
+    h(
+      "span",
+      {},
+      "Of ",
+      h("a", { href: `/units/${unit}` }, about.serial),
+      made.length ? ` (${made.join(", ")})` : "",
+      ", from ",
+      from,
+      `, ${day(about.created_at)}${about.simulated_time ? ` (${SIMULATED})` : ""}. Holds ${KIND_TEXTS[about.kind] ?? about.kind}.`,
+    ),
+    h("a", { class: "button primary", href: `/explore?unit=${unit}&recording=${about.id}` }, "Explore"),
+    ...(about.kind === "coefficients" ? [] : [file("parquet", "Save as Parquet"), file("csv", "Save as CSV")]),
+  );
+}
+
+/**
+ * @param {Recording} recording
+ * @param {DataSets} sets
+ */
 function conditionsCard({ info, datasets, readings: n, kind }, sets) {
+  /** @param {readonly (number | null)[] | undefined} values */
   const span = (values) => {
     const there = (values ?? []).filter((value) => value !== null);
     return there.length ? [Math.min(...there), Math.max(...there)] : null;
@@ -66,14 +136,28 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
   const warm = span(sets.channels.temperature_c?.mean);
   const rates = span(sets.table_rate_dps);
   const units = [...new Set(info.axes.map((axis) => channelUnit(`gyro_${axis}`, info.output)))];
-  const card_ = card("Conditions", factList([
-    ["Axes", info.axes.join(", "), "", `output in ${units.join(", ")}`],
-    datasets ? ["Data sets", count(datasets)] : null,
-    kind === "samples" ? ["Readings", count(n), "", info.sample_rate_hz ? `${plainNumber(info.sample_rate_hz)} per second` : null] : null,
-    rates ? ["Table rate", `${plainNumber(rates[0])} to ${plainNumber(rates[1])}`, "deg/s", info.max_rate_dps ? `unit's limit ${plainNumber(info.max_rate_dps)} deg/s` : null] : null,
-    warm ? ["Gyro temperature", `${number(warm[0])} to ${number(warm[1])}`, "deg C"] : null,
-    info.latitude_deg === null ? null : ["Latitude", plainNumber(info.latitude_deg), "deg", "the Earth's rate is taken off"],
-  ]));
-  if (info.notes) card_.append(h("p", { class: "muted" }, info.notes));
-  return card_;
+  const element = card(
+    "Conditions",
+    factList([
+      ["Axes", info.axes.join(", "), "", `output in ${units.join(", ")}`],
+      datasets ? ["Data sets", count(datasets)] : null,
+      kind === "samples"
+        ? ["Readings", count(n), "", info.sample_rate_hz ? `${plainNumber(info.sample_rate_hz)} per second` : null]
+        : null,
+      rates
+        ? [
+            "Table rate",
+            `${plainNumber(rates[0])} to ${plainNumber(rates[1])}`,
+            "deg/s",
+            info.max_rate_dps ? `unit's limit ${plainNumber(info.max_rate_dps)} deg/s` : null,
+          ]
+        : null,
+      warm ? ["Gyro temperature", `${number(warm[0])} to ${number(warm[1])}`, "deg C"] : null,
+      info.latitude_deg === null
+        ? null
+        : ["Latitude", plainNumber(info.latitude_deg), "deg", "the Earth's rate is taken off"],
+    ]),
+  );
+  if (info.notes) element.append(h("p", { class: "muted" }, info.notes));
+  return element;
 }

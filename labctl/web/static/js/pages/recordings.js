@@ -1,13 +1,19 @@
 // The page of all recordings, with the import form.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
 import { count, day } from "../core/format.js";
-import { chip, selectField, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
+import { chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
+import { option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 import { importForm } from "../recordings/import_form.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
 
+/** @import { RecordingRow } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @param {PageContext} context */
 export async function page({ query, signal }) {
   const list = h("div", {});
   let unit = query.unit ?? "";
@@ -16,11 +22,16 @@ export async function page({ query, signal }) {
   const choose = h("div", {});
   function show() {
     const units = [...new Set(rows.map((row) => row.serial))].sort();
-    setChildren(choose, units.length > 1 ? selectField("Unit", [["", "all units"], ...units.map((serial) => [serial, serial])], unit, (value) => {
-      unit = value;
-      updateQuery({ unit });
-      show();
-    }) : null);
+    setChildren(
+      choose,
+      units.length > 1
+        ? selectField("Unit", [["", "all units"], ...units.map((serial) => option(serial, serial))], unit, (value) => {
+            unit = value;
+            updateQuery({ unit });
+            show();
+          })
+        : null,
+    );
     const shown = rows.filter((row) => !unit || row.serial === unit);
     setChildren(list, shown.length ? recordingTable(shown) : noRecordings());
   }
@@ -29,24 +40,75 @@ export async function page({ query, signal }) {
     rows = await get("/api/recordings", { signal });
     show();
   };
-  return h("div", { class: "page" }, pageHeader("Recordings", "All data sets of one unit in one campaign, or brought in as files."),
+  return h(
+    "div",
+    { class: "page" },
+    pageHeader("Recordings", "All data sets of one unit in one campaign, or brought in as files."),
     importForm(taken),
-    cardWithHeader(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list));
+    cardWithHeader(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list),
+  );
 }
 
+/** @type {Record<string, string>} */
 const KINDS = { samples: "every reading", points: "means", coefficients: "a published table" };
 
+/** @param {readonly RecordingRow[]} rows */
 function recordingTable(rows) {
-  return table([
-    { title: "Recording", cell: (row) => [h("a", { href: `/recordings/${row.id}` }, `Recording ${row.id}`), row.notes ? h("span", { class: "muted small secondary two-lines", title: row.notes }, row.notes) : null] },
-    { title: "Unit", cell: (row) => h("a", { href: `/units/${encodeURIComponent(row.serial)}`, class: "nowrap" }, row.serial) },
-    { title: "Holds", cell: (row) => chip(KINDS[row.kind] ?? row.kind) },
-    { title: "Data sets", number: true, cell: (row) => count(row.datasets) },
-    { title: "Readings", number: true, cell: (row) => (row.kind === "samples" ? count(row.readings) : "–") },
-    { title: "From", cell: (row) => (row.campaign ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`) : h("span", { class: "muted" }, "import")) },
-    { title: "Since", cell: (row) => [h("span", { class: "nowrap" }, day(row.created_at)), row.simulated_time ? h("span", { class: "muted small secondary" }, SIMULATED) : null] },
-    { title: h("span", { class: "visually-hidden" }, "Explore"), cell: (row) => h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(row.serial)}&recording=${row.id}` }, "Explore") },
-  ], rows, { label: "Recordings", first: "13rem" });
+  return table(
+    [
+      {
+        title: "Recording",
+        cell: (row) => [
+          h("a", { href: `/recordings/${row.id}` }, `Recording ${row.id}`),
+          row.notes ? h("span", { class: "muted small secondary two-lines", title: row.notes }, row.notes) : null,
+        ],
+      },
+      {
+        title: "Unit",
+        cell: (row) => h("a", { href: `/units/${encodeURIComponent(row.serial)}`, class: "nowrap" }, row.serial),
+      },
+      { title: "Holds", cell: (row) => chip(KINDS[row.kind] ?? row.kind) },
+      { title: "Data sets", number: true, cell: (row) => count(row.datasets) },
+      { title: "Readings", number: true, cell: (row) => (row.kind === "samples" ? count(row.readings) : "–") },
+      {
+        title: "From",
+        cell: (row) =>
+          row.campaign
+            ? h("a", { href: `/campaigns/${row.campaign}`, class: "nowrap" }, `campaign ${row.campaign}`)
+            : h("span", { class: "muted" }, "import"),
+      },
+      {
+        title: "Since",
+        cell: (row) => [
+          h("span", { class: "nowrap" }, day(row.created_at)),
+          row.simulated_time ? h("span", { class: "muted small secondary" }, SIMULATED) : null,
+        ],
+      },
+      {
+        title: h("span", { class: "visually-hidden" }, "Explore"),
+        cell: (row) =>
+          h(
+            "a",
+            { class: "button tiny", href: `/explore?unit=${encodeURIComponent(row.serial)}&recording=${row.id}` },
+            "Explore",
+          ),
+      },
+    ],
+    rows,
+    { label: "Recordings", first: "13rem" },
+  );
 }
 
-const noRecordings = () => emptyState(h("p", {}, "There is no recording yet."), h("p", {}, "Drop one above, ", h("a", { href: "/campaigns/new" }, "run a campaign"), ", or ", h("a", { href: "/start" }, "begin with an example"), "."));
+const noRecordings = () =>
+  emptyState(
+    h("p", {}, "There is no recording yet."),
+    h(
+      "p",
+      {},
+      "Drop one above, ",
+      h("a", { href: "/campaigns/new" }, "run a campaign"),
+      ", or ",
+      h("a", { href: "/start" }, "begin with an example"),
+      ".",
+    ),
+  );

@@ -1,59 +1,154 @@
 // The start page: an overview, or, with an empty database, the ways to begin.
 
-import { get, post } from "../core/api.js";
+import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { button, card, pageHeader } from "../core/components.js";
-import { presentWords } from "../core/freshness.js";
+import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
 import { isRunning } from "../campaigns/states.js";
 
+/** @import { Bench, Campaign, Unit } from "../../../types/api.js" */
+
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @param {PageContext} context */
 export async function page({ signal }) {
-  const [units, campaigns, benches] = await Promise.all(["/api/units", "/api/campaigns", "/api/benches"].map((path) => get(path, { signal })));
+  const [units, campaigns, benches] = await Promise.all([
+    get("/api/units", { signal }),
+    get("/api/campaigns", { signal }),
+    get("/api/benches", { signal }),
+  ]);
   if (units.length || campaigns.length) return overview(units, campaigns, benches);
-  return h("div", { class: "page" },
+  return h(
+    "div",
+    { class: "page" },
     pageHeader("Begin", "Nothing has been measured yet. Three ways to the first calibration, one press each."),
-    h("div", { class: "columns" },
-      card("See it find a hidden effect",
-        h("p", {}, "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out what is missing."),
-        button("Simulate a recording", openSimulated, { kind: "primary" })),
-      card("Look at a real gyro",
-        h("p", {}, "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. Why is the fit fifteen times worse than the noise?"),
-        button("Open the real gyro", openExample)),
-      card("Bring your own data",
+    h(
+      "div",
+      { class: "columns" },
+      card(
+        "See it find a hidden effect",
+        h(
+          "p",
+          {},
+          "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out what is missing.",
+        ),
+        button("Simulate a recording", openSimulated, { kind: "primary" }),
+      ),
+      card(
+        "Look at a real gyro",
+        h(
+          "p",
+          {},
+          "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. Why is the fit fifteen times worse than the noise?",
+        ),
+        button("Open the real gyro", openExample),
+      ),
+      card(
+        "Bring your own data",
         h("p", {}, "A folder in the interchange format: recording.toml and its data file, as CSV or Parquet."),
-        h("a", { class: "button", href: "/recordings" }, "Import a recording")),
-      benches.length ? card(`Run a campaign on ${benches[0].name}`,
-        h("p", {}, "Choose a recipe, see what it could find, and start."),
-        h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign")) : null));
+        h("a", { class: "button", href: "/recordings" }, "Import a recording"),
+      ),
+      benches.length
+        ? card(
+            `Run a campaign on ${benches[0].name}`,
+            h("p", {}, "Choose a recipe, see what it could find, and start."),
+            h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"),
+          )
+        : null,
+    ),
+  );
 }
 
 /** Simulate a recording, fit it, and open it on the explore page. */
 async function openSimulated() {
-  const made = await post("/api/recordings/simulated", { recipe: "ojeda2000-121", hide: ["scale_factor_asymmetry=0.0002"], seed: 1 });
+  const made = await post("/api/recordings/simulated", {
+    body: { recipe: "ojeda2000-121", hide: ["scale_factor_asymmetry=0.0002"], seed: 1 },
+  });
   await openExplore(made.serial, made.recording, "ojeda2000");
 }
 
 async function openExample() {
-  const made = await post("/api/recordings/example", { name: "osu-fog" });
+  const made = await post("/api/recordings/example", { body: { name: "osu-fog" } });
   await openExplore(made.serial, made.recording, "bias_scale");
 }
 
+/**
+ * @param {string} serial
+ * @param {number} recording
+ * @param {string} model
+ */
 async function openExplore(serial, recording, model) {
-  const fitted = await post(`/api/units/${encodeURIComponent(serial)}/calibrations`, { recording, model });
+  const fitted = await post("/api/units/{serial}/calibrations", { path: { serial }, body: { recording, model } });
   await navigate(`/explore?unit=${encodeURIComponent(serial)}&version=${fitted.version}&recording=${recording}`);
 }
 
+/**
+ * @param {readonly Unit[]} units
+ * @param {readonly Campaign[]} campaigns
+ * @param {readonly Bench[]} benches
+ */
 function overview(units, campaigns, benches) {
   const running = campaigns.find(isRunning);
-  return h("div", { class: "page" },
-    pageHeader("labctl", "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall."),
-    h("div", { class: "columns", style: "--column-min: 17rem" },
-      card("Bench", benches.length
-        ? h("p", {}, presentWords(running ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.` : benches[0].unconfirmed ? `${benches[0].name} was not confirmed safe: look at it.` : `${benches[0].name} is free.`))
-        : h("p", {}, "This service drives no bench."),
-      h("div", { class: "row" }, h("a", { class: "button primary", href: "/bench" }, "To the bench"), h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"))),
-      card("Units", h("ul", { class: "plain" }, units.slice(0, 6).map((unit) => h("li", { class: "row space-between" },
-        h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
-        h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"))))),
-      card("Data", h("div", { class: "row" }, h("a", { class: "button", href: "/recordings" }, "Import a recording"), button("Simulate a hidden effect", openSimulated), button("Open the real gyro", openExample)))));
+  return h(
+    "div",
+    { class: "page" },
+    pageHeader(
+      "labctl",
+      "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall.",
+    ),
+    h(
+      "div",
+      { class: "columns", style: "--column-min: 17rem" },
+      card(
+        "Bench",
+        benches.length
+          ? h(
+              "p",
+              {},
+              presentWords(
+                running
+                  ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.`
+                  : benches[0].unconfirmed
+                    ? `${benches[0].name} was not confirmed safe: look at it.`
+                    : `${benches[0].name} is free.`,
+              ),
+            )
+          : h("p", {}, "This service drives no bench."),
+        h(
+          "div",
+          { class: "row" },
+          h("a", { class: "button primary", href: "/bench" }, "To the bench"),
+          h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"),
+        ),
+      ),
+      card(
+        "Units",
+        h(
+          "ul",
+          { class: "plain" },
+          units
+            .slice(0, 6)
+            .map((unit) =>
+              h(
+                "li",
+                { class: "row space-between" },
+                h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
+                h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"),
+              ),
+            ),
+        ),
+      ),
+      card(
+        "Data",
+        h(
+          "div",
+          { class: "row" },
+          h("a", { class: "button", href: "/recordings" }, "Import a recording"),
+          button("Simulate a hidden effect", openSimulated),
+          button("Open the real gyro", openExample),
+        ),
+      ),
+    ),
+  );
 }

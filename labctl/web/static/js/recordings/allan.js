@@ -1,28 +1,57 @@
 // Noise at rest: Allan deviation of each axis, and N, B and K with the reason where one has no value.
 
-import { get, Problem } from "../core/api.js";
+import { get } from "../core/http/api.js";
+import { Problem } from "../core/http/errors.js";
 import { setChildren, h, whenNearViewport } from "../core/elements.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
-import { cardWithHeader, loadInto, notice, table, toggleGroup } from "../core/components.js";
+import { cardWithHeader, loadInto, notice, table } from "../core/components.js";
+import { toggleGroup } from "../core/fields.js";
 
-const NOISE_FIGURES = [["N", "angle random walk"], ["B", "bias instability"], ["K", "rate random walk"]];
+/** @import { Allan, NoiseFigure } from "../../../types/api.js" */
+/** @import { RecordingState } from "../../../types/pages.js" */
 
-/** Card for the longest stretch at rest, or for the selected data set. */
+/** @type {["N" | "B" | "K", string][]} */
+const NOISE_FIGURES = [
+  ["N", "angle random walk"],
+  ["B", "bias instability"],
+  ["K", "rate random walk"],
+];
+
+/**
+ * Card for the longest stretch at rest, or for the selected data set.
+ * @param {RecordingState} state
+ * @param {AbortSignal} signal
+ */
 export function allan(state, signal) {
   const place = h("div", { class: "stack" });
   const which = h("div", {});
   let [own, seen] = [false, false];
   const show = () => {
     if (!seen) return; // the readings at rest are loaded only when the card is near the viewport
-    setChildren(which, state.dataset ? toggleGroup("Of what", [["rest", "longest stretch at rest"], ["set", `data set ${state.dataset}`]], own ? "set" : "rest", (value) => {
-      own = value === "set";
-      show();
-    }) : null);
+    setChildren(
+      which,
+      state.dataset
+        ? toggleGroup(
+            "Of what",
+            [
+              ["rest", "longest stretch at rest"],
+              ["set", `data set ${state.dataset}`],
+            ],
+            own ? "set" : "rest",
+            (value) => {
+              own = value === "set";
+              show();
+            },
+          )
+        : null,
+    );
     const dataset = own ? state.dataset : null;
     loadInto(place, "Working out the Allan deviation", async () => {
       try {
-        return allanFigure(await get(`/api/recordings/${state.id}/allan`, { query: { dataset }, signal }));
+        return allanFigure(
+          await get("/api/recordings/{recording}/allan", { path: { recording: state.id }, query: { dataset }, signal }),
+        );
       } catch (error) {
         if (error instanceof Problem && error.status < 500) return notice("", error.message); // too little at rest is no fault
         throw error;
@@ -37,29 +66,107 @@ export function allan(state, signal) {
   return Object.assign(element, { redraw: show });
 }
 
+/** @param {Allan} found */
 function allanFigure(found) {
   const axes = Object.entries(found.axes);
   const [first, last] = [found.datasets[0], found.datasets.at(-1)];
   const where = `Data set${first === last ? ` ${first}` : `s ${first} to ${last}`}, ${duration(found.duration_s)} at ${withUnit(found.temperature_c, "deg C")}.`;
   const draw = () => ({
     data: axes.flatMap(([axis, noise]) => [
-      { type: "scatter", mode: "lines", x: [...noise.tau_s, ...[...noise.tau_s].reverse()], y: [...noise.high_dps, ...[...noise.low_dps].reverse()], fill: "toself", fillcolor: `color-mix(in srgb, ${axisColour(axis)} 18%, transparent)`, line: { width: 0 }, hoverinfo: "skip", showlegend: false, name: `${axis}, 95 %` },
-      { type: "scatter", mode: "lines", x: noise.tau_s, y: noise.model_dps, line: { color: axisColour(axis), dash: "dot", width: 1.2 }, hoverinfo: "skip", showlegend: false, name: `${axis}, fitted` },
-      { type: "scatter", mode: "lines+markers", x: noise.tau_s, y: noise.deviation_dps, line: { color: axisColour(axis), width: 2 }, marker: { size: 5 }, name: `axis ${axis}`, hovertemplate: `${axis}: %{y:.3~g} deg/s over %{x:.3~g} s<extra></extra>` },
+      {
+        type: "scatter",
+        mode: "lines",
+        x: [...noise.tau_s, ...[...noise.tau_s].reverse()],
+        y: [...noise.high_dps, ...[...noise.low_dps].reverse()],
+        fill: "toself",
+        fillcolor: `color-mix(in srgb, ${axisColour(axis)} 18%, transparent)`,
+        line: { width: 0 },
+        hoverinfo: "skip",
+        showlegend: false,
+        name: `${axis}, 95 %`,
+      },
+      {
+        type: "scatter",
+        mode: "lines",
+        x: noise.tau_s,
+        y: noise.model_dps,
+        line: { color: axisColour(axis), dash: "dot", width: 1.2 },
+        hoverinfo: "skip",
+        showlegend: false,
+        name: `${axis}, fitted`,
+      },
+      {
+        type: "scatter",
+        mode: "lines+markers",
+        x: noise.tau_s,
+        y: noise.deviation_dps,
+        line: { color: axisColour(axis), width: 2 },
+        marker: { size: 5 },
+        name: `axis ${axis}`,
+        hovertemplate: `${axis}: %{y:.3~g} deg/s over %{x:.3~g} s<extra></extra>`,
+      },
     ]),
-    layout: { xaxis: { type: "log", title: { text: "averaging time, s" } }, yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } }, margin: { l: 70, r: 12, t: 8, b: 46 } },
+    layout: {
+      xaxis: { type: "log", title: { text: "averaging time, s" } },
+      yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } },
+      margin: { l: 70, r: 12, t: 8, b: 46 },
+    },
   });
-  const csv = () => [["axis", "tau_s", "deviation_dps", "low_dps", "high_dps", "model_dps"], ...axes.flatMap(([axis, noise]) => noise.tau_s.map((tau, k) => [axis, tau, noise.deviation_dps[k], noise.low_dps[k], noise.high_dps[k], noise.model_dps[k]]))];
-  return [h("p", { class: "muted" }, where),
-    figure(`Recording ${found.recording} Allan deviation`, "Band: 95 % interval. Dotted: the fit that N, B and K come from.", draw, { height: "21rem", csv }),
-    table([
-      { title: "Figure", cell: ([id, name]) => [h("strong", {}, id), h("span", { class: "muted nowrap" }, `, ${name}`)] },
-      ...axes.map(([axis, noise]) => ({ title: `Axis ${axis}`, cell: ([id]) => noiseFigure(noise[id]) })),
-    ], NOISE_FIGURES, { label: "Figures of IEEE Std 952", first: "11rem" })];
+  const csv = () => [
+    ["axis", "tau_s", "deviation_dps", "low_dps", "high_dps", "model_dps"],
+    ...axes.flatMap(([axis, noise]) =>
+      noise.tau_s.map((tau, k) => [
+        axis,
+        tau,
+        noise.deviation_dps[k],
+        noise.low_dps[k],
+        noise.high_dps[k],
+        noise.model_dps[k],
+      ]),
+    ),
+  ];
+  return [
+    h("p", { class: "muted" }, where),
+    figure(
+      `Recording ${found.recording} Allan deviation`,
+      "Band: 95 % interval. Dotted: the fit that N, B and K come from.",
+      draw,
+      { height: "21rem", csv },
+    ),
+    table(
+      [
+        {
+          title: "Figure",
+          cell: ([id, name]) => [h("strong", {}, id), h("span", { class: "muted nowrap" }, `, ${name}`)],
+        },
+        ...axes.map(([axis, noise]) => ({
+          title: `Axis ${axis}`,
+          /** @param {typeof NOISE_FIGURES[number]} row */
+          cell: ([id]) => noiseFigure(noise[id]),
+        })),
+      ],
+      NOISE_FIGURES,
+      { label: "Figures of IEEE Std 952", first: "11rem" },
+    ),
+  ];
 }
 
-/** A noise figure with its uncertainty, or its upper bound and the reason why it has no value. */
+/**
+ * A noise figure with its uncertainty, or its upper bound and the reason why it has no value.
+ * @param {NoiseFigure | null | undefined} noise
+ */
 function noiseFigure(noise) {
-  if (noise?.value !== null && noise?.value !== undefined) return [h("strong", { class: "nowrap" }, `${number(noise.value)} ${noise.unit}`), h("span", { class: "muted small secondary" }, `u = ${number(noise.u, 2)} ${noise.unit}`)];
-  return [h("span", { class: "muted nowrap" }, noise?.at_most ? `below ${number(noise.at_most, 2)} ${noise.unit}` : "not seen"), noise?.why ? h("span", { class: "muted small secondary" }, noise.why) : null];
+  if (noise?.value !== null && noise?.value !== undefined)
+    return [
+      h("strong", { class: "nowrap" }, `${number(noise.value)} ${noise.unit}`),
+      h("span", { class: "muted small secondary" }, `u = ${number(noise.u, 2)} ${noise.unit}`),
+    ];
+  return [
+    h(
+      "span",
+      { class: "muted nowrap" },
+      noise?.at_most ? `below ${number(noise.at_most, 2)} ${noise.unit}` : "not seen",
+    ),
+    noise?.why ? h("span", { class: "muted small secondary" }, noise.why) : null,
+  ];
 }

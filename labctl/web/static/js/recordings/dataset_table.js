@@ -2,42 +2,87 @@
 
 import { setChildren, h } from "../core/elements.js";
 import { count, duration, mean, number, plainNumber } from "../core/format.js";
-import { chip, selectField, cardWithHeader, table } from "../core/components.js";
+import { chip, cardWithHeader, table } from "../core/components.js";
+import { option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 import { channelName, channelUnit } from "./channels.js";
 
+/** @import { Query, RecordingState } from "../../../types/pages.js" */
+
 const PAGE_SIZE = 25;
+/** @type {Record<string, string>} */
 const CHIP_KINDS = { complete: "good", running: "accent", open: "accent" };
 
-/** `state` has {sets, dataset, pick(number), output}; `asked` are the position and the page (from 1) of the address. */
+/**
+ * `state` has {sets, dataset, pick(number), output}; `asked` are the position and the page (from 1) of the address.
+ * @param {RecordingState} state
+ * @param {Query} asked
+ */
 export function datasetTable(state, asked) {
   const { sets } = state;
   const place = h("div", {});
   const leaf = h("div", { class: "row" });
   let position = asked.position ?? "";
+  /** @type {number | null} */
   let at = Number(asked.page) || null;
 
   function show() {
     const rows = sets.number.map((_, k) => k).filter((k) => !position || sets.position[k] === position);
     const pages = Math.max(1, Math.ceil(rows.length / PAGE_SIZE));
     const picked = rows.findIndex((k) => sets.number[k] === state.dataset);
-    at = Math.min(Math.max(at ?? (picked >= 0 ? Math.floor(picked / PAGE_SIZE) + 1 : 1), 1), pages);
-    setChildren(place, pageTable(state, rows.slice((at - 1) * PAGE_SIZE, at * PAGE_SIZE)));
-    const turn = (text, label, to) => h("button", { type: "button", class: "button tiny", "aria-label": label, disabled: to < 1 || to > pages, onclick: () => {
-      at = to;
-      updateQuery({ page: at === 1 ? null : at });
-      show();
-    } }, text);
-    setChildren(leaf, pages > 1 ? [turn("« First", "First page", at === 1 ? 0 : 1), turn("‹ Back", "Page before", at - 1), h("span", { class: "muted small", "aria-live": "polite" }, `${at} of ${pages}`), turn("On ›", "Next page", at + 1), turn("Last »", "Last page", at === pages ? 0 : pages)] : null);
+    const shown = Math.min(Math.max(at ?? (picked >= 0 ? Math.floor(picked / PAGE_SIZE) + 1 : 1), 1), pages);
+    at = shown;
+    setChildren(place, pageTable(state, rows.slice((shown - 1) * PAGE_SIZE, shown * PAGE_SIZE)));
+    /**
+     * @param {string} text
+     * @param {string} label
+     * @param {number} to
+     */
+    const turn = (text, label, to) =>
+      h(
+        "button",
+        {
+          type: "button",
+          class: "button tiny",
+          "aria-label": label,
+          disabled: to < 1 || to > pages,
+          onclick: () => {
+            at = to;
+            updateQuery({ page: at === 1 ? null : at });
+            show();
+          },
+        },
+        text,
+      );
+    setChildren(
+      leaf,
+      pages > 1
+        ? [
+            turn("« First", "First page", shown === 1 ? 0 : 1),
+            turn("‹ Back", "Page before", shown - 1),
+            h("span", { class: "muted small", "aria-live": "polite" }, `${shown} of ${pages}`),
+            turn("On ›", "Next page", shown + 1),
+            turn("Last »", "Last page", shown === pages ? 0 : pages),
+          ]
+        : null,
+    );
   }
   show();
   const positions = [...new Set(sets.position)];
-  const filter = positions.length > 1 ? selectField("Position", [["", "all"], ...positions.map((each) => [each, `${each} up`])], position, (value) => {
-    position = value;
-    at = 1;
-    updateQuery({ position, page: null });
-    show();
-  }) : null;
+  const filter =
+    positions.length > 1
+      ? selectField(
+          "Position",
+          [["", "all"], ...positions.map((each) => option(each, `${each} up`))],
+          position,
+          (value) => {
+            position = value;
+            at = 1;
+            updateQuery({ position, page: null });
+            show();
+          },
+        )
+      : null;
   const redraw = () => {
     at = null;
     show();
@@ -45,24 +90,70 @@ export function datasetTable(state, asked) {
   return Object.assign(cardWithHeader(`${count(sets.number.length)} data sets`, filter, place, leaf), { redraw });
 }
 
+/**
+ * @param {RecordingState} state
+ * @param {readonly number[]} rows
+ */
 function pageTable(state, rows) {
   const { sets, output } = state;
   const gyros = Object.keys(sets.channels).filter((name) => name.startsWith("gyro_"));
+  /**
+   * @param {string} name
+   * @param {number} k
+   * @param {number} digits
+   */
   const of = (name, k, digits) => (sets.channels[name] ? number(sets.channels[name].mean[k], digits) : "–");
   const timed = sets.t_from_s.some((t) => t !== null);
   const warm = sets.chamber_setpoint_c.some((t) => t !== null);
-  return table([
-    { title: "Data set", cell: (k) => h("button", { type: "button", class: "button tiny", "aria-pressed": String(sets.number[k] === state.dataset), onclick: (event) => {
-      event.stopPropagation();
-      state.pick(sets.number[k]);
-    } }, `${sets.number[k]}`) },
-    { title: "State", cell: (k) => h("span", { title: sets.reason[k] }, chip(sets.state[k], CHIP_KINDS[sets.state[k]] ?? "warn")) },
-    { title: "Up", cell: (k) => sets.position[k] },
-    { title: "Table rate, deg/s", number: true, cell: (k) => plainNumber(sets.table_rate_dps[k], 6) },
-    warm ? { title: "Set point, deg C", number: true, cell: (k) => plainNumber(sets.chamber_setpoint_c[k] ?? NaN) } : null,
-    { title: "Gyro, deg C", number: true, cell: (k) => of("temperature_c", k, 4) },
-    ...gyros.map((name) => ({ title: `${channelName(name).replace("gyro output", "Output")}, ${channelUnit(name, output)}`, number: true, cell: (k) => [mean(sets.channels[name].mean[k], sets.channels[name].std[k]), sets.channels[name].std[k] === null ? null : h("span", { class: "muted small secondary" }, ` ± ${number(sets.channels[name].std[k], 2)}`)] })),
-    { title: "Readings", number: true, cell: (k) => count(sets.n[k]) },
-    timed ? { title: "Begins after", number: true, cell: (k) => duration(sets.t_from_s[k] ?? NaN) } : null,
-  ].filter(Boolean), rows, { dense: true, label: "Data sets", selected: (k) => sets.number[k] === state.dataset, onrow: (k) => state.pick(sets.number[k]) });
+  return table(
+    [
+      {
+        title: "Data set",
+        cell: (k) =>
+          h(
+            "button",
+            {
+              type: "button",
+              class: "button tiny",
+              "aria-pressed": String(sets.number[k] === state.dataset),
+              onclick: (event) => {
+                event.stopPropagation();
+                state.pick(sets.number[k]);
+              },
+            },
+            `${sets.number[k]}`,
+          ),
+      },
+      {
+        title: "State",
+        cell: (k) => h("span", { title: sets.reason[k] }, chip(sets.state[k], CHIP_KINDS[sets.state[k]] ?? "warn")),
+      },
+      { title: "Up", cell: (k) => sets.position[k] },
+      { title: "Table rate, deg/s", number: true, cell: (k) => plainNumber(sets.table_rate_dps[k], 6) },
+      warm
+        ? { title: "Set point, deg C", number: true, cell: (k) => plainNumber(sets.chamber_setpoint_c[k] ?? NaN) }
+        : null,
+      { title: "Gyro, deg C", number: true, cell: (k) => of("temperature_c", k, 4) },
+      ...gyros.map((name) => ({
+        title: `${channelName(name).replace("gyro output", "Output")}, ${channelUnit(name, output)}`,
+        number: true,
+        /** @param {number} k */
+        cell: (k) => [
+          mean(sets.channels[name].mean[k], sets.channels[name].std[k]),
+          sets.channels[name].std[k] === null
+            ? null
+            : h("span", { class: "muted small secondary" }, ` ± ${number(sets.channels[name].std[k], 2)}`),
+        ],
+      })),
+      { title: "Readings", number: true, cell: (k) => count(sets.n[k]) },
+      timed ? { title: "Begins after", number: true, cell: (k) => duration(sets.t_from_s[k] ?? NaN) } : null,
+    ],
+    rows,
+    {
+      dense: true,
+      label: "Data sets",
+      selected: (k) => sets.number[k] === state.dataset,
+      onrow: (k) => state.pick(sets.number[k]),
+    },
+  );
 }

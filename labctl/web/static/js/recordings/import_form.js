@@ -1,43 +1,95 @@
 // Form to import a recording: drop or choose files, then show the answer of the service.
 
-import { upload } from "../core/api.js";
+import { upload } from "../core/http/api.js";
+import { messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
 import { busyIndicator, notice } from "../core/components.js";
 import { droppedFiles, recordingFiles } from "./file_input.js";
 
+/** @import { Imported } from "../../../types/api.js" */
+
+/** @param {readonly File[]} files */
 const totalSize = (files) => {
   const bytes = files.reduce((sum, file) => sum + file.size, 0);
   return bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
 };
 
-/** The import card; `taken(imported)` is called when a recording is in the database. */
+/**
+ * The import card; `taken(imported)` is called when a recording is in the database.
+ * @param {(imported: Imported) => unknown} taken
+ */
 export function importForm(taken) {
   const result = h("div", { "aria-live": "polite" });
+  /** @param {boolean} folder */
   const pick = (folder) => {
-    const input = h("input", { type: "file", multiple: true, webkitdirectory: folder, accept: folder ? null : ".toml,.csv,.parquet", "aria-label": folder ? "Folder of a recording" : "Files of a recording", class: "visually-hidden", tabindex: "-1", onchange: () => {
-      const files = [...input.files];
-      input.value = "";
-      if (files.length) take(folder ? recordingFiles(files) : { files, left: [] });
-    } });
-    return [h("button", { type: "button", class: "button", onclick: () => input.click() }, folder ? "Choose a folder" : "Choose files"), input];
+    /** @type {HTMLInputElement} */
+    const input = h("input", {
+      type: "file",
+      multiple: true,
+      webkitdirectory: folder,
+      accept: folder ? null : ".toml,.csv,.parquet",
+      "aria-label": folder ? "Folder of a recording" : "Files of a recording",
+      class: "visually-hidden",
+      tabindex: "-1",
+      onchange: () => {
+        const files = [...(input.files ?? [])];
+        input.value = "";
+        if (files.length) take(folder ? recordingFiles(files) : { files, left: [] });
+      },
+    });
+    return [
+      h(
+        "button",
+        { type: "button", class: "button", onclick: () => input.click() },
+        folder ? "Choose a folder" : "Choose files",
+      ),
+      input,
+    ];
   };
-  const zone = h("div", { class: "drop stack", ondragover: over, ondragenter: over, ondragleave: (event) => zone.contains(event.relatedTarget) || zone.classList.remove("dragover"), ondrop: async (event) => {
-    event.preventDefault();
-    zone.classList.remove("dragover");
-    take(await droppedFiles(event.dataTransfer));
-  } },
-  h("p", { class: "drop-title" }, "Drop a recording here"),
-  h("p", { class: "small" }, h("code", {}, "recording.toml"), ", its data as CSV or Parquet, and the environment file if there is one; or the folder that holds them."),
-  h("div", { class: "row", style: "justify-content: center" }, pick(false), pick(true)));
+  /** @type {HTMLElement} */
+  const zone = h(
+    "div",
+    {
+      class: "drop stack",
+      ondragover: over,
+      ondragenter: over,
+      ondragleave: (event) =>
+        (event.relatedTarget instanceof Node && zone.contains(event.relatedTarget)) ||
+        zone.classList.remove("dragover"),
+      ondrop: async (event) => {
+        event.preventDefault();
+        zone.classList.remove("dragover");
+        if (event.dataTransfer) take(await droppedFiles(event.dataTransfer));
+      },
+    },
+    h("p", { class: "drop-title" }, "Drop a recording here"),
+    h(
+      "p",
+      { class: "small" },
+      h("code", {}, "recording.toml"),
+      ", its data as CSV or Parquet, and the environment file if there is one; or the folder that holds them.",
+    ),
+    h("div", { class: "row", style: "justify-content: center" }, pick(false), pick(true)),
+  );
 
+  /** @param {DragEvent} event */
   function over(event) {
     event.preventDefault();
     zone.classList.add("dragover");
   }
 
+  /** @param {{ files: File[], left: string[] }} chosen */
   async function take({ files, left }) {
-    if (!files.length) return setChildren(result, refusedNotice(new Error("None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.")));
+    if (!files.length)
+      return setChildren(
+        result,
+        refusedNotice(
+          new Error(
+            "None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.",
+          ),
+        ),
+      );
     setChildren(result, busyIndicator(`Reading ${files.map((file) => file.name).join(", ")} (${totalSize(files)})`));
     try {
       const made = await upload("/api/recordings", files);
@@ -52,17 +104,45 @@ export function importForm(taken) {
   return h("section", { class: "card stack", "aria-label": "Import" }, h("h2", {}, "Import"), zone, result);
 }
 
+/**
+ * @param {Imported} made
+ * @param {readonly string[]} left
+ */
 function acceptedNotice(made, left) {
-  const warnings = made.warnings ?? [];
-  return notice(warnings.length ? "bad" : "good", h("p", { class: "lead" }, `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`),
+  const warnings = made.warnings;
+  return notice(
+    warnings.length ? "bad" : "good",
+    h(
+      "p",
+      { class: "lead" },
+      `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`,
+    ),
     warnings.map((warning) => h("p", {}, `${warning.severity === "certain" ? "Wrong" : "Check"}: ${warning.text}`)),
     left.length ? h("p", { class: "small" }, `Left out of the folder: ${left.join(", ")}.`) : null,
-    h("div", { class: "row" },
-      h("a", { class: "button primary", href: `/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}` }, "Fit and explore"),
-      h("a", { class: "button", href: `/recordings/${made.recording}` }, "Look at it")));
+    h(
+      "div",
+      { class: "row" },
+      h(
+        "a",
+        {
+          class: "button primary",
+          href: `/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}`,
+        },
+        "Fit and explore",
+      ),
+      h("a", { class: "button", href: `/recordings/${made.recording}` }, "Look at it"),
+    ),
+  );
 }
 
-/** The error in large type: it names the file, column and row to correct. */
+/**
+ * The error in large type: it names the file, column and row to correct.
+ * @param {unknown} error
+ */
 function refusedNotice(error) {
-  return notice("bad", h("p", { class: "lead" }, error.message), h("p", { class: "small" }, "Nothing of it was kept."));
+  return notice(
+    "bad",
+    h("p", { class: "lead" }, messageOf(error)),
+    h("p", { class: "small" }, "Nothing of it was kept."),
+  );
 }

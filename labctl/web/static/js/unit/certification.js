@@ -1,11 +1,16 @@
 // Certification of a version: what is known of it, the questions that are asked, and the acts that were kept.
 
-import { get, post } from "../core/api.js";
+import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { instant, number } from "../core/format.js";
-import { chip, dialog, factList, notice, table } from "../core/components.js";
+import { chip, factList, notice, table } from "../core/components.js";
+import { dialog } from "../core/dialog.js";
 import { show } from "../core/router.js";
 
+/** @import { Assessment, Certification } from "../../../types/api.js" */
+/** @import { Field } from "../../../types/pages.js" */
+
+/** @type {Record<string, [text: string, kind: string]>} */
 const VERDICTS = {
   adequate: ["adequate", "good"],
   missing: ["missing", "warn"],
@@ -14,63 +19,146 @@ const VERDICTS = {
   insufficient_data: ["too little data", "warn"],
 };
 
-/** The verdict of an assessment, or the one that was kept with an act. */
+/**
+ * The verdict of an assessment, or the one that was kept with an act.
+ * @param {{ verdict: string | null }} known
+ */
 export function verdictChip(known) {
-  const [text, kind] = VERDICTS[known.verdict] ?? ["none", ""];
+  const [text, kind] = VERDICTS[known.verdict ?? ""] ?? ["none", ""];
   return chip(text, kind);
 }
 
-/** What was overridden by an act. */
-export const overridden = (act) => notice("warn", h("p", {}, h("strong", {}, "Certified against objections. "), `${act.by}: ${act.reason}`), act.objections.map((each) => h("p", { class: "small" }, each.text)));
+/**
+ * What was overridden by an act.
+ * @param {Certification} act
+ */
+export const overridden = (act) =>
+  notice(
+    "warn",
+    h("p", {}, h("strong", {}, "Certified against objections. "), `${act.by}: ${act.reason}`),
+    act.objections.map((each) => h("p", { class: "small" }, each.text)),
+  );
 
-/** Ask who certifies a version and why; the verdict on it is shown, and what would have to be overridden. */
-export async function askCertification(base, version) {
-  const known = await get(`${base}/calibrations/${version}/assessment`);
+/**
+ * Ask who certifies a version and why; the verdict on it is shown, and what would have to be overridden.
+ * @param {string} serial
+ * @param {number} version
+ */
+export async function askCertification(serial, version) {
+  const known = await get("/api/units/{serial}/calibrations/{version}/assessment", {
+    path: { serial, version },
+  });
   const needed = known.override_needed;
   const words = `A sentence: at least ${known.least_reason_characters} characters and ${known.least_reason_words} words.`;
-  const fields = [{ name: "by", label: "Who" },
-    { name: "reason", label: "Why", hint: needed ? words : null, minlength: needed ? known.least_reason_characters : null },
-    { name: "due_days", label: "Due again in days", type: "number", value: "365", required: false }];
+  /** @type {Field[]} */
+  const fields = [
+    { name: "by", label: "Who" },
+    {
+      name: "reason",
+      label: "Why",
+      hint: needed ? words : null,
+      minlength: needed ? known.least_reason_characters : null,
+    },
+    { name: "due_days", label: "Due again in days", type: "number", value: "365", required: false },
+  ];
   if (needed) fields.push({ name: "override", label: "Certify it all the same", type: "checkbox" });
   const answers = await dialog(`Put version ${version} in force`, fields, {
     text: "Whoever asks for this unit's calibration gets this version from now on. It is written to the audit trail.",
-    body: assessed(known), confirm: "Certify", kind: needed ? "danger" : "primary",
+    body: assessed(known),
+    confirm: "Certify",
+    kind: needed ? "danger" : "primary",
   });
+  if (!answers) return;
+  const body = {
+    by: answers.by,
+    reason: answers.reason,
+    ...(answers.due_days ? { due_days: Number(answers.due_days) } : {}),
+    ...(answers.override ? { override: true } : {}),
+  };
+  await post("/api/units/{serial}/calibrations/{version}/certify", { path: { serial, version }, body });
+  await show();
+}
+
+/**
+ * @param {string} serial
+ * @param {number} version
+ */
+export async function askRevocation(serial, version) {
+  const answers = await dialog(
+    `Take version ${version} out of force`,
+    [
+      { name: "by", label: "Who" },
+      { name: "reason", label: "Why" },
+    ],
+    {
+      text: "The unit then has no calibration in force. It is written to the audit trail.",
+      confirm: "Revoke",
+      kind: "danger",
+    },
+  );
   if (!answers) return;
   const body = { by: answers.by, reason: answers.reason };
-  if (answers.due_days) body.due_days = Number(answers.due_days);
-  if (answers.override) body.override = true;
-  await post(`${base}/calibrations/${version}/certify`, body);
+  await post("/api/units/{serial}/calibrations/{version}/revoke", { path: { serial, version }, body });
   await show();
 }
 
-export async function askRevocation(base, version) {
-  const answers = await dialog(`Take version ${version} out of force`, [{ name: "by", label: "Who" }, { name: "reason", label: "Why" }], {
-    text: "The unit then has no calibration in force. It is written to the audit trail.", confirm: "Revoke", kind: "danger",
-  });
-  if (!answers) return;
-  await post(`${base}/calibrations/${version}/revoke`, { by: answers.by, reason: answers.reason });
-  await show();
-}
-
-/** What is known of a version: verdict, errors, objections. */
+/**
+ * What is known of a version: verdict, errors, objections.
+ * @param {Assessment} known
+ */
 function assessed(known) {
-  return h("div", { class: "stack" },
+  return h(
+    "div",
+    { class: "stack" },
     factList([
       ["Verdict", verdictChip(known), null, known.verdict_recording ? `recording ${known.verdict_recording}` : null],
-      ["RMS error", number(known.error.rms_dps), "deg/s", known.error.raw_rms_dps === null ? null : `${number(known.error.raw_rms_dps)} without correction`],
+      [
+        "RMS error",
+        number(known.error.rms_dps),
+        "deg/s",
+        known.error.raw_rms_dps === null ? null : `${number(known.error.raw_rms_dps)} without correction`,
+      ],
       ["At unseen temperatures", number(known.error.heldout_rms_dps), "deg/s"],
     ]),
-    known.objections.some((each) => each.what === "verdict") ? null : h("p", {}, known.verdict_text || `No verdict: ${known.verdict_reason}.`),
-    known.objections.length ? notice("bad", h("p", {}, h("strong", {}, "This speaks against it:")), h("ul", { class: "plain" }, known.objections.map((each) => h("li", {}, `${each.text}. To do: ${each.do}.`)))) : null);
+    known.objections.some((each) => each.what === "verdict")
+      ? null
+      : h("p", {}, known.verdict_text || `No verdict: ${known.verdict_reason}.`),
+    known.objections.length
+      ? notice(
+          "bad",
+          h("p", {}, h("strong", {}, "This speaks against it:")),
+          h(
+            "ul",
+            { class: "plain" },
+            known.objections.map((each) => h("li", {}, `${each.text}. To do: ${each.do}.`)),
+          ),
+        )
+      : null,
+  );
 }
 
+/** @param {readonly Certification[]} history */
 export function certificationTable(history) {
-  return table([
-    { title: "When", cell: (act) => instant(act.at) },
-    { title: "What", cell: (act) => `${act.act} version ${act.version}` },
-    { title: "Verdict", cell: (act) => (act.override === null ? "–" : h("span", { class: "row tight", title: act.verdict_text || act.verdict_reason }, verdictChip(act), act.override ? chip("overridden", "bad") : null)) },
-    { title: "Who", cell: (act) => act.by },
-    { title: "Why", prose: true, cell: (act) => act.reason },
-  ], history, { label: "Certifications" });
+  return table(
+    [
+      { title: "When", cell: (act) => instant(act.at) },
+      { title: "What", cell: (act) => `${act.act} version ${act.version}` },
+      {
+        title: "Verdict",
+        cell: (act) =>
+          act.override === null
+            ? "–"
+            : h(
+                "span",
+                { class: "row tight", title: act.verdict_text || act.verdict_reason },
+                verdictChip(act),
+                act.override ? chip("overridden", "bad") : null,
+              ),
+      },
+      { title: "Who", cell: (act) => act.by },
+      { title: "Why", prose: true, cell: (act) => act.reason },
+    ],
+    history,
+    { label: "Certifications" },
+  );
 }

@@ -1,91 +1,171 @@
 // Uncertainty in use of a version: over what was calibrated, and its parts at one rate and temperature.
 
-import { get } from "../core/api.js";
+import { get } from "../core/http/api.js";
+import { isAbort, messageOf } from "../core/http/errors.js";
 import { h, setChildren } from "../core/elements.js";
 import { number } from "../core/format.js";
-import { busyIndicator, chip, labelledField, notice, table } from "../core/components.js";
+import { busyIndicator, notice, table } from "../core/components.js";
+import { labelledField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
+import { atPlace, joined, shown, titleOf, unknown } from "./uncertainty_parts.js";
 
-/** Parts of a standard uncertainty: key, title, where a known one is from. */
-const PARTS = [
-  ["coefficients", "Coefficients", () => "covariance of the fit"],
-  ["model", "Model and drift nearby", () => "data sets left out of the fit"],
-  ["repeatability", "From one power-on to the next", (one) => one.repeatability_source],
-];
-/** Uncertainties have two significant digits (GUM 7.2.6). */
-const shown = (u_dps) => number(u_dps, 2);
-const unknown = () => h("span", { class: "warn-text" }, "unknown");
-const joined = (names) => (names.length > 1 ? `${names.slice(0, -1).join(", ")} and ${names.at(-1)}` : names[0]);
+/** @import { AxisUncertainty, Uncertainty, Validity, Version } from "../../../types/api.js" */
+
+const PATH = "/api/units/{serial}/calibrations/{version}/uncertainty";
+/** @param {string} text */
 const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
-const titleOf = (part) => PARTS.find(([key]) => key === part)[1];
-
-/** Return {element, show(version)}: the uncertainty of a version, which is the answer about it. `base`: path of the unit. */
-export function uncertaintyInUse(base, signal) {
+/**
+ * Return {element, show(version)}: the uncertainty of a version, which is the answer about it.
+ * @param {string} serial
+ * @param {AbortSignal} signal
+ */
+export function uncertaintyInUse(serial, signal) {
   const element = h("div", { class: "stack" });
   let latest = 0;
-  return { element, show: async (version) => {
-    const own = ++latest;
-    const path = `${base}/calibrations/${version.version}/uncertainty`;
-    setChildren(element, busyIndicator("Working out the uncertainty"));
-    try {
-      const place = placeOf(version.validity);
-      const answer = await get(path, { query: { ...place, grid: true }, signal });
-      if (own === latest) setChildren(element, over(answer), parts(answer, place, path, signal));
-    } catch (error) {
-      // a model that needs more than a rate and a temperature, or without data to be uncertain by
-      if (error.name !== "AbortError" && own === latest) setChildren(element, notice("warn", h("strong", {}, "Unknown: "), error.message));
-    }
-  } };
+  return {
+    element,
+    /** @param {Version} version */
+    show: async (version) => {
+      const own = ++latest;
+      const path = { serial, version: version.version };
+      setChildren(element, busyIndicator("Working out the uncertainty"));
+      try {
+        const place = placeOf(version.validity);
+        const answer = await get(PATH, { path, query: { ...place, grid: true }, signal });
+        if (own === latest) setChildren(element, over(answer), parts(answer, place, path, signal));
+      } catch (error) {
+        // a model that needs more than a rate and a temperature, or without data to be uncertain by
+        if (!isAbort(error) && own === latest)
+          setChildren(element, notice("warn", h("strong", {}, "Unknown: "), messageOf(error)));
+      }
+    },
+  };
 }
 
-/** The place of the address, or the middle of the temperatures at half of the fastest rate. */
+/**
+ * The place of the address, or the middle of the temperatures at half of the fastest rate.
+ * @param {Validity} validity
+ */
 function placeOf({ rate_dps, temperature_c }) {
   const asked = query();
+  /**
+   * @param {string | undefined} text
+   * @param {number} otherwise
+   */
   const given = (text, otherwise) => (text && Number.isFinite(Number(text)) ? Number(text) : otherwise);
-  return { rate_dps: given(asked.rate, Number(((rate_dps[1] ?? 0) / 2).toPrecision(3))), temperature_c: given(asked.temperature, Number(((temperature_c[0] + temperature_c[1]) / 2).toFixed(1))) };
+  return {
+    rate_dps: given(asked.rate, Number(((rate_dps[1] ?? 0) / 2).toPrecision(3))),
+    temperature_c: given(asked.temperature, Number(((temperature_c[0] + temperature_c[1]) / 2).toFixed(1))),
+  };
 }
 
-/** The table over what was calibrated: a row for each axis and temperature, a column for each rate. */
+/**
+ * The table over what was calibrated: a row for each axis and temperature, a column for each rate.
+ * @param {Uncertainty} answer
+ */
 function over({ grid, coverage_factor }) {
-  const rows = Object.entries(grid.axes).flatMap(([axis, lines]) => lines.map((cells, k) => ({ axis, warm: grid.temperature_c[k], cells })));
+  if (!grid) return null;
+  const rows = Object.entries(grid.axes).flatMap(([axis, lines]) =>
+    lines.map((cells, k) => ({ axis, warm: grid.temperature_c[k], cells })),
+  );
   const several = Object.keys(grid.axes).length > 1;
-  return h("div", { class: "stack" },
-    h("p", { class: "muted small" }, `How far a corrected rate may be off on a later day, after another power-on: expanded uncertainty in deg/s, k = ${coverage_factor}, about 95 %. The noise of a single reading comes on top.`),
-    table([
-      several ? { title: "Axis", cell: (row) => row.axis } : null,
-      { title: "deg C", number: true, cell: (row) => row.warm.toFixed(1) },
-      ...grid.rate_dps.map((rate, k) => ({ title: `${number(rate, 3)} deg/s`, number: true, cell: (row) => cell(row.cells[k], coverage_factor) })),
-    ].filter(Boolean), rows, { dense: true, label: "Uncertainty in use" }),
-    reasons(rows.flatMap((row) => row.cells)));
+  return h(
+    "div",
+    { class: "stack" },
+    h(
+      "p",
+      { class: "muted small" },
+      `How far a corrected rate may be off on a later day, after another power-on: expanded uncertainty in deg/s, k = ${coverage_factor}, about 95 %. The noise of a single reading comes on top.`,
+    ),
+    table(
+      [
+        several ? { title: "Axis", cell: (row) => row.axis } : null,
+        { title: "deg C", number: true, cell: (row) => row.warm.toFixed(1) },
+        ...grid.rate_dps.map((rate, k) => ({
+          title: `${number(rate, 3)} deg/s`,
+          number: true,
+          /** @param {{ cells: readonly AxisUncertainty[] }} row */
+          cell: (row) => cell(row.cells[k], coverage_factor),
+        })),
+      ],
+      rows,
+      { dense: true, label: "Uncertainty in use" },
+    ),
+    reasons(rows.flatMap((row) => row.cells)),
+  );
 }
 
-/** An expanded uncertainty; where it is unknown, what is known of it below. */
+/**
+ * An expanded uncertainty; where it is unknown, what is known of it below.
+ * @param {AxisUncertainty} one
+ * @param {number} k
+ */
 function cell(one, k) {
   if (one.expanded_dps !== null) return shown(one.expanded_dps);
-  const least = one.same_run_dps === null ? null : h("div", { class: "muted small" }, `same run ${shown(k * one.same_run_dps)}`);
+  const least =
+    one.same_run_dps === null ? null : h("div", { class: "muted small" }, `same run ${shown(k * one.same_run_dps)}`);
   return [unknown(), least];
 }
 
-/** Why some of the cells are unknown, one line for each reason. */
+/**
+ * Why some of the cells are unknown, one line for each reason.
+ * @param {readonly AxisUncertainty[]} cells
+ */
 function reasons(cells) {
+  /** @type {Map<string, { parts: Set<string>, cells: Set<AxisUncertainty> }>} */
   const found = new Map();
-  for (const one of cells) for (const [part, why] of Object.entries(one.unknown)) {
-    const places = found.get(why) ?? { parts: new Set(), cells: new Set() };
-    places.parts.add(titleOf(part).toLowerCase());
-    places.cells.add(one);
-    found.set(why, places);
-  }
+  for (const one of cells)
+    for (const [part, why] of Object.entries(one.unknown)) {
+      const places = found.get(why) ?? { parts: new Set(), cells: new Set() };
+      places.parts.add(titleOf(part).toLowerCase());
+      places.cells.add(one);
+      found.set(why, places);
+    }
   if (!found.size) return null;
+  /** @param {number} n */
   const where = (n) => (n === cells.length ? "" : ` (${n} of ${cells.length} cells)`);
-  return notice("warn", h("p", {}, h("strong", {}, "Why it is unknown:")),
-    h("ul", { class: "plain" }, [...found].map(([why, { parts: names, cells: here }]) => h("li", {}, `${sentence(joined([...names]))}: ${why}${where(here.size)}.`))),
-    cells.some((one) => one.expanded_dps === null && one.same_run_dps !== null) ? h("p", { class: "small" }, "“same run”: coefficients and model alone, expanded; it holds only until the unit is switched off.") : null);
+  return notice(
+    "warn",
+    h("p", {}, h("strong", {}, "Why it is unknown:")),
+    h(
+      "ul",
+      { class: "plain" },
+      [...found].map(([why, { parts: names, cells: here }]) =>
+        h("li", {}, `${sentence(joined([...names]))}: ${why}${where(here.size)}.`),
+      ),
+    ),
+    cells.some((one) => one.expanded_dps === null && one.same_run_dps !== null)
+      ? h(
+          "p",
+          { class: "small" },
+          "“same run”: coefficients and model alone, expanded; it holds only until the unit is switched off.",
+        )
+      : null,
+  );
 }
 
-/** The parts at a place that can be chosen. */
+/**
+ * The parts at a place that can be chosen.
+ * @param {Uncertainty} first
+ * @param {{ rate_dps: number, temperature_c: number }} place
+ * @param {{ serial: string, version: number }} path
+ * @param {AbortSignal} signal
+ */
 function parts(first, place, path, signal) {
   const result = h("div", { class: "stack", "aria-live": "polite" });
-  const input = (value) => h("input", { type: "number", step: "any", required: true, value: String(value), style: "width: 9rem", onchange: ask });
+  /**
+   * @param {number} value
+   * @returns {HTMLInputElement}
+   */
+  const input = (value) =>
+    h("input", {
+      type: "number",
+      step: "any",
+      required: true,
+      value: String(value),
+      style: "width: 9rem",
+      onchange: ask,
+    });
   const [rate, warm] = [input(place.rate_dps), input(place.temperature_c)];
   let latest = 0;
   async function ask() {
@@ -93,43 +173,19 @@ function parts(first, place, path, signal) {
     const own = ++latest;
     updateQuery({ rate: rate.value, temperature: warm.value });
     try {
-      const answer = await get(path, { query: { rate_dps: rate.value, temperature_c: warm.value }, signal });
+      const asked = { rate_dps: Number(rate.value), temperature_c: Number(warm.value) };
+      const answer = await get(PATH, { path, query: asked, signal });
       if (own === latest) setChildren(result, atPlace(answer));
     } catch (error) {
-      if (error.name !== "AbortError" && own === latest) setChildren(result, notice("bad", error.message));
+      if (!isAbort(error) && own === latest) setChildren(result, notice("bad", messageOf(error)));
     }
   }
   setChildren(result, atPlace(first));
-  return h("div", { class: "stack" }, h("h3", {}, "What it is made of"),
-    h("div", { class: "row" }, labelledField("Rate, deg/s", rate), labelledField("Temperature, deg C", warm)), result);
-}
-
-function atPlace(answer) {
-  const axes = Object.entries(answer.axes);
-  const figure = (value, strong) => (value === null ? unknown() : strong ? h("strong", {}, shown(value)) : shown(value));
-  const k = answer.coverage_factor;
-  const rows = [
-    ...PARTS.map(([part, title, source]) => ({ title, of: (one) => figure(one[`${part}_dps`]), from: (one) => one.unknown[part] ?? source(one) })),
-    { title: "Combined", of: (one) => figure(one.combined_dps), from: becauseOf },
-    { title: `Expanded, k = ${k}`, of: (one) => figure(one.expanded_dps, true), from: becauseOf },
-    axes.some(([, one]) => one.expanded_dps === null && one.same_run_dps !== null)
-      ? { title: `Same run, expanded, k = ${k}`, of: (one) => figure(one.same_run_dps === null ? null : k * one.same_run_dps), from: () => "coefficients and model alone, without another power-on" } : null,
-  ].filter(Boolean);
-  return h("div", { class: "stack" },
-    answer.inside ? null : h("p", {}, chip("outside", "warn"), " This rate or temperature was not calibrated: the figures are extrapolated."),
-    table([
-      { title: "Standard uncertainty, deg/s", cell: (row) => row.title },
-      ...axes.map(([axis, one]) => ({ title: `Axis ${axis}`, number: true, cell: (row) => row.of(one) })),
-      { title: "From", prose: true, cell: (row) => byAxis(axes, row.from) },
-    ], rows, { label: "Parts of the uncertainty" }));
-}
-
-/** What an unknown sum lacks. */
-const becauseOf = (one) => (one.combined_dps === null ? `unknown, as ${joined(Object.keys(one.unknown))} ${Object.keys(one.unknown).length > 1 ? "are" : "is"}` : one.repeatability_source === "between runs" ? "all parts, wider for few power-ons" : "all parts");
-
-/** A text of each axis, once where all say the same. */
-function byAxis(axes, text) {
-  const texts = axes.map(([axis, one]) => [axis, text(one)]);
-  if (new Set(texts.map(([, said]) => said)).size === 1) return texts[0][1];
-  return texts.map(([axis, said]) => h("div", {}, `axis ${axis}: ${said}`));
+  return h(
+    "div",
+    { class: "stack" },
+    h("h3", {}, "What it is made of"),
+    h("div", { class: "row" }, labelledField("Rate, deg/s", rate), labelledField("Temperature, deg C", warm)),
+    result,
+  );
 }

@@ -2,21 +2,66 @@
 
 import { h } from "../../core/elements.js";
 import { axisColour, colour, figure } from "../../core/figure.js";
-import { linesOf, ownRows, positionsOf } from "./rows.js";
+import { linesOf, ownRows, pickRows, positionsOf } from "./rows.js";
 
+/** @import { Comparison } from "../../../../types/api.js" */
+/** @import { Picture } from "../../../../types/pages.js" */
+/** @import { ExploreState } from "../state.js" */
+
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function atRest(comparison, state) {
   const own = ownRows(comparison, state.axis);
-  const here = own.table_rate_dps.map((rate, k) => (Math.abs(rate) < comparison.at_rest_dps ? k : -1)).filter((k) => k >= 0);
+  const here = own.table_rate_dps
+    .map((rate, k) => (Math.abs(rate) < comparison.at_rest_dps ? k : -1))
+    .filter((k) => k >= 0);
   if (!here.length) return h("p", { class: "muted" }, "No data set of this recording is at rest.");
-  const at = (name) => here.map((k) => own[name][k]);
-  const lines = linesOf(comparison.over_temperature, state.axis, positionsOf({ position: at("position") }));
+  const rest = pickRows(own, here);
+  const lines = linesOf(comparison.over_temperature, state.axis, positionsOf(rest));
   const floor = state.criticism.error.noise_floor_dps;
+  /** @returns {Picture} */
   const draw = () => ({
     data: [
-      ...lines.flatMap((each) => each.level.flatMap((level, k) => (Math.abs(level) < comparison.at_rest_dps ? [{ type: "scatter", mode: "lines", name: "model", x: each.at, y: each.error_dps[k], line: { color: colour("text"), width: 1.5 }, hoverinfo: "skip" }] : []))),
-      { type: "scatter", mode: "markers", name: "measured", x: at("temperature_c"), y: at("measured_error_dps"), customdata: at("dataset"), error_y: floor ? { type: "constant", value: 2 * floor, thickness: 1, width: 0 } : undefined, marker: { color: axisColour(state.axis), size: 7 }, hovertemplate: "data set %{customdata}<br>%{x:.4g} deg C: %{y:.4g} deg/s<extra></extra>" },
+      ...lines.flatMap((each) =>
+        each.level.flatMap((level, k) =>
+          Math.abs(level) < comparison.at_rest_dps
+            ? [
+                {
+                  type: "scatter",
+                  mode: "lines",
+                  name: "model",
+                  x: each.at,
+                  y: each.error_dps[k],
+                  line: { color: colour("text"), width: 1.5 },
+                  hoverinfo: "skip",
+                },
+              ]
+            : [],
+        ),
+      ),
+      {
+        type: "scatter",
+        mode: "markers",
+        name: "measured",
+        x: rest.temperature_c,
+        y: rest.measured_error_dps,
+        customdata: rest.dataset,
+        error_y: floor ? { type: "constant", value: 2 * floor, thickness: 1, width: 0 } : undefined,
+        marker: { color: axisColour(state.axis), size: 7 },
+        hovertemplate: "data set %{customdata}<br>%{x:.4g} deg C: %{y:.4g} deg/s<extra></extra>",
+      },
     ],
-    layout: { xaxis: { title: { text: "gyro temperature, deg C" } }, yaxis: { title: { text: "error at rest, deg/s" } } },
+    layout: {
+      xaxis: { title: { text: "gyro temperature, deg C" } },
+      yaxis: { title: { text: "error at rest, deg/s" } },
+    },
   });
-  return figure("Error at rest", `Axis ${state.axis} at rest over temperature, the Earth's rate taken off where the latitude is known; bars are two noise floors.`, draw, { height: "22rem" });
+  return figure(
+    "Error at rest",
+    `Axis ${state.axis} at rest over temperature, the Earth's rate taken off where the latitude is known; bars are two noise floors.`,
+    draw,
+    { height: "22rem" },
+  );
 }

@@ -5,34 +5,108 @@ import { temperatureColours } from "../../core/colour_scales.js";
 import { h } from "../../core/elements.js";
 import { figure } from "../../core/figure.js";
 import { number, plainNumber } from "../../core/format.js";
-import { ownRows, rms, span } from "./rows.js";
+import { ownRows, pickRows, rms, span } from "./rows.js";
 import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
+
+/** @import { Comparison } from "../../../../types/api.js" */
+/** @import { PlotTrace } from "../../../../types/pages.js" */
+/** @import { Rows } from "./rows.js" */
+/** @import { Axes } from "./scenes.js" */
+/** @import { ExploreState } from "../state.js" */
 
 /** More temperature levels than this are dots without lines. */
 const MOST_LINES = 24;
 
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function fullTurn(comparison, state) {
   const own = ownRows(comparison, state.axis);
   const here = own.dataset.map((_, k) => k).filter((k) => own.turn_before_deg[k] !== null);
-  if (!here.length) return h("p", { class: "muted" }, `No data set of this recording turns the axis at ${comparison.least_turn_rate_dps} deg/s or more, or none is at rest.`);
-  const rows = Object.fromEntries(Object.entries(own).map(([name, values]) => [name, here.map((k) => values[k])]));
+  if (!here.length)
+    return h(
+      "p",
+      { class: "muted" },
+      `No data set of this recording turns the axis at ${comparison.least_turn_rate_dps} deg/s or more, or none is at rest.`,
+    );
+  const rows = pickRows(own, here);
+  const turn = { before: numbersOf(rows.turn_before_deg), after: numbersOf(rows.turn_after_deg) };
   const draw = () => {
     const colours = temperatureColours(rows.temperature_c, barPlace());
-    const titles = [["turn_before_deg", "before: static bias off only"], ["turn_after_deg", "after the calibration"]].map(([name, title]) => `${title}, RMS ${number(rms(rows[name]), 2)} deg`);
-    const axes = { x: ["rate, deg/s", span(rows.rate)], y: ["deg C", span(rows.temperature_c)], z: ["deg per turn", span([...rows.turn_before_deg, ...rows.turn_after_deg])] };
+    const titles = [
+      `before: static bias off only, RMS ${number(rms(turn.before), 2)} deg`,
+      `after the calibration, RMS ${number(rms(turn.after), 2)} deg`,
+    ];
+    /** @type {Axes} */
+    const axes = {
+      x: ["rate, deg/s", span(rows.rate)],
+      y: ["deg C", span(rows.temperature_c)],
+      z: ["deg per turn", span([...turn.before, ...turn.after])],
+    };
     return {
-      data: [...turnTraces(rows, "turn_before_deg", "scene", colours), ...turnTraces(rows, "turn_after_deg", "scene2", colours)],
+      data: [
+        ...turnTraces(rows, turn.before, "before", "scene", colours),
+        ...turnTraces(rows, turn.after, "after", "scene2", colours),
+      ],
       layout: { ...sceneLayout(titles, axes), coloraxis: colours.axis, showlegend: false },
     };
   };
-  return figure("Error after a full turn", `How far a heading is off after one turn about axis ${state.axis}, from ${comparison.least_turn_rate_dps} deg/s on: left with the static bias at rest taken off only, right with the calibration and the static bias that it leaves, both on the same axes. Blue is cold, red is hot.`, draw, { height: twoScenes() });
+  return figure(
+    "Error after a full turn",
+    `How far a heading is off after one turn about axis ${state.axis}, from ${comparison.least_turn_rate_dps} deg/s on: left with the static bias at rest taken off only, right with the calibration and the static bias that it leaves, both on the same axes. Blue is cold, red is hot.`,
+    draw,
+    { height: twoScenes() },
+  );
 }
 
-function turnTraces(rows, name, scene, colours) {
+/** @param {readonly (number | null)[]} values */
+const numbersOf = (values) => values.map((value) => value ?? 0);
+
+/**
+ * @param {Rows} rows
+ * @param {readonly number[]} turn
+ * @param {string} name
+ * @param {string} scene
+ * @param {{ of: (temperature: number) => string }} colours
+ * @returns {PlotTrace[]}
+ */
+function turnTraces(rows, turn, name, scene, colours) {
   const levels = [...new Set(rows.temperature_level_c)].sort((a, b) => a - b);
-  const dots = { type: "scatter3d", mode: "markers", name, scene, x: rows.rate, y: rows.temperature_c, z: rows[name], marker: { size: 3, color: rows.temperature_c, coloraxis: "coloraxis" }, customdata: rows.dataset, hovertemplate: "data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C<br>%{z:.3g} deg per turn<extra></extra>" };
-  return levels.length > MOST_LINES ? [dots] : [...levels.flatMap((level) => [-1, 1].map((side) => {
-    const line = rows.rate.map((_, k) => k).filter((k) => rows.temperature_level_c[k] === level && side * rows.rate[k] > 0).sort((a, b) => rows.rate[a] - rows.rate[b]);
-    return { type: "scatter3d", mode: "lines", name: `${plainNumber(level, 3)} deg C`, scene, x: line.map((k) => rows.rate[k]), y: line.map((k) => rows.temperature_c[k]), z: line.map((k) => rows[name][k]), line: { color: colours.of(level), width: 3 }, hoverinfo: "skip" };
-  })), dots];
+  const dots = {
+    type: "scatter3d",
+    mode: "markers",
+    name,
+    scene,
+    x: rows.rate,
+    y: rows.temperature_c,
+    z: turn,
+    marker: { size: 3, color: rows.temperature_c, coloraxis: "coloraxis" },
+    customdata: rows.dataset,
+    hovertemplate: "data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C<br>%{z:.3g} deg per turn<extra></extra>",
+  };
+  return levels.length > MOST_LINES
+    ? [dots]
+    : [
+        ...levels.flatMap((level) =>
+          [-1, 1].map((side) => {
+            const line = rows.rate
+              .map((_, k) => k)
+              .filter((k) => rows.temperature_level_c[k] === level && side * rows.rate[k] > 0)
+              .sort((a, b) => rows.rate[a] - rows.rate[b]);
+            return {
+              type: "scatter3d",
+              mode: "lines",
+              name: `${plainNumber(level, 3)} deg C`,
+              scene,
+              x: line.map((k) => rows.rate[k]),
+              y: line.map((k) => rows.temperature_c[k]),
+              z: line.map((k) => turn[k]),
+              line: { color: colours.of(level), width: 3 },
+              hoverinfo: "skip",
+            };
+          }),
+        ),
+        dots,
+      ];
 }

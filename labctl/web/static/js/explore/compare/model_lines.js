@@ -5,18 +5,65 @@ import { figure } from "../../core/figure.js";
 import { plainNumber } from "../../core/format.js";
 import { alongRate, linesOf, ownRows, positionsOf, rowsWhere, signOf } from "./rows.js";
 
+/** @import { Comparison, ModelLines } from "../../../../types/api.js" */
+/** @import { PlotLayout, PlotTrace } from "../../../../types/pages.js" */
+/** @import { Rows } from "./rows.js" */
+/** @import { ExploreState } from "../state.js" */
+
 const PANEL_PX = { wide: 210, narrow: 230 };
 const isNarrow = () => window.innerWidth < 760;
 
-/** Dots of some rows, coloured by `colours`. */
+/**
+ * Dots of some rows, coloured by `colours`.
+ * @param {Rows} rows
+ * @param {readonly number[]} x
+ * @param {readonly number[]} colours
+ * @param {string} unit
+ * @param {object} [more]
+ * @returns {PlotTrace}
+ */
 const dots = (rows, x, colours, unit, more) => ({
-  type: "scatter", mode: "markers", name: "measured", x, y: rows.measured_error_dps, customdata: rows.dataset, marker: { size: 5, color: colours, coloraxis: "coloraxis" }, showlegend: false,
-  hovertemplate: `data set %{customdata}<br>%{x:.5g} ${unit}: %{y:.4g} deg/s<extra></extra>`, ...more,
+  type: "scatter",
+  mode: "markers",
+  name: "measured",
+  x,
+  y: rows.measured_error_dps,
+  customdata: rows.dataset,
+  marker: { size: 5, color: colours, coloraxis: "coloraxis" },
+  showlegend: false,
+  hovertemplate: `data set %{customdata}<br>%{x:.5g} ${unit}: %{y:.4g} deg/s<extra></extra>`,
+  ...more,
 });
-const line = (x, y, name, shade, more) => ({ type: "scatter", mode: "lines", name, x, y, line: { color: shade, width: 1.5 }, hovertemplate: `model at ${name}<br>%{x:.5g}: %{y:.4g} deg/s<extra></extra>`, showlegend: false, ...more });
+/**
+ * @param {readonly number[]} x
+ * @param {readonly number[]} y
+ * @param {string} name
+ * @param {string} shade
+ * @param {object} [more]
+ * @returns {PlotTrace}
+ */
+const line = (x, y, name, shade, more) => ({
+  type: "scatter",
+  mode: "lines",
+  name,
+  x,
+  y,
+  line: { color: shade, width: 1.5 },
+  hovertemplate: `model at ${name}<br>%{x:.5g}: %{y:.4g} deg/s<extra></extra>`,
+  showlegend: false,
+  ...more,
+});
 
-const ofAll = (lines) => (lines.length && lines[0].level.length < lines[0].levels ? ` Lines: ${lines[0].level.length} of ${lines[0].levels} levels, all dots.` : "");
+/** @param {readonly ModelLines[]} lines */
+const ofAll = (lines) =>
+  lines.length && lines[0].level.length < lines[0].levels
+    ? ` Lines: ${lines[0].level.length} of ${lines[0].levels} levels, all dots.`
+    : "";
 
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function overRate(comparison, state) {
   const rows = ownRows(comparison, state.axis);
   const lines = linesOf(comparison.over_rate, state.axis, positionsOf(rows));
@@ -24,15 +71,32 @@ export function overRate(comparison, state) {
     const colours = temperatureColours(rows.temperature_c);
     return {
       data: [
-        ...lines.flatMap((each) => each.level.map((level, k) => line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} deg C`, colours.of(level)))),
+        ...lines.flatMap((each) =>
+          each.level.map((level, k) =>
+            line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} deg C`, colours.of(level)),
+          ),
+        ),
         dots(rows, rows.rate, rows.temperature_c, "deg/s"),
       ],
-      layout: { coloraxis: colours.axis, xaxis: { title: { text: "rate about the axis, deg/s" } }, yaxis: { title: { text: "error, deg/s" } } },
+      layout: {
+        coloraxis: colours.axis,
+        xaxis: { title: { text: "rate about the axis, deg/s" } },
+        yaxis: { title: { text: "error, deg/s" } },
+      },
     };
   };
-  return figure("Error over rate", `Dots are measured, lines the model of axis ${state.axis} at each temperature level; blue is cold, red is hot. Where dots leave their line, the model fails.${ofAll(lines)}`, draw, { height: "24rem" });
+  return figure(
+    "Error over rate",
+    `Dots are measured, lines the model of axis ${state.axis} at each temperature level; blue is cold, red is hot. Where dots leave their line, the model fails.${ofAll(lines)}`,
+    draw,
+    { height: "24rem" },
+  );
 }
 
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function overTemperature(comparison, state) {
   const rows = ownRows(comparison, state.axis);
   const lines = linesOf(comparison.over_temperature, state.axis, positionsOf(rows));
@@ -40,16 +104,37 @@ export function overTemperature(comparison, state) {
     const colours = rateColours(rows.rate);
     return {
       data: [
-        ...lines.flatMap((each) => each.level.map((level, k) => line(each.at, each.error_dps[k], `${plainNumber(signOf(each.position) * level, 4)} deg/s`, colours.of(signOf(each.position) * level)))),
+        ...lines.flatMap((each) =>
+          each.level.map((level, k) =>
+            line(
+              each.at,
+              each.error_dps[k],
+              `${plainNumber(signOf(each.position) * level, 4)} deg/s`,
+              colours.of(signOf(each.position) * level),
+            ),
+          ),
+        ),
         dots(rows, rows.temperature_c, rows.rate, "deg C"),
       ],
-      layout: { coloraxis: colours.axis, xaxis: { title: { text: "gyro temperature, deg C" } }, yaxis: { title: { text: "error, deg/s" } } },
+      layout: {
+        coloraxis: colours.axis,
+        xaxis: { title: { text: "gyro temperature, deg C" } },
+        yaxis: { title: { text: "error, deg/s" } },
+      },
     };
   };
-  return figure("Error over temperature", `Dots are measured, lines the model of axis ${state.axis} at each rate: violet is negative, green is positive.${ofAll(lines)}`, draw, { height: "24rem" });
+  return figure(
+    "Error over temperature",
+    `Dots are measured, lines the model of axis ${state.axis} at each rate: violet is negative, green is positive.${ofAll(lines)}`,
+    draw,
+    { height: "24rem" },
+  );
 }
 
-/** A panel for each output (row) and turning axis (column): Yang's nine where three axes were turned. */
+/**
+ * A panel for each output (row) and turning axis (column): Yang's nine where three axes were turned.
+ * @param {Comparison} comparison
+ */
 export function allPanels(comparison) {
   const outputs = [...new Set(comparison.columns.axis)];
   const positions = [...new Set(comparison.columns.position)];
@@ -59,25 +144,56 @@ export function allPanels(comparison) {
     const columns = below ? 1 : positions.length;
     const colours = temperatureColours(comparison.columns.temperature_c);
     const rowsOfPanels = Math.ceil(panels.length / columns);
+    /** @type {PlotLayout} */
     const layout = {
-      coloraxis: colours.axis, annotations: [], margin: { l: 62, r: 8, t: 26, b: 46 }, height: 60 + rowsOfPanels * (below ? PANEL_PX.narrow : PANEL_PX.wide),
+      coloraxis: colours.axis,
+      annotations: [],
+      margin: { l: 62, r: 8, t: 26, b: 46 },
+      height: 60 + rowsOfPanels * (below ? PANEL_PX.narrow : PANEL_PX.wide),
       grid: { rows: rowsOfPanels, columns, pattern: "independent", xgap: 0.22, ygap: 0.34 },
     };
     const data = panels.flatMap(({ axis, position }, panel) => {
       const id = panel ? String(panel + 1) : "";
       const place = { xaxis: `x${id}`, yaxis: `y${id}` };
       const rows = rowsWhere(comparison, (k, each) => each.axis[k] === axis && each.position[k] === position);
-      layout[`xaxis${id}`] = { title: panel >= panels.length - columns ? { text: "rate about the axis, deg/s" } : undefined };
+      layout[`xaxis${id}`] = {
+        title: panel >= panels.length - columns ? { text: "rate about the axis, deg/s" } : undefined,
+      };
       layout[`yaxis${id}`] = { title: panel % columns ? undefined : { text: "error, deg/s" }, nticks: 5 };
-      layout.annotations.push({ text: `output ${axis}, turning about ${position}`, showarrow: false, xref: `x${id} domain`, yref: `y${id} domain`, x: 0, y: 1.02, xanchor: "left", yanchor: "bottom", font: { size: 12 } });
+      layout.annotations.push({
+        text: `output ${axis}, turning about ${position}`,
+        showarrow: false,
+        xref: `x${id} domain`,
+        yref: `y${id} domain`,
+        x: 0,
+        y: 1.02,
+        xanchor: "left",
+        yanchor: "bottom",
+        font: { size: 12 },
+      });
       const lines = linesOf(comparison.over_rate, axis, [position]);
       return [
-        ...lines.flatMap((each) => each.level.map((level, k) => line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} deg C`, colours.of(level), place))),
-        dots(rows, rows.rate, rows.temperature_c, "deg/s", { ...place, name: `${axis} about ${position}`, marker: { size: 4, color: rows.temperature_c, coloraxis: "coloraxis" } }),
+        ...lines.flatMap((each) =>
+          each.level.map((level, k) =>
+            line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} deg C`, colours.of(level), place),
+          ),
+        ),
+        dots(rows, rows.rate, rows.temperature_c, "deg/s", {
+          ...place,
+          name: `${axis} about ${position}`,
+          marker: { size: 4, color: rows.temperature_c, coloraxis: "coloraxis" },
+        }),
       ];
     });
     return { data, layout };
   };
-  const height = 60 + Math.ceil(panels.length / (isNarrow() ? 1 : positions.length)) * (isNarrow() ? PANEL_PX.narrow : PANEL_PX.wide);
-  return figure("Error of every output for every turning axis", "Rows are outputs, columns the axis that is turned: scale factor on the diagonal, misalignment and cross effects beside it. Blue is cold, red is hot; each panel has its own scale of errors.", draw, { height: `${height}px` });
+  const height =
+    60 +
+    Math.ceil(panels.length / (isNarrow() ? 1 : positions.length)) * (isNarrow() ? PANEL_PX.narrow : PANEL_PX.wide);
+  return figure(
+    "Error of every output for every turning axis",
+    "Rows are outputs, columns the axis that is turned: scale factor on the diagonal, misalignment and cross effects beside it. Blue is cold, red is hot; each panel has its own scale of errors.",
+    draw,
+    { height: `${height}px` },
+  );
 }

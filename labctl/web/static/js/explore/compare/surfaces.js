@@ -5,35 +5,99 @@ import { alongRate, linesOf, ownRows, positionsOf, rms, span } from "./rows.js";
 import { number } from "../../core/format.js";
 import { barPlace, sceneLayout, twoScenes } from "./scenes.js";
 
+/** @import { Comparison } from "../../../../types/api.js" */
+/** @import { Picture, PlotTrace } from "../../../../types/pages.js" */
+/** @import { Rows } from "./rows.js" */
+/** @import { Axes } from "./scenes.js" */
+/** @import { ExploreState } from "../state.js" */
+
 const SCALE = "Viridis";
 
+/**
+ * @param {Comparison} comparison
+ * @param {ExploreState} state
+ */
 export function surfaces(comparison, state) {
   const rows = ownRows(comparison, state.axis);
   const lines = linesOf(comparison.over_rate, state.axis, positionsOf(rows));
+  /** @returns {Picture} */
   const draw = () => {
-    const reach = span([...rows.measured_error_dps, ...rows.residual_dps, ...lines.flatMap((each) => each.error_dps.flat())]);
-    const titles = [`before: measured and model, RMS ${number(rms(rows.measured_error_dps), 2)} deg/s`, `after: what remains, RMS ${number(rms(rows.residual_dps), 2)} deg/s`];
+    const reach = span([
+      ...rows.measured_error_dps,
+      ...rows.residual_dps,
+      ...lines.flatMap((each) => each.error_dps.flat()),
+    ]);
+    const titles = [
+      `before: measured and model, RMS ${number(rms(rows.measured_error_dps), 2)} deg/s`,
+      `after: what remains, RMS ${number(rms(rows.residual_dps), 2)} deg/s`,
+    ];
     const shared = { colorscale: SCALE, cmin: reach[0], cmax: reach[1] };
-    const axes = { x: ["rate, deg/s", span(rows.rate)], y: ["deg C", span(rows.temperature_c)], z: ["error, deg/s", reach] };
+    /** @type {Axes} */
+    const axes = {
+      x: ["rate, deg/s", span(rows.rate)],
+      y: ["deg C", span(rows.temperature_c)],
+      z: ["error, deg/s", reach],
+    };
     return {
       data: [
-        ...lines.map((each, k) => ({ type: "surface", name: "model", scene: "scene", ...shared, showscale: k === 0, colorbar: { title: { text: "deg/s" }, thickness: 12, outlinewidth: 0, ...barPlace() }, opacity: 0.85, x: alongRate(each)[0], y: each.level, z: each.error_dps, hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>modelled %{z:.4g} deg/s<extra></extra>" })),
-        dots(rows, "measured_error_dps", "measured", "scene"),
+        ...lines.map((each, k) => ({
+          type: "surface",
+          name: "model",
+          scene: "scene",
+          ...shared,
+          showscale: k === 0,
+          colorbar: { title: { text: "deg/s" }, thickness: 12, outlinewidth: 0, ...barPlace() },
+          opacity: 0.85,
+          x: alongRate(each, each.error_dps)[0],
+          y: each.level,
+          z: each.error_dps,
+          hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>modelled %{z:.4g} deg/s<extra></extra>",
+        })),
+        dots(rows, rows.measured_error_dps, "measured", "scene"),
         residualSurface(rows, shared),
-        dots(rows, "residual_dps", "what remains", "scene2"),
-      ].filter(Boolean),
+        dots(rows, rows.residual_dps, "what remains", "scene2"),
+      ].filter((trace) => trace !== null),
       layout: { ...sceneLayout(titles, axes), showlegend: false },
     };
   };
-  return figure("Error surface", `Axis ${state.axis} turned about itself: left the measured error as dots with the model as a surface, right what the model leaves, both on the same axes. Drag to turn.`, draw, { height: twoScenes() });
+  return figure(
+    "Error surface",
+    `Axis ${state.axis} turned about itself: left the measured error as dots with the model as a surface, right what the model leaves, both on the same axes. Drag to turn.`,
+    draw,
+    { height: twoScenes() },
+  );
 }
 
-const dots = (rows, name, label, scene) => ({ type: "scatter3d", mode: "markers", name: label, scene, x: rows.rate, y: rows.temperature_c, z: rows[name], marker: { size: 2.5, color: colour("text") }, customdata: rows.dataset, hovertemplate: `data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C<br>${label} %{z:.4g} deg/s<extra></extra>` });
+/**
+ * @param {Rows} rows
+ * @param {readonly number[]} z
+ * @param {string} label
+ * @param {string} scene
+ * @returns {PlotTrace}
+ */
+const dots = (rows, z, label, scene) => ({
+  type: "scatter3d",
+  mode: "markers",
+  name: label,
+  scene,
+  x: rows.rate,
+  y: rows.temperature_c,
+  z,
+  marker: { size: 2.5, color: colour("text") },
+  customdata: rows.dataset,
+  hovertemplate: `data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C<br>${label} %{z:.4g} deg/s<extra></extra>`,
+});
 
-/** The mean residual of each cell as a surface; null where cells do not make a grid. */
+/**
+ * The mean residual of each cell as a surface; null where cells do not make a grid.
+ * @param {Rows} rows
+ * @param {object} shared
+ * @returns {PlotTrace | null}
+ */
 function residualSurface(rows, shared) {
   const rates = [...new Set(rows.rate_level_dps)].sort((a, b) => a - b);
   const warm = [...new Set(rows.temperature_level_c)].sort((a, b) => a - b);
+  /** @type {Map<string, number[]>} */
   const cells = new Map();
   rows.dataset.forEach((_, k) => {
     const id = `${rows.rate_level_dps[k]} ${rows.temperature_level_c[k]}`;
@@ -41,6 +105,18 @@ function residualSurface(rows, shared) {
   });
   if (positionsOf(rows).length > 1 || cells.size < 0.9 * rates.length * warm.length) return null;
   const sign = positionsOf(rows)[0].startsWith("-") ? -1 : 1;
+  /** @param {readonly number[] | undefined} values */
   const mean = (values) => (values ? values.reduce((sum, value) => sum + value, 0) / values.length : null);
-  return { type: "surface", name: "what remains", scene: "scene2", ...shared, showscale: false, opacity: 0.85, x: rates.map((rate) => sign * rate), y: warm, z: warm.map((level) => rates.map((rate) => mean(cells.get(`${rate} ${level}`)))), hoverinfo: "skip" };
+  return {
+    type: "surface",
+    name: "what remains",
+    scene: "scene2",
+    ...shared,
+    showscale: false,
+    opacity: 0.85,
+    x: rates.map((rate) => sign * rate),
+    y: warm,
+    z: warm.map((level) => rates.map((rate) => mean(cells.get(`${rate} ${level}`)))),
+    hoverinfo: "skip",
+  };
 }

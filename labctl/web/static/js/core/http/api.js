@@ -1,0 +1,164 @@
+// Client of the HTTP interface: keys, problem documents, event streams. Paths, parameters, bodies and answers have the
+// types of the OpenAPI document; tsc checks every call.
+
+import { address } from "./address.js";
+import { Problem, Unreachable, isAbort } from "./errors.js";
+import { parseMessage, splitMessages } from "./event_message.js";
+
+/** @import { AnswerOf, Options, PathOf, PostOptions, Streams } from "../../../../types/api.js" */
+/** @import { EventMessage } from "./event_message.js" */
+/**
+ * @template {PathOf<"get">} P
+ * @typedef {Options<"get", P> extends { path: unknown } ? [options: Options<"get", P>] : [options?: Options<"get", P>]} GetOptions
+ */
+
+const KEY = "labctl.key";
+
+export const accessKey = () => sessionStorage.getItem(KEY);
+/** @param {string | null} value */
+export const setAccessKey = (value) => (value ? sessionStorage.setItem(KEY, value) : sessionStorage.removeItem(KEY));
+
+/** @param {Record<string, string>} [more] */
+function headers(more = {}) {
+  return accessKey() ? { ...more, Authorization: `Bearer ${accessKey()}` } : more;
+}
+
+/**
+ * @param {string} path
+ * @param {RequestInit} options
+ */
+async function request(path, options) {
+  let response;
+  try {
+    response = await fetch(path, options);
+  } catch (error) {
+    if (isAbort(error)) throw error;
+    throw new Unreachable();
+  }
+  if (response.ok) return response;
+  const document = await response.json().catch(() => ({ title: response.statusText, status: response.status }));
+  if (response.status === 401) window.dispatchEvent(new CustomEvent("labctl:key", { detail: document.detail }));
+  throw new Problem({ status: response.status, ...document });
+}
+
+/**
+ * Read: `get("/api/units/{serial}", { path: { serial }, query, signal })`.
+ * @template {PathOf<"get">} P
+ * @param {P} path
+ * @param {GetOptions<P>} options
+ * @returns {Promise<AnswerOf<"get", P>>}
+ */
+export async function get(path, ...[{ path: parameters, query, signal } = /** @type {any} */ ({})]) {
+  return (await request(address(path, parameters, query), { headers: headers(), signal })).json();
+}
+
+/**
+ * Act: `post("/api/campaigns/{campaign}/pause", { path: { campaign }, body, signal })`.
+ * @template {PathOf<"post">} P
+ * @param {P} path
+ * @param {PostOptions<P>} options
+ * @returns {Promise<AnswerOf<"post", P>>}
+ */
+export async function post(path, { path: parameters, body, signal }) {
+  const options = {
+    method: "POST",
+    headers: headers({ "Content-Type": "application/json" }),
+    body: JSON.stringify(body),
+    signal,
+  };
+  return (await request(address(path, parameters), options)).json();
+}
+
+/**
+ * @template {PathOf<"delete">} P
+ * @param {P} path
+ * @param {Options<"delete", P>} options
+ * @returns {Promise<AnswerOf<"delete", P>>}
+ */
+export async function remove(path, { path: parameters }) {
+  return (await request(address(path, parameters), { method: "DELETE", headers: headers() })).json();
+}
+
+/**
+ * Send files as one form.
+ * @template {PathOf<"post">} P
+ * @param {P} path
+ * @param {File[]} files
+ * @returns {Promise<AnswerOf<"post", P>>}
+ */
+export async function upload(path, files) {
+  const form = new FormData();
+  for (const file of files) form.append("files", file, file.name);
+  return (await request(path, { method: "POST", headers: headers(), body: form })).json();
+}
+
+/**
+ * Fetch a file with the access key and save it as `name`.
+ * @template {PathOf<"get">} P
+ * @param {P} path
+ * @param {string} name
+ * @param {Options<"get", P>} options
+ */
+export async function download(path, name, { path: parameters, query }) {
+  const blob = await (await request(address(path, parameters, query), { headers: headers() })).blob();
+  saveBlob(blob, name);
+}
+
+/**
+ * @param {Blob} blob
+ * @param {string} name
+ */
+export function saveBlob(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/**
+ * Yield {event, id, data} of a stream of server-sent events until it ends. A comment (keep-alive) is {event: "alive"}.
+ * Not an EventSource, because that cannot send a key.
+ * @template {keyof Streams} P
+ * @param {P} path
+ * @param {Options<"get", P> & { after?: number }} options
+ * @returns {AsyncGenerator<EventMessage>}
+ */
+export async function* eventStream(path, { path: parameters, after, query, signal }) {
+  const response = await request(address(path, parameters, query), {
+    headers: headers(after ? { "Last-Event-ID": String(after) } : {}),
+    signal,
+  });
+  if (!response.body) return;
+  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  try {
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) return;
+      const { messages, rest } = splitMessages(text + value);
+      text = rest;
+      for (const message of messages) yield parseMessage(message);
+    }
+  } finally {
+    reader.cancel().catch(() => {});
+  }
+}
+
+/** @typedef {"/api/units/{serial}/calibrations/{version}/criticism/events"} FollowedPath */
+/** @typedef {Streams[FollowedPath]} Followed */
+/**
+ * The answer of a long computation, followed to its end: `onstage` is called with each stage, in words. Leaving the
+ * page (`signal`) cancels the computation in the service.
+ * @param {FollowedPath} path
+ * @param {Options<"get", FollowedPath> & { onstage: (stage: string) => void }} options
+ * @returns {Promise<Followed["answer"]>}
+ */
+export async function getFollowed(path, { onstage, ...options }) {
+  for await (const { event, data } of eventStream(path, options)) {
+    if (event === "stage") onstage(/** @type {Followed["stage"]} */ (data).stage);
+    else if (event === "answer") return /** @type {Followed["answer"]} */ (data);
+    else if (event === "problem") throw new Problem(/** @type {Followed["problem"]} */ (data));
+  }
+  throw new Unreachable();
+}

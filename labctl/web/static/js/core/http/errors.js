@@ -1,0 +1,32 @@
+// Errors of requests, and what a page says of them.
+
+/** @import { ProblemDocument, Warning } from "../../../../types/api.js" */
+
+/** A problem document of the service (RFC 9457): `status`, `type`, `title`, and `detail` as the message. */
+export class Problem extends Error {
+  /** @param {ProblemDocument} document */
+  constructor(document) {
+    super(document.detail || document.title || "the service gave no reason");
+    this.status = document.status;
+    this.type = document.type;
+    this.title = document.title;
+    /** @type {Warning[] | undefined} */
+    this.warnings = document.warnings;
+  }
+}
+
+/** The service did not answer. */
+export class Unreachable extends Error {
+  constructor() {
+    super("The service does not answer. Nothing on this page is newer than what you see.");
+  }
+}
+
+/**
+ * Whether a request was cancelled, as it is when the page is left.
+ * @param {unknown} error
+ */
+export const isAbort = (error) => error instanceof Error && error.name === "AbortError";
+
+/** @param {unknown} error */
+export const messageOf = (error) => (error instanceof Error ? error.message : String(error));

@@ -1,0 +1,49 @@
+// Routes: which module shows an address.
+
+/** @import { PageModule } from "../../../types/pages.js" */
+/** @typedef {{ parts: string[], load: () => Promise<PageModule> }} Route */
+
+/** @param {string} path */
+const partsOf = (path) => path.split("/").filter(Boolean);
+
+/**
+ * A route of a pattern like `/units/:serial`.
+ * @param {string} pattern
+ * @param {Route["load"]} load
+ * @returns {Route}
+ */
+export const routeOf = (pattern, load) => ({ parts: partsOf(pattern), load });
+
+/**
+ * The first route whose pattern fits a path, with the decoded values of its parameters; null where none does.
+ * @param {readonly Route[]} routes
+ * @param {string} path
+ */
+export function matchRoute(routes, path) {
+  const parts = partsOf(path).map(decodeURIComponent);
+  for (const { parts: pattern, load } of routes) {
+    if (pattern.length !== parts.length) continue;
+    if (!pattern.every((part, k) => part.startsWith(":") || part === parts[k])) continue;
+    /** @type {Record<string, string>} */
+    const params = {};
+    pattern.forEach((part, k) => {
+      if (part.startsWith(":")) params[part.slice(1)] = parts[k];
+    });
+    return { load, params };
+  }
+  return null;
+}
+
+/**
+ * A query string with some values changed: "" , null and undefined remove one.
+ * @param {string} search
+ * @param {Record<string, string | number | null | undefined>} choice
+ */
+export function changedQuery(search, choice) {
+  const query = new URLSearchParams(search);
+  for (const [name, value] of Object.entries(choice)) {
+    if (value === null || value === undefined || value === "") query.delete(name);
+    else query.set(name, String(value));
+  }
+  return query.toString();
+}

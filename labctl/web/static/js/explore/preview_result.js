@@ -1,0 +1,107 @@
+// What a changed model would do: errors, residuals and sizes, before and after.
+
+import { h } from "../core/elements.js";
+import { axisColour, colour, figure } from "../core/figure.js";
+import { number, idText } from "../core/format.js";
+import { inDatasetOrder, shownText } from "./dataset_rows.js";
+import { selectedRows } from "./residual_map.js";
+
+/** @import { Preview } from "../../../types/api.js" */
+/** @import { ExploreState } from "./state.js" */
+
+/**
+ * @param {number | null} before
+ * @param {number | null} after
+ */
+export function relativeChange(before, after) {
+  if (!before || !after) return null;
+  const share = after / before - 1;
+  return h(
+    "span",
+    { class: share < -0.02 ? "good-text" : share > 0.02 ? "bad-text" : "muted" },
+    `${share < 0 ? "–" : "+"}${Math.abs(Math.round(100 * share))} %`,
+  );
+}
+
+/**
+ * @param {ExploreState} state
+ * @param {Preview} found
+ * @param {number | null} floor
+ */
+export function residualFigure(state, found, floor) {
+  const draw = () => {
+    const rows = selectedRows(state);
+    const x = rows.channels.table_rate_dps;
+    const after = inDatasetOrder(state, found.residuals, "residual_dps");
+    /**
+     * @param {readonly (number | null)[]} y
+     * @param {string} name
+     * @param {object} marker
+     */
+    const dots = (y, name, marker) => ({
+      type: "scatter",
+      mode: "markers",
+      name,
+      x,
+      y,
+      marker,
+      customdata: rows.dataset,
+      hovertemplate: `data set %{customdata}<br>%{x:.5g} deg/s: %{y:.3g} deg/s<extra>${name}</extra>`,
+    });
+    /** @param {number} y */
+    const line = (y) => ({
+      type: "line",
+      xref: "paper",
+      x0: 0,
+      x1: 1,
+      y0: y,
+      y1: y,
+      line: { color: colour("border-strong"), dash: "dash", width: 1 },
+    });
+    return {
+      data: [
+        dots(rows.residual, "before", { size: 5, color: colour("border-strong"), symbol: "circle-open" }),
+        dots(after, "after", { size: 6, color: axisColour(state.axis) }),
+      ],
+      layout: {
+        title: shownText(state.criticism) ? { text: shownText(state.criticism), font: { size: 11 } } : undefined,
+        xaxis: { title: { text: "table rate, deg/s" } },
+        yaxis: { title: { text: "residual, deg/s" } },
+        shapes: floor ? [line(2 * floor), line(-2 * floor)] : [],
+      },
+    };
+  };
+  return figure("Residual before and after", "Dashed: two noise floors.", draw, { height: "18rem" });
+}
+
+/**
+ * @param {ExploreState} state
+ * @param {Preview} found
+ * @param {{ add: ReadonlySet<string> }} change
+ */
+export function plausibility(state, found, change) {
+  const own = found.axes[state.axis]?.coefficients;
+  const added = [...change.add].map((id) => id.split(":")[0]);
+  if (!own || !added.length) return null;
+  const ranges = added.flatMap((id) => {
+    const range = found.plausible[id];
+    return range ? [{ id, ...range }] : [];
+  });
+  return ranges.length
+    ? h(
+        "ul",
+        { class: "plain" },
+        ranges.map(({ id, ...range }) =>
+          h(
+            "li",
+            {},
+            `${idText(id)}: `,
+            range.inside
+              ? h("span", { class: "good-text" }, "of a usual size")
+              : h("span", { class: "bad-text" }, "larger than is usual"),
+            h("span", { class: "muted" }, ` (${number(range.from, 2)} to ${number(range.to, 2)})`),
+          ),
+        ),
+      )
+    : null;
+}

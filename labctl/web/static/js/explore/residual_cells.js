@@ -1,0 +1,57 @@
+// Cells of the residual map: data sets that share a rate and a temperature.
+
+import { plainNumber } from "../core/format.js";
+
+/** @import { Criticism, ResidualMap } from "../../../types/api.js" */
+
+/** @typedef {ReturnType<typeof mapCells>["cells"][number]} Cell */
+
+const LIMITS = [3, 10];
+
+/**
+ * The maps of an axis, one for each position: columns of equal length, one number for each data set.
+ * @param {Pick<Criticism, "maps">} criticism
+ * @param {string} axis
+ */
+export const mapsOf = (criticism, axis) => criticism.maps.filter((map) => map.axis === axis);
+
+/**
+ * End of the colour scale: the largest residual over floor of several lists of maps, clipped to LIMITS.
+ * @param {...readonly Pick<ResidualMap, "over_floor">[]} all
+ */
+export function colourLimit(...all) {
+  const largest = all
+    .flat()
+    .reduce((most, map) => map.over_floor.reduce((m, score) => Math.max(m, Math.abs(score)), most), 0);
+  return Math.min(Math.max(largest, LIMITS[0]), LIMITS[1]);
+}
+
+/**
+ * Which data sets share a cell, in words.
+ * @param {Pick<Criticism, "maps">} criticism
+ */
+export function cellsText(criticism) {
+  const width = Math.max(0, ...criticism.maps.map((map) => map.level_width_c));
+  return `Data sets share a cell where rate and temperature repeat within 0.1 % and 0.25 K${width ? `; temperatures of one row are within ${plainNumber(width, 2)} K` : ""}.`;
+}
+
+/** @param {readonly number[]} values */
+const sorted = (values) => [...new Set(values)].sort((a, b) => a - b);
+
+/**
+ * Measured cells of one map: their rates and temperatures, and each cell's mean score and data sets.
+ * @param {Pick<ResidualMap, "dataset" | "rate_level_dps" | "temperature_level_c" | "over_floor">} map
+ */
+export function mapCells(map) {
+  /** @type {Map<string, { rate: number, warm: number, sum: number, sets: number[] }>} */
+  const found = new Map();
+  map.dataset.forEach((set, k) => {
+    const [rate, warm] = [map.rate_level_dps[k], map.temperature_level_c[k]];
+    const cell = found.get(`${rate} ${warm}`) ?? { rate, warm, sum: 0, sets: [] };
+    found.set(`${rate} ${warm}`, cell);
+    cell.sum += map.over_floor[k];
+    cell.sets.push(set);
+  });
+  const cells = [...found.values()].map((cell) => ({ ...cell, mean: cell.sum / cell.sets.length }));
+  return { rates: sorted(map.rate_level_dps), warm: sorted(map.temperature_level_c), cells };
+}

@@ -1,0 +1,114 @@
+// Explore: selections, labels, cells of the residual map, rows of the comparison.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import {
+  alongRate,
+  ownRows,
+  pickRows,
+  rms,
+  rowsWhere,
+  turns,
+} from "../../labctl/web/static/js/explore/compare/rows.js";
+import {
+  distinctLabels,
+  fromRanges,
+  inDatasetOrder,
+  scaled,
+  toRanges,
+} from "../../labctl/web/static/js/explore/dataset_rows.js";
+import { cellsText, colourLimit, mapCells } from "../../labctl/web/static/js/explore/residual_cells.js";
+
+test("a selection is written as ranges and read again", () => {
+  const numbers = [3, 1, 2, 20, 7, 8];
+  assert.equal(toRanges(numbers), "1-3,7-8,20");
+  assert.deepEqual([...fromRanges("1-3,7-8,20")], [1, 2, 3, 7, 8, 20]);
+  assert.deepEqual([...fromRanges(undefined)], []);
+  assert.deepEqual([...fromRanges("x,5,1-9999999")], [5]);
+});
+
+test("labels have as many digits as tell them apart", () => {
+  assert.deepEqual(distinctLabels([1, 2.5]), ["1", "2.5"]);
+  assert.deepEqual(distinctLabels([100.01, 100.02]), ["100.01", "100.02"]);
+});
+
+test("times are in hours", () => {
+  assert.deepEqual(scaled("t_s", [3600, 7200]), [1, 2]);
+  assert.deepEqual(scaled("temperature_c", [20]), [20]);
+});
+
+const map = {
+  dataset: [1, 2, 3],
+  rate_level_dps: [10, 10, -10],
+  temperature_level_c: [20, 20, 40],
+  over_floor: [2, 4, -12],
+};
+
+test("data sets of the same rate and temperature share a cell", () => {
+  const { rates, warm, cells } = mapCells(map);
+  assert.deepEqual(
+    [rates, warm],
+    [
+      [-10, 10],
+      [20, 40],
+    ],
+  );
+  assert.deepEqual(
+    cells.map(({ rate, sets, mean }) => [rate, sets, mean]),
+    [
+      [10, [1, 2], 3],
+      [-10, [3], -12],
+    ],
+  );
+});
+
+test("the colour scale ends at the largest residual, between 3 and 10 floors", () => {
+  assert.equal(colourLimit([map]), 10);
+  assert.equal(colourLimit([{ over_floor: [1, -2] }]), 3);
+  assert.equal(colourLimit([{ over_floor: [1] }], [{ over_floor: [-5] }]), 5);
+});
+
+test("how wide a row of temperatures is, is said where it is not nothing", () => {
+  /** @param {number} level_width_c */
+  const text = (level_width_c) => cellsText(/** @type {any} */ ({ maps: [{ level_width_c }] }));
+  assert.match(text(1.5), /within 1\.5 K\.$/);
+  assert.match(text(0), /0\.25 K\.$/);
+});
+
+test("residuals are brought into the order of the criticism's data sets", () => {
+  const sets = { dataset: [2, 1, 3], residual_dps: {}, over_floor: {}, channels: {}, position: [], of: 3 };
+  const columns = { dataset: [1, 2, 1], axis: ["z", "z", "x"], residual_dps: [0.1, 0.2, 0.9] };
+  assert.deepEqual(inDatasetOrder({ criticism: { views: { sets } }, axis: "z" }, columns, "residual_dps"), [
+    0.2,
+    0.1,
+    null,
+  ]);
+});
+
+const columns = /** @type {any} */ ({
+  dataset: [1, 2, 3],
+  axis: ["z", "z", "x"],
+  position: ["-z", "x", "x"],
+  table_rate_dps: [5, 6, 7],
+});
+
+test("an axis turns in its own position, the other way round where it points down", () => {
+  assert.ok(turns("-z", "z"));
+  assert.ok(!turns("x", "z"));
+  const own = ownRows({ columns }, "z");
+  assert.deepEqual([own.dataset, own.rate], [[1], [-5]]);
+  assert.deepEqual(alongRate({ at: [1, 2], position: "-z" }, "y"), [[-1, -2], "y"]);
+});
+
+test("an axis that never turns has all of its rows", () => {
+  const still = { columns: { ...columns, position: ["x", "x", "x"] } };
+  assert.deepEqual(ownRows(still, "z").dataset, [1, 2]);
+  assert.deepEqual(rowsWhere(still, (k) => k === 2).rate, [7]);
+});
+
+test("rows of columns are picked together", () => {
+  assert.deepEqual(pickRows({ a: [1, 2, 3], b: ["x", "y", "z"] }, [2, 0]), { a: [3, 1], b: ["z", "x"] });
+  assert.equal(rms([3, 4, 0, 0]), 2.5);
+  assert.equal(rms([]), 0);
+});

@@ -1,0 +1,93 @@
+// Numbers, sizes, durations and results as text.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import * as format from "../../labctl/web/static/js/core/format.js";
+import { roundedToUncertainty } from "../../labctl/web/static/js/core/rounding.js";
+import { timeUnit } from "../../labctl/web/static/js/core/time_unit.js";
+
+/** @type {(act: (...given: any[]) => unknown, cases: [given: unknown[], text: string][]) => void} */
+const holds = (act, cases) => {
+  for (const [given, text] of cases) assert.equal(act(...given), text, `${act.name}(${given.join(", ")})`);
+};
+
+test("a number has its significant digits, and a power of ten only far from 1", () => {
+  holds(format.number, [
+    [[0.0012], "0.00120"],
+    [[1234.5], "1230"],
+    [[9.999], "10.0"],
+    [[0], "0"],
+    [[4.5e-7, 2], "4.5 × 10⁻⁷"],
+    [[12_345_678], "1.23 × 10⁷"],
+    [[null], "–"],
+    [[undefined], "–"],
+    [[NaN], "–"],
+    [[Infinity], "–"],
+  ]);
+});
+
+test("a setting has no trailing zeros", () => {
+  holds(format.plainNumber, [
+    [[-100], "-100"],
+    [[12.5], "12.5"],
+    [[0.0042], "0.0042"],
+    [[null], "–"],
+  ]);
+});
+
+test("means line up at one place beyond their spread", () => {
+  holds(format.mean, [
+    [[1.23456, 0.01], "1.2346"],
+    [[1.2, 0.01], "1.2000"],
+    [[123.4567, null], "123.46"],
+    [[123.4567, 0], "123.46"],
+  ]);
+});
+
+test("a duration is in the two units that matter", () => {
+  holds(format.duration, [
+    [[162_600], "45 h 10 min"],
+    [[200], "3 min 20 s"],
+    [[12.4], "12 s"],
+    [[-3], "0 s"],
+    [[null], "–"],
+  ]);
+});
+
+test("a size without a unit is a share", () => {
+  holds(format.sizeText, [
+    [[0.000014, "1"], "14 ppm"],
+    [[0.027, "1"], "2.7 %"],
+    [[0.5, "(deg/s)^-1"], "0.50 (deg/s)⁻¹"],
+    [[0, "deg/s"], "0 deg/s"],
+    [[NaN, "1"], "–"],
+  ]);
+});
+
+test("a result and its uncertainty end at the same place", () => {
+  holds(format.withUncertainty, [
+    [[0.0002013, 0.0000031, "1"], "201.3 ± 3.1 ppm"],
+    [[9.06e-7, 2.1e-9, "(deg/s)^-1"], "(9.060 ± 0.021) × 10⁻⁷ (deg/s)⁻¹"],
+    [[1.5, null, "deg/s"], "1.5 deg/s"],
+    [[null, 1, "deg/s"], "–"],
+  ]);
+});
+
+test("the uncertainty has two significant digits, and the value its place", () => {
+  assert.deepEqual(roundedToUncertainty(1.23456, 0.0999), { value: "1.23", u: "0.10", exponent: 0 });
+  assert.deepEqual(roundedToUncertainty(1234.5, 120), { value: "1230", u: "120", exponent: 0 });
+  assert.deepEqual(roundedToUncertainty(0, null), { value: "0", u: null, exponent: 0 });
+});
+
+test("ids and units are words", () => {
+  assert.equal(format.idText("scale_factor_asymmetry"), "scale factor asymmetry");
+  assert.equal(format.unitText("deg/s^2"), "deg/s²");
+  assert.equal(format.unitText("1"), "");
+});
+
+test("a time axis is in hours, minutes or seconds", () => {
+  assert.equal(timeUnit(7200, 7200).name, "h");
+  assert.equal(timeUnit(7199, 7200).name, "min");
+  assert.deepEqual(timeUnit(599, 7200), { name: "s", seconds: 1 });
+});

@@ -1,0 +1,58 @@
+// How fresh a page is, and the words for it.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import {
+  ago,
+  BENCH_STALE_S,
+  freshnessWords,
+  STALE_MS,
+  stalenessOf,
+} from "../../labctl/web/static/js/core/freshness/state.js";
+
+/** @import { Heard } from "../../labctl/web/static/js/core/freshness/state.js" */
+
+/** @type {Heard} */
+const fresh = { service_s: 0.4, open_s: 60, bench_s: 1.2, paused: false, trouble: "", clock: "12:00:00" };
+/** @param {Partial<Heard>} change */
+const words = (change) => {
+  const heard = { ...fresh, ...change };
+  const found = stalenessOf(heard);
+  return { found, ...freshnessWords(found, heard) };
+};
+
+test("a page that hears service and bench is fresh", () => {
+  assert.deepEqual(words({}), { found: "no", stale: false, text: "Service last heard 0 s ago, bench 1 s ago." });
+  assert.equal(words({ bench_s: null }).text, "Service last heard 0 s ago.");
+});
+
+test("it is stale once the service was not heard for long enough", () => {
+  assert.equal(words({ service_s: STALE_MS / 1000 }).found, "no");
+  const { found, stale, text } = words({ service_s: STALE_MS / 1000 + 0.1 });
+  assert.deepEqual([found, stale], ["yes", true]);
+  assert.equal(text, "Service last heard 4 s ago. What is shown may no longer be so; it is of 12:00:00.");
+});
+
+test("a page that has just been opened asks first", () => {
+  const opened = { service_s: null, bench_s: null, clock: null };
+  assert.equal(words({ ...opened, open_s: 1 }).text, "Asking the service …");
+  assert.deepEqual(words({ ...opened, open_s: 5 }), {
+    found: "yes",
+    stale: true,
+    text: "The service was not heard. What is shown may no longer be so.",
+  });
+});
+
+test("a silent bench, an answer that does not fit and a hidden tab each say what is known", () => {
+  assert.match(words({ bench_s: BENCH_STALE_S + 0.1 }).text, /^Bench last heard 3 s ago; the service answers\./);
+  assert.equal(words({ trouble: "no such path" }).found, "trouble");
+  assert.match(words({ trouble: "no such path" }).text, /: no such path$/);
+  assert.match(words({ paused: true }).text, /last heard at 12:00:00\.$/);
+  assert.match(words({ paused: true, clock: null }).text, /last heard never\.$/);
+});
+
+test("two minutes and more are in minutes", () => {
+  assert.equal(ago(119.9), "119 s ago");
+  assert.equal(ago(120), "2 min ago");
+});
