@@ -17,6 +17,7 @@ from labctl.store import Store, holder_of, open_store
 
 if TYPE_CHECKING:
     from labctl.services.commands.foreground_control import OpenTerminal
+    from labctl.services.commands.remote import HttpExecutor
 
 
 @contextmanager
@@ -40,9 +41,8 @@ def open_commands(database: str | None, open_terminal: OpenTerminal | None = Non
     """
     location = database or default_database()
     if url := service_url(location):
-        from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415  an HTTP client only where one is needed
-
-        yield HttpExecutor(url)
+        with _remote(url) as executor:
+            yield executor
         return
     from labctl.services.commands.foreground_control import ForegroundControl, no_terminal  # noqa: PLC0415  loads drivers
 
@@ -54,6 +54,16 @@ def open_commands(database: str | None, open_terminal: OpenTerminal | None = Non
         yield LocalExecutor(
             CommandContext(open_writable, SystemClock(), ForegroundControl(location, open_terminal or no_terminal))
         )
+
+
+@contextmanager
+def _remote(url: str) -> Iterator[HttpExecutor]:
+    """Give the executor of a service; an HTTP client is loaded only where one is needed."""
+    from labctl.service_connection import ServiceConnection  # noqa: PLC0415
+    from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415
+
+    with ServiceConnection(url) as connection:
+        yield HttpExecutor(connection)
 
 
 def execute(database: str | None, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
@@ -70,9 +80,8 @@ def current_status(database: str | None, campaign: int | None) -> CampaignRespon
     with open_readonly(database) as store:
         answer = with_resume(store, campaign_status(store, campaign))
     if url := service_url(database):
-        from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415
-
-        return HttpExecutor(url).fetch(f"/api/campaigns/{answer.id}", CampaignResponse)
+        with _remote(url) as executor:
+            return executor.fetch(f"/api/campaigns/{answer.id}", CampaignResponse)
     return answer
 
 
