@@ -1,13 +1,5 @@
 """A client of a labctl service: calibrations by serial number, recordings, fits and campaigns.
 
-```python
-from labctl.client import CampaignRequest, Client
-
-with Client("http://127.0.0.1:8420") as client:
-    for unit in client.units():
-        print(unit.serial, unit.certified_version)
-```
-
 Every method sends one HTTP request and returns a typed answer. Three errors are common to all of them:
 `ServiceRefused` (the service refuses the request and says why), `labctl.errors.StoreError` (it does not answer) and
 `pydantic.ValidationError` (a value of a request is wrong; nothing was sent).
