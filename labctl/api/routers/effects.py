@@ -8,7 +8,7 @@ from fastapi import APIRouter
 
 from labctl.services.effects import catalogue
 
-router = APIRouter(prefix="/api", tags=["what there is"])
+router = APIRouter(prefix="/api", tags=["catalogue"])
 
 
 @router.get("/effects", summary="The catalogue of physical effects")

@@ -73,7 +73,7 @@ class BenchHold:
             beat=1 if found is None else found.beat + 1, beat_at=now, expires_at=now + timedelta(seconds=TERM_S),
         )  # fmt: skip
         if not self._store.leases.claim(mine, replacing=found):
-            raise Conflict(f"bench {self._bench}: somebody else took it this moment; try again")
+            raise Conflict(f"bench {self._bench}: another process has just taken it; try again")
         _HELD_HERE.add(self._owner)
         self._renewed_s, self._why_lost = begun_s, ""
 

@@ -88,7 +88,7 @@ class Download:
     content: IO[bytes]
 
     def chunks(self) -> Iterator[bytes]:
-        """Yield the bytes, then close the file; also when whoever reads goes away."""
+        """Yield the bytes, then close the file; also when the reader disconnects."""
         with self.content:
             while chunk := self.content.read(CHUNK_BYTES):
                 yield chunk

@@ -91,7 +91,7 @@ class PreviewResponse(ResponseModel):
     validity: Validity
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     plausible: dict[str, dict[str, Any]] = Field(description="Effect -> the usual range, and whether it is inside.")
-    left_out: list[dict[str, Any]] = Field(description="Effects that would not leave the house with a calibration.")
+    left_out: list[dict[str, Any]] = Field(description="Effects that a calibration would not export.")
     residuals: ResidualColumns = Field(description="What the changed model leaves, data set by data set.")
 
 

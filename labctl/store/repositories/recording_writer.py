@@ -121,7 +121,7 @@ class Imports:
         return len(found)
 
     def _claimed(self, ticket: ImportTicket) -> ImportTicket:
-        """Return a ticket that only this process has: whoever had it before can write no further part."""
+        """Return a ticket that only this process has: the process that had it before can write no further part."""
         mine = ImportTicket(ticket.recording, secrets.token_hex(16))
         with self._database.writing(synced=False) as connection:
             _give_sign(connection, ticket, token=mine.token)

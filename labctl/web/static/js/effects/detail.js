@@ -47,7 +47,7 @@ function sizeCard(effect) {
 }
 
 function shapeCard(effect) {
-  const orders = effect.max_order === null ? null : h("p", {}, `A polynomial up to order ${effect.max_order}; ${effect.order} where nobody says.`);
+  const orders = effect.max_order === null ? null : h("p", {}, `A polynomial up to order ${effect.max_order}; ${effect.order} by default.`);
   if (!effect.parameters.length) return card("Its shape", orders ?? h("p", {}, "It has no shape to choose: one size says all."));
   return card("Its shape", orders, table([
     { title: "Parameter", cell: (each) => h("code", {}, each.name) },

@@ -53,7 +53,7 @@ function watchForChange(unconfirmed, signal) {
 
 function unconfirmedNotice(bench, simulated_time) {
   return notice("bad", h("p", { class: "lead" }, `Bench ${bench.name} was not confirmed safe`),
-    h("p", {}, `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`),
+    h("p", {}, `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Check it; no campaign starts before a person has.`),
     bench.attempts ? h("p", {}, bench.confirmed_at ? `labctl confirmed the safe state at ${campaignInstant({ simulated_time }, bench.confirmed_at)}, at attempt ${bench.attempts}. Look all the same before you clear it.` : `The safe state was tried again ${bench.attempts} times, last at ${campaignInstant({ simulated_time }, bench.attempted_at)}; it is tried every 30 s.`) : null,
     h("div", { class: "row" }, clearButton(bench.name, show)));
 }

@@ -23,7 +23,7 @@ export async function page({ params, query, signal }) {
   const state = { id: about.id, kind: about.kind, sets, output: info.output ?? {}, channel: query.channel ?? `gyro_${info.axes[0]}`, from: number_(query.from), until: number_(query.until), dataset: number_(query.dataset) };
   const element = h("div", { class: "page" }, recordingHeader(about, path), conditionsCard(about, sets));
   if (about.kind === "coefficients") {
-    element.append(notice("", "This recording is a table that somebody published: scale factors and offsets over temperature. It has no data sets and no readings to look at; it can be fitted."));
+    element.append(notice("", "This recording is a published table: scale factors and offsets over temperature. It has no data sets and no readings to look at; it can be fitted."));
     return element;
   }
   const timed = sets.t_from_s.some((t) => t !== null);
