@@ -21,6 +21,8 @@ GENERATED = "docs/reference/command-line.md"
 LOOKS_LIKE_A_COMMAND = re.compile(
     r"^\s*(?:\$ |labctl |make |pip |curl |python |\.venv/bin/|systemctl |from \w+ import )", re.MULTILINE
 )
+#: Pages whose files and commands another test builds and runs, in packages of their own.
+ELSEWHERE = {"docs/how-to/extending.md": "tests/system/test_extending.py"}
 MOST_SKIPPED = 8
 LEAST_REASON_WORDS = 5
 
@@ -30,7 +32,9 @@ def text_of(page: Path) -> str:
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("name", [name for name in NAMES if FENCE.search(text_of(ROOT / name))])
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if name not in ELSEWHERE and FENCE.search(text_of(ROOT / name))]
+)
 def test_blocks_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_playground(tmp_path) as playground:
         monkeypatch.chdir(tmp_path)
@@ -54,6 +58,10 @@ def test_every_block_says_what_it_is() -> None:
         and not (found["language"] == "console" and page == ROOT / GENERATED)
     ]
     assert not unknown, "\n".join(["name the language: sh and python are executed, text is output", *unknown])
+
+
+def test_a_page_that_is_executed_elsewhere_names_a_test_that_is_there() -> None:
+    assert all((ROOT / test).is_file() for page, test in ELSEWHERE.items() if FENCE.search(text_of(ROOT / page)))
 
 
 def test_no_command_hides_in_a_block_of_text() -> None:

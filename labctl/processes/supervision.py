@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 from multiprocessing.connection import Connection
 
-from labctl.errors import Conflict
+from labctl.errors import Conflict, StoreError
 from labctl.processes.elapsed import Elapsed
 from labctl.processes.settings import BenchSettings
 from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft
+from labctl.services.benches.lease import this_machine
 from labctl.store import ServiceAddress, Store
 
 BEAT_S = 1.0
@@ -45,6 +47,8 @@ class Supervision:
             self._line = line
         self._settings = wanted
         self._store.note_address(ServiceAddress(wanted.url, str(wanted.folder)))
+        with contextlib.suppress(StoreError):  # a hint for other processes; a stop does not need it
+            self._store.leases.note_address(this_machine(), os.getpid())
         threading.Thread(target=self._hear, args=(line,), name="supervisor", daemon=True).start()
         threading.Thread(target=self._beat, args=(line,), name="beat", daemon=True).start()
 
