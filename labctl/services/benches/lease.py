@@ -189,7 +189,7 @@ def open_for(bench: BenchFile, location: str) -> Iterator[Store]:
 
 
 def driver_of(store: Store, bench_name: str, now: datetime) -> LeaseRow | None:
-    """Return the lease of the process that drives a bench now; None where nobody does."""
+    """Return the lease of the process that drives a bench now; None where no process does."""
     found = store.leases.holder(bench_name)
     return None if found is None or found.expires_at <= now or _is_dead(found) else found
 
