@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 
 from labctl.errors import Conflict, StoreError
@@ -21,8 +22,10 @@ BEAT_S = 1.0
 class Supervision:
     """The bench process's side: one supervisor at a time, or none."""
 
-    def __init__(self, settings: BenchSettings, store: Store, waker: Waker) -> None:
+    def __init__(self, settings: BenchSettings, store: Store, waker: Waker, is_stuck: Callable[[], bool]) -> None:
+        """`is_stuck`: whether this process lives and its engine does not; then no beat is sent, and it is replaced."""
         self._settings, self._store, self._waker = settings, store, waker
+        self._is_stuck = is_stuck
         self._guard = threading.Lock()
         self._line: Connection | None = None
         self._alone = Elapsed()
@@ -66,9 +69,11 @@ class Supervision:
     def _beat(self, line: Connection) -> None:
         never = threading.Event()
         with contextlib.suppress(OSError):
+            line.send("beat")  # the answer that it is in charge
             while self._line is line:
-                line.send("beat")
                 never.wait(BEAT_S)
+                if not self._is_stuck():
+                    line.send("beat")
 
     def _let_go(self, line: Connection) -> None:
         with self._guard:
