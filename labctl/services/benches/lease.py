@@ -149,7 +149,7 @@ class BenchHold:
 def hold_bench(store: Store, bench: BenchFile, clock: Clock | None = None) -> BenchHold | None:
     """Take the lease on a bench and keep it. Raises Conflict.
 
-    None for a simulated bench of a database to which no other process writes: nobody else can take up its campaign.
+    None for a simulated bench of a database to which no other process writes: no other process can resume its campaign.
     """
     if bench.is_simulated and store.is_sole_writer:
         return None
