@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: install demo test lint types bench study attack lock clean
+.PHONY: install demo test lint types docs bench study attack lock clean
 
 install: $(VENV)/.installed
 demo: install
@@ -27,6 +27,11 @@ types: $(VENV)/.tested
 	@scripts/install-page-tools
 	@$(BIN)/python scripts/openapi-document >node_modules/.openapi.json
 	@npm run --silent types -- node_modules/.openapi.json
+
+# The documentation as a site in docs/_build, every warning an error: links, anchors, pictures and docstrings are checked.
+docs: $(VENV)/.documented
+	$(BIN)/python -m sphinx --builder html --fresh-env --fail-on-warning --keep-going --quiet docs docs/_build
+	@echo "docs/_build/index.html"
 
 bench: $(VENV)/.tested
 	@$(BIN)/python -m benchmarks
@@ -55,11 +60,16 @@ $(VENV)/.studied: requirements/study.txt $(VENV)/.installed
 	$(PIP) install --require-hashes -r requirements/study.txt
 	@touch $@
 
+$(VENV)/.documented: requirements/docs.txt $(VENV)/.installed
+	$(PIP) install --require-hashes -r requirements/docs.txt
+	@touch $@
+
 # Versions move only here. The lock files carry hashes and no registry address.
 lock:
 	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt
-	uv pip compile pyproject.toml --extra build --extra dev --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/dev.txt
+	uv pip compile pyproject.toml --extra build --extra dev --extra docs --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/dev.txt
 	uv pip compile pyproject.toml --extra build --extra study --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/study.txt
+	uv pip compile pyproject.toml --extra build --extra docs --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/docs.txt
 
 clean:
-	rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf docs/_build $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -2,7 +2,7 @@
 
 Durations are seconds of the clock's own monotonic time, which starts at 0; records carry aware UTC. In virtual time a
 sleep advances the clock at once, so a 45-hour campaign takes the time of its arithmetic; in scaled time (demos,
-simulators in another process) one wall second is `speed` clock seconds.
+simulators in another process) one second of real time is `speed` clock seconds.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Clock(Protocol):
         ...
 
     def wall_s(self, duration_s: float) -> float:
-        """Get the wall seconds that a time-out of `duration_s` clock seconds may take, for client libraries."""
+        """Get the seconds of real time that a time-out of `duration_s` clock seconds may take, for client libraries."""
         ...
 
 

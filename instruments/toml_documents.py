@@ -1,4 +1,4 @@
-"""TOML that anybody may have written: bounded in size and depth before the parser sees it.
+"""TOML of unknown origin: bounded in size and depth before the parser sees it.
 
 The parser of the standard library recurses into every bracket and takes the square of the time for a key of many parts,
 so both are counted first, in one pass over the text.

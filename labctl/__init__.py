@@ -1,1 +1,1 @@
-"""labctl calibrates gyroscopes: the rooms people enter."""
+"""labctl calibrates gyroscopes: command line, HTTP service, pages, fitting and criticism."""

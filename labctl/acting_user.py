@@ -1,4 +1,4 @@
-"""In whose name something is done: set once at the door, so that no act on the way can forget to say it."""
+"""In whose name something is done: set once where a request comes in, so that every audit row has it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Actor:
-    """Somebody who acts, and how that is known: "key", "command line", "loopback"."""
+    """Who acts, and how that is known: "key", "command line", "loopback"."""
 
     name: str
     via: str = ""

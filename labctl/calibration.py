@@ -23,6 +23,8 @@ from labctl.json_types.calibrations import CalibrationJson, OutputUnitJson
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.recording.info import Axis
 
+__all__ = ["SCHEMA", "Calibration", "build_calibration", "canonical", "hash_of", "read_calibration"]
+
 SCHEMA = "labctl-calibration/1"
 #: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
 MOST_BYTES = 64 << 20

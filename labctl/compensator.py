@@ -18,6 +18,8 @@ from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
 from labctl.fitting.models.sine_form import sine_form_of
 
+__all__ = ["MARGIN_C", "MARGIN_SHARE", "Compensated", "Compensator", "Outside", "output_limits_dps"]
+
 Array = NDArray[np.float64]
 Outside = Literal["clamp", "refuse"]
 #: Beyond the calibrated temperatures by no more than this counts as inside, K: a thermometer's last digits.

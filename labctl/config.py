@@ -1,4 +1,4 @@
-"""Where things are when nobody says otherwise."""
+"""Defaults: the database, the API key and the user's name."""
 
 from __future__ import annotations
 

@@ -11,10 +11,10 @@ LabctlError              exit 2, HTTP 400
 ├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
 │   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
-├── Conflict             somebody else holds it, or it is already so               HTTP 409
+├── Conflict             another process holds it, or it is already so             HTTP 409
 │   ├── CertificationRefused   something speaks against a version; it can be overridden      HTTP 409
 │   ├── VersionTaken     another calibration of the unit got this number meanwhile    HTTP 409
-│   └── BenchBusy        somebody drives the bench now: it may be free later          HTTP 409
+│   └── BenchBusy        another campaign or process drives the bench now             HTTP 409
 ├── NotAllowed           the key's role may not do this, or the request came a way it may not    HTTP 403
 │   └── NotIdentified    no key was given, or it is not one in force                             HTTP 401
 ├── TooLarge             a request carries more than this service takes              HTTP 413
@@ -145,14 +145,14 @@ class NotEnoughData(LabctlError):
 
 
 class Conflict(LabctlError):
-    """Somebody else holds it, or it is already so."""
+    """Another process or user holds it, or it is already so."""
 
     status = 409
     slug = "conflict"
 
 
 class BenchBusy(Conflict):
-    """Somebody drives the bench now: another campaign, or another process. It may be free later."""
+    """Another campaign or another process drives the bench now. It may be free later."""
 
     slug = "bench-busy"
 

@@ -41,7 +41,7 @@ class LinkFactory(Protocol):
 
 
 class HardwareLinks:
-    """Real ports and hosts. A time-out of the bench clock becomes wall seconds."""
+    """Real ports and hosts. A time-out of the bench clock becomes seconds of real time."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -52,7 +52,7 @@ class HardwareLinks:
         return serial.serial_for_url(url, baudrate=baudrate, timeout=wall_s, write_timeout=wall_s, exclusive=True)
 
     def port_timeout_s(self, timeout_s: float) -> float:
-        """Return the wall seconds of a time-out in seconds of the bench clock."""
+        """Return the seconds of real time of a time-out in seconds of the bench clock."""
         return self._clock.wall_s(timeout_s)
 
     def tcp_client(self, host: str, tcp_port: int, *, timeout_s: float) -> ModbusTcpClient:

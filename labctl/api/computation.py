@@ -158,7 +158,7 @@ async def _left(request: Request) -> None:
 
 
 async def _end(*tasks: asyncio.Future[Any]) -> None:
-    """Cancel what is not done yet, and wait until it has let go of what it waits for."""
+    """Cancel what is not done yet, and wait until it no longer waits for anything."""
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)

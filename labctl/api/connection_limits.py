@@ -12,7 +12,7 @@ RESERVED = "reserved"
 
 @dataclass(frozen=True)
 class ConnectionLimits:
-    """Bounds on connections, which hold before anybody has shown a key."""
+    """Bounds on connections, which hold before a key is shown."""
 
     header_bytes: int = 64 * KIB  #: request line and headers together; trailers of a body, too
     headers: int = 128

@@ -1,6 +1,6 @@
 """uvicorn's HTTP protocol with bounds: on headers in size and time, on stalled bodies and readers, on connections.
 
-The parser behind it (httptools) bounds nothing: a header that never ends is collected, piece after piece, for ever.
+The parser behind it (httptools) bounds nothing: a header that never ends is collected, piece after piece, without end.
 """
 
 from __future__ import annotations

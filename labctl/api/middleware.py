@@ -14,8 +14,8 @@ from labctl.api.access_policy import API, OPEN, READING, UPLOAD, AccessPolicy, r
 from labctl.api.connection_limits import RESERVED
 from labctl.api.problems import as_problem
 from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, Overloaded, TooLarge
+from labctl.service_connection import USER_HEADER
 from labctl.services.admin.api_keys import identify, require_role
-from labctl.services.commands.remote import USER_HEADER
 from labctl.services.lab_service import LabService
 from labctl.services.schemas.admin import Caller, Role
 from labctl.web import is_page

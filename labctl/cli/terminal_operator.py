@@ -1,4 +1,4 @@
-"""Puts a campaign's questions to whoever sits at the terminal that runs it."""
+"""Puts a campaign's questions to the person at the terminal that runs it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class TerminalOperator:
     def answer_prompts(self, operator: Operator, note: Callable[[str], None]) -> None:
         """Answer for an operator from now on, in the background; `note` is told of each answer.
 
-        A bench that helps itself asks nobody.
+        A bench with a unit handler asks no questions.
         """
         if isinstance(operator, HumanOperator):
             here = copy_context()  # in the name of whoever gave the command

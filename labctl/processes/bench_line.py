@@ -74,7 +74,7 @@ class BenchLine:
             signal.pidfd_send_signal(self._handle, number)
 
     def close(self) -> None:
-        """Let go of a process that has ended. Safe to call twice."""
+        """Forget a process that has ended. Safe to call twice."""
         if self._closed:
             return
         self._closed = True

@@ -54,7 +54,7 @@ def create_service(settings: WebSettings) -> LabService:
 
 
 def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:
-    """Return who may come in: on loopback this machine's users, elsewhere whoever shows a key. Raises BadInput."""
+    """Return who is admitted: on loopback this machine's users, elsewhere callers with a key. Raises BadInput."""
     upload = request.max_upload_mib * MIB
     if _is_loopback(request.host) and not request.require_keys:
         return AccessPolicy(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload)

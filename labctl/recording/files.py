@@ -6,8 +6,9 @@ import os
 import shutil
 import tempfile
 import tomllib
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Literal
+from typing import BinaryIO, Literal
 
 import tomli_w
 from pydantic import ValidationError
@@ -21,6 +22,10 @@ from labctl.recording.recording import Recording
 HEAD = "recording.toml"
 ENVIRONMENT = "environment"
 FORMATS = ("parquet", "csv")
+#: Every name that a file of a recording may have.
+FILE_NAMES = frozenset(
+    {HEAD, *(f"{stem}.{suffix}" for stem in ("samples", "points", "coefficients", ENVIRONMENT) for suffix in FORMATS)}
+)
 #: A key that is not known is shown up to here.
 LONGEST_PLACE = 80
 FileFormat = Literal["parquet", "csv"]
@@ -104,3 +109,14 @@ def _sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def recording_parts(opened: ExitStack, folder: Path) -> list[tuple[str, tuple[str, BinaryIO]]]:
+    """Open the files of a recording as parts of one form, as an HTTP client sends them; `opened` closes them.
+
+    Raises BadRecording for a folder without any.
+    """
+    found = [path for path in sorted(folder.glob("*")) if path.name in FILE_NAMES]
+    if not found:
+        raise BadRecording(f"{folder}: no recording there (expected {HEAD} and a data file)")
+    return [("files", (path.name, opened.enter_context(path.open("rb")))) for path in found]

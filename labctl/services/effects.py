@@ -20,7 +20,7 @@ OTHER_UNITS = {"thermometer_error": "K"}
 def catalogue() -> CatalogueResponse:
     """Return every effect and every model preset as JSON.
 
-    `unit` is that of an effect's plausible sizes; `leaves` says whether a calibration takes it out of the house.
+    `unit` is that of an effect's plausible sizes; `leaves` says whether a calibration exports it.
     """
     units = _units()
     effects: list[CataloguedEffect] = [

@@ -8,7 +8,7 @@ ProcedureError
 │   ├── BadData          a unit's readings are missing, damaged or too few
 │   ├── GuardTripped     a limit that is watched was passed
 │   ├── TableStopped     the table does not move as it was told to, in the middle of a data set
-│   └── Unanswered       nobody answered a question in time
+│   └── Unanswered       a question was not answered in time
 ├── Aborted              a person asked for the end
 │   └── Interrupted      the bench had to be released; the campaign is to be resumed
 └── StalePrompt          an answer to a question that is no longer asked
@@ -76,7 +76,7 @@ class TableStopped(StepFailed):
 
 
 class Unanswered(StepFailed):
-    """Nobody answered a question in time."""
+    """A question was not answered in time."""
 
 
 class Aborted(ProcedureError):

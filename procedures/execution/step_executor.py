@@ -35,7 +35,7 @@ class StepExecutor:
         Raises what the step raises once the recipe allows no further recovery.
         """
         if index in self.skipped:
-            self._record_skipped(index, "nobody turned the units")
+            self._record_skipped(index, "the units were not turned")
             return
         recovery = Recovery(self._context, self._plan.steps[index])
         while index not in self.skipped:

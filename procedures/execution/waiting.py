@@ -1,6 +1,6 @@
-"""Waiting: time that passes in slices, with a look at the requests of people and at the bench in each.
+"""Waiting: time that passes in slices, with a check of requests and of the bench in each.
 
-Whatever waits, for a soak, a settled rate, a person, a link or limits to hold again, waits here: a request to stop
+Every wait, for a soak, a settled rate, a person, a link or limits to hold again, is done here: a request to stop
 takes effect within `CHECK_S`, as `Aborted` or `Interrupted`. Ctrl-C at a terminal is a `KeyboardInterrupt` out of the
 clock's sleep.
 """

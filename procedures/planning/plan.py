@@ -88,7 +88,7 @@ class Plan(BaseModel):
         return (Home(), *(each for each in (move, soak) if each is not None))
 
     def mounted_at(self, index: int) -> str | None:
-        """Return the position in which the units are before step `index`; None when nobody has turned them yet."""
+        """Return the position in which the units are before step `index`; None when they have not been turned yet."""
         mounts = [step.position for step in self.steps[:index] if isinstance(step, Mount)]
         return mounts[-1] if mounts else None
 

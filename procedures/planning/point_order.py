@@ -76,7 +76,7 @@ def _inverted(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list
 
 
 def _merged(blocks: list[MountingBlock]) -> list[MountingBlock]:
-    """Return the mountings with neighbours of one position as one: nobody turns a unit to where it already is."""
+    """Return the mountings with neighbours of one position as one: a unit is not turned to where it already is."""
     merged: list[MountingBlock] = []
     for block in blocks:
         if merged and merged[-1].position == block.position:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
+import httpx
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
@@ -32,3 +33,15 @@ def service_of(client: TestClient) -> LabService:
 def add_recording(client: TestClient, recording: Recording) -> int:
     """Store a recording without a request; returns its number."""
     return service_of(client).store.recordings.add_import(recording, recording.info.started_at)
+
+
+def transport_to(client: TestClient) -> httpx.MockTransport:
+    """Return a transport whose requests reach the service of a test client without a port."""
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        request.read()
+        given = client.request(request.method, str(request.url), content=request.content, headers=dict(request.headers))
+        headers = {name: given.headers[name] for name in ("content-type", "etag") if name in given.headers}
+        return httpx.Response(given.status_code, content=given.content, headers=headers)
+
+    return httpx.MockTransport(answer)

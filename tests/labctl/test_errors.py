@@ -12,7 +12,7 @@ from instruments import errors as of_instruments
 from instruments.transport.modbus_link import RefusedRegister
 from labctl.errors import DataRefused, LabctlError, StoreError, TooBusy
 from labctl.fitting.models.inversion import NotConverged
-from labctl.services.commands.remote import ServiceRefused
+from labctl.service_connection import ServiceRefused
 from procedures.contracts import errors as of_procedures
 
 

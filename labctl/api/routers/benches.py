@@ -10,7 +10,7 @@ from labctl.services.commands.registry import CLEAR_BENCH
 from labctl.services.commands.requests import ToBench
 from labctl.services.schemas.benches import BenchResponse, BenchStatus, ClearRequest
 
-router = APIRouter(prefix="/api", tags=["what there is"])
+router = APIRouter(prefix="/api", tags=["catalogue"])
 
 
 @router.get("/benches", summary="This service's bench")

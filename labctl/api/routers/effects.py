@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from labctl.services.effects import catalogue
 from labctl.services.schemas.effects import CatalogueResponse
 
-router = APIRouter(prefix="/api", tags=["what there is"])
+router = APIRouter(prefix="/api", tags=["catalogue"])
 
 
 @router.get("/effects", summary="The catalogue of physical effects")

@@ -8,7 +8,7 @@ from labctl.api.dependencies import ServiceDep
 from labctl.services.schemas.units import UnitResponse
 from labctl.services.units import list_units, unit
 
-router = APIRouter(prefix="/api", tags=["what there is"])
+router = APIRouter(prefix="/api", tags=["catalogue"])
 
 
 @router.get("/units", summary="All units")

@@ -47,7 +47,7 @@ def status(as_json: Json = False, database: Database = None) -> None:
         print_json(benches)
     else:
         for bench in benches:
-            said = [bench.unconfirmed, *(f"nobody has made it safe: {left}" for left in bench.left)]
+            said = [bench.unconfirmed, *(f"it has not been made safe: {left}" for left in bench.left)]
             if bench.attempts:
                 said.insert(1, f"the safe state was tried again {bench.attempts} times, last at {bench.attempted_at}")
             if bench.confirmed_at:

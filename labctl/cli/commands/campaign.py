@@ -28,7 +28,8 @@ At = Annotated[
 ]
 Cron = Annotated[str | None, typer.Option("--cron", metavar="LINE", help="Begin again and again: '30 22 * * FRI'.")]
 TimeZone = Annotated[
-    str | None, typer.Option("--time-zone", metavar="NAME", help="Of TIME and LINE; default: the local one.")
+    str | None,
+    typer.Option("--time-zone", metavar="NAME", help="Time zone of --at and --cron; default: that of this computer."),
 ]
 Priority = Annotated[int | None, typer.Option("--priority", metavar="N", help="The highest goes first; default: 0.")]
 LateLimit = Annotated[

@@ -23,7 +23,7 @@ By = Annotated[str | None, typer.Option("--by", metavar="NAME", help="Who says s
 
 
 def person(by: str | None) -> str:
-    """Return who acts: as said, or whoever is logged in."""
+    """Return who acts: the given name, or else the user who is logged in."""
     try:
         return by or getpass.getuser()
     except (KeyError, OSError):

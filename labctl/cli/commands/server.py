@@ -81,7 +81,9 @@ def simulator(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Write a bench file that points at the simulator here.")
     ] = None,
-    speed: Annotated[float, typer.Option("--speed", metavar="X", help="X times as fast as the wall.")] = 1.0,
+    speed: Annotated[
+        float, typer.Option("--speed", metavar="X", help="Speed of the simulated instruments: X times real time.")
+    ] = 1.0,
     log: Annotated[
         Path | None,
         typer.Option("--log", metavar="FILE", help="Write what every instrument hears here, as JSON lines."),
@@ -112,7 +114,7 @@ def demo(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Run the whole job on simulated benches in virtual time, and on a real gyro's recording; prints the story."""
+    """Run the whole job on simulated benches in virtual time, and on a real gyro's recording; print each result."""
     from labctl.cli.demo import run_demo
 
     with one_clear_line():

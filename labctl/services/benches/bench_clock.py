@@ -1,4 +1,4 @@
-"""Whose clock a campaign's times are of: the wall's, or that of a simulated bench."""
+"""Which clock a campaign's times are of: the system's, or that of a simulated bench."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from labctl.json_types import JsonObject
 
 
 def has_simulated_time(bench: JsonObject) -> bool:
-    """Return whether a bench, as its file says it, keeps a simulated clock, which may run faster than the wall's."""
+    """Return whether a bench, as its file says it, keeps a simulated clock, which may run faster than real time."""
     simulation, gyros = bench.get("simulation"), bench.get("gyros")
     if isinstance(simulation, Mapping) and simulation.get("control"):  # simulators in another process set the pace
         return True

@@ -43,5 +43,5 @@ def serve_simulator(
     `log` gets one JSON document per line: when which instrument heard what, and whether the table turned.
     """
     if not 0 < speed < float("inf"):
-        raise BadInput(f"--speed {speed}: a positive number, 1 for the wall's own pace")
+        raise BadInput(f"--speed {speed}: give a positive number; 1 is real time")
     serve_simulation(load_bench(source), ScaledClock(speed), out, ready, log)

@@ -77,7 +77,7 @@ class BenchHold:
             url=self._store.leases.address.url, calls=self._store.leases.address.calls,
         )  # fmt: skip
         if not self._store.leases.claim(mine, replacing=found):
-            raise Conflict(f"bench {self._bench}: somebody else took it this moment; try again")
+            raise Conflict(f"bench {self._bench}: another process has just taken it; try again")
         _HELD_HERE.add(self._owner)
         self._renewed_s, self._why_lost = begun_s, ""
         log.info("lease.taken", bench=self._bench, instead_of="" if found is None else described(found))
@@ -158,7 +158,7 @@ class BenchHold:
 def hold_bench(store: Store, bench: BenchFile, clock: Clock | None = None) -> BenchHold | None:
     """Take the lease on a bench and keep it. Raises Conflict.
 
-    None for a simulated bench of a database to which no other process writes: nobody else can take up its campaign.
+    None for a simulated bench of a database to which no other process writes: no other process can resume its campaign.
     """
     if bench.is_simulated and store.is_sole_writer:
         return None
@@ -198,7 +198,7 @@ def open_for(bench: BenchFile, location: str) -> Iterator[Store]:
 
 
 def driver_of(store: Store, bench_name: str, now: datetime) -> LeaseRow | None:
-    """Return the lease of the process that drives a bench now; None where nobody does."""
+    """Return the lease of the process that drives a bench now; None where no process does."""
     found = store.leases.holder(bench_name)
     return None if found is None or found.expires_at <= now or _is_dead(found) else found
 

@@ -11,7 +11,7 @@ from labctl.services.schemas.campaigns import BENCH_CHECKS, BenchCheck
 
 #: What is asked, and what the answer yes says.
 QUESTIONS: Mapping[BenchCheck, str] = {
-    "chamber_clear": "Is the chamber clear: nobody's hand, no tool, no loose part in it, door closed?",
+    "chamber_clear": "Is the chamber clear: no hand, no tool, no loose part in it, door closed?",
     "table_free": "Is the table free to turn: nothing touches it, cables have their slack?",
     "limiter_on": "Is the independent temperature limiter on?",
 }

@@ -57,8 +57,8 @@ FAILURES: tuple[Failure, ...] = (
         f"Remove what prevents it, {RESUME} and answer its question.",
     ),
     Failure(
-        r"nobody answered within",
-        "Nobody answered the bench's question in time.",
+        r"(?:\w+ answered|no answer) within",
+        "The bench's question was not answered in time.",
         f"Choose a time when a person is at the bench, {RESUME} and answer its question.",
     ),
     Failure(

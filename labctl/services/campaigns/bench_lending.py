@@ -1,7 +1,7 @@
 """The bench of a campaign whose engine waits for its database: another thread may stop the table meanwhile.
 
 Drivers are for one thread. The engine has the bench while it runs, and lends it while it writes its journal: a writer
-that is held, or a disk that stands still, must not keep a table turning that somebody wants stopped.
+that is held, or a disk that stands still, must not keep a table turning that is to be stopped.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class BenchLending:
     def stop(self, table: RateTable, clock: Clock, within_s: float) -> str | None:
         """Stop the table once the bench is lent; returns what could not be confirmed, None when it stands."""
         if not self._lock.acquire(timeout=within_s):
-            return "the engine did not let go of the bench"
+            return "the engine did not release the bench"
         try:
             return stop_table(table, clock)
         finally:

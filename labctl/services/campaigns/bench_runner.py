@@ -282,8 +282,8 @@ class BenchRunner:
     def close(self) -> None:
         """End what runs, in the safe state, and let the bench go.
 
-        Waits as long as that takes, and every part of the safe state has an end of its own: whoever had the bench or
-        the database before the table stands could drive it too.
+        Waits as long as that takes: a process that had the bench or the database before the table stands could drive it
+        too. Every part of the safe state has an end of its own.
         """
         with ignore_signals():  # an impatient Ctrl-C must not leave the bench as it is
             self.end_soon()

@@ -10,7 +10,7 @@ from labctl.store import BenchRow, Store
 
 
 def bench_status(row: BenchRow) -> BenchStatus:
-    """Return a bench as it leaves the house."""
+    """Return a bench as the services report it."""
     return BenchStatus(**asdict(row))
 
 

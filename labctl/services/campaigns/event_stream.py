@@ -1,4 +1,4 @@
-"""Following a campaign: any number of onlookers, and the bench is looked at once for all of them."""
+"""Following a campaign: any number of clients, and the bench is polled once for all of them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class StatusCache:
 
 
 class CampaignEventStream:
-    """Tells onlookers where campaigns are."""
+    """Tells clients the status of campaigns."""
 
     def __init__(self, store: Store, status: Callable[[int], CampaignResponse], listen: Listen | None) -> None:
         self._store = store
@@ -63,7 +63,7 @@ class CampaignEventStream:
         """Yield a campaign's events after number `after`, where it stands whenever that has changed, and None to show
         that the stream lives, until the campaign ends or it is `over` for another reason.
 
-        Whoever reads slowly gets the newest picture next, never a queue of old ones; the bench only rings a bell.
+        A client that reads slowly gets the newest status next, never a queue of old ones; the bench only rings a bell.
         """
         bell = asyncio.Event()
         loop = asyncio.get_running_loop()
@@ -98,7 +98,7 @@ class CampaignEventStream:
     async def _told(self, campaign: int, after: int) -> tuple[CampaignState, list[EventResponse]]:
         """Return the state in the database, not that of the live picture, and the events that came before it.
 
-        The last event is written before the state there ends, so that whoever sees the end has seen every event.
+        The last event is written before the state there ends, so that a client that sees the end has seen every event.
         """
 
         def look() -> tuple[CampaignState, list[EventResponse]]:

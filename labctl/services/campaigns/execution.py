@@ -137,7 +137,7 @@ def run_here(
     """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks.
 
     `say` is told of a campaign that was left on a simulated bench. `ask_clear` is given the questions about a real
-    bench that nobody has confirmed yet, and returns who has. Raises Conflict for a campaign that was left on a real
+    bench that is not confirmed yet, and returns who has. Raises Conflict for a campaign that was left on a real
     bench, StartNotConfirmed where no person has confirmed that it is clear.
     """
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
@@ -169,7 +169,7 @@ def _left_on(store: Store, bench: BenchFile) -> list[str]:
 def run_attended(
     store: Store, prepared: Prepared, control: Control, observe: Observe | None, attend: Attend | None
 ) -> CampaignResponse:
-    """Run a prepared campaign to its end at somebody's terminal.
+    """Run a prepared campaign to its end at a terminal.
 
     Raises Stopped after a Ctrl-C, StoreError when it cannot be written any more; both say how the bench was left.
     """

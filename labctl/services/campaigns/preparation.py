@@ -55,7 +55,7 @@ def operator_of(bench: Bench) -> Operator:
 
 
 def refuse_unconfirmed(store: Store, bench: str) -> None:
-    """Raise Conflict while nobody has looked at a bench whose safe state was not confirmed when it was due."""
+    """Raise Conflict while a bench whose safe state was not confirmed has not been checked by a person."""
     row = store.benches.get(bench)
     if row is None or not row.unconfirmed:
         return
@@ -77,7 +77,7 @@ def seeded(bench: BenchFile, seed: int | None) -> BenchFile:
 
 
 def clock_for(bench: BenchFile, speed: float | None) -> Clock:
-    """Return the wall's clock for real instruments; for simulated ones a scaled or a virtual clock.
+    """Return the system's clock for real instruments; for simulated ones a scaled or a virtual clock.
 
     Simulators in another process set the pace themselves. Raises BadInput for a speed on a bench that has its own.
     """

@@ -29,7 +29,7 @@ def describe_recovery(store: Store, bench: str) -> str:
         return ""
     text = how_far(from_rows(store, row))
     if store.benches.unconfirmed(bench):
-        return f"{text} and is not taken up: bench {bench} was not confirmed safe, and nobody has looked at it since"
+        return f"{text} and is not taken up: bench {bench} was not confirmed safe, and has not been checked since"
     if why_not := retries_exhausted(store.resume_points.of_campaign(row.id)):
         return f"{text} and is not taken up: {why_not}"
     return f"{text} and is taken up now, safe state first"

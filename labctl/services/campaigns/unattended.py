@@ -33,7 +33,7 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
     if row.state in UNDER_WAY and outlives_its_process(row):
         text = f"the process that ran campaign {campaign} ended before it could make the bench safe"
         store.benches.mark(row.bench_name, text, at)
-        said += f". Nobody has made bench {row.bench_name} safe: look at it, then `labctl bench clear`"
+        said += f". Bench {row.bench_name} has not been made safe: check it, then run `labctl bench clear`"
     store.campaigns.close_unfinished(campaign, said, at, CampaignState.ABORTED)
     log.warning("campaign.closed", campaign=campaign, bench=row.bench_name, reason=said)
     return campaign_status(store, campaign)
@@ -42,4 +42,4 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
 def not_running(store: Store, campaign: int, action: str) -> Conflict:
     """Return the refusal of an action that only a running campaign can take. Raises NotFound."""
     state = store.campaigns.get(campaign).state
-    return Conflict(f"campaign {campaign} is {state} and no process runs it; there is nobody to {action}")
+    return Conflict(f"campaign {campaign} is {state} and no process runs it, so it is not possible to {action}")

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 
-from labctl.errors import BadRecording
+from labctl.recording.files import recording_parts
 from labctl.services.commands.requests import RecordingFolder
-from labctl.services.recordings.transfer import FILE_NAMES
 from labctl.services.schemas.base import Request
 
 
@@ -21,8 +20,4 @@ def json_body(_: ExitStack, request: object) -> Mapping[str, object]:
 
 def recording_files(opened: ExitStack, request: RecordingFolder) -> Mapping[str, object]:
     """Send the files of a recording as parts of one form. Raises BadRecording for a folder without any."""
-    found = [path for path in sorted(request.folder.glob("*")) if path.name in FILE_NAMES]
-    files = [("files", (path.name, opened.enter_context(path.open("rb")))) for path in found]
-    if not files:
-        raise BadRecording(f"{request.folder}: no recording there (expected recording.toml and a data file)")
-    return {"files": files}
+    return {"files": recording_parts(opened, request.folder)}

@@ -17,6 +17,7 @@ from labctl.store import Store, holder_of, is_url, open_store
 
 if TYPE_CHECKING:
     from labctl.services.commands.foreground_control import OpenTerminal
+    from labctl.services.commands.remote import HttpExecutor
 
 
 @contextmanager
@@ -54,9 +55,8 @@ def open_commands(database: str | None, open_terminal: OpenTerminal | None = Non
     """
     location = database or default_database()
     if url := service_url(location):
-        from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415  an HTTP client only where one is needed
-
-        yield HttpExecutor(url)
+        with _remote(url) as executor:
+            yield executor
         return
     from labctl.services.commands.foreground_control import ForegroundControl, no_terminal  # noqa: PLC0415  loads drivers
 
@@ -71,10 +71,24 @@ def open_commands(database: str | None, open_terminal: OpenTerminal | None = Non
 
 
 def _routed(local: CommandExecutor, location: str) -> CommandExecutor:
+    from labctl.service_connection import ServiceConnection  # noqa: PLC0415  an HTTP client only where one is needed
     from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415  as above
     from labctl.services.commands.routing import RoutedExecutor  # noqa: PLC0415  as above
 
-    return RoutedExecutor(local, HttpExecutor, lambda: open_readonly(location), SystemClock())
+    def remote(url: str) -> HttpExecutor:
+        return HttpExecutor(ServiceConnection(url))
+
+    return RoutedExecutor(local, remote, lambda: open_readonly(location), SystemClock())
+
+
+@contextmanager
+def _remote(url: str) -> Iterator[HttpExecutor]:
+    """Give the executor of a service; an HTTP client is loaded only where one is needed."""
+    from labctl.service_connection import ServiceConnection  # noqa: PLC0415
+    from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415
+
+    with ServiceConnection(url) as connection:
+        yield HttpExecutor(connection)
 
 
 def execute(database: str | None, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
@@ -91,9 +105,8 @@ def current_status(database: str | None, campaign: int | None) -> CampaignRespon
     with open_readonly(database) as store:
         answer = with_resume(store, campaign_status(store, campaign))
     if url := service_url(database, answer.id):
-        from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415
-
-        return HttpExecutor(url).fetch(f"/api/campaigns/{answer.id}", CampaignResponse)
+        with _remote(url) as executor:
+            return executor.fetch(f"/api/campaigns/{answer.id}", CampaignResponse)
     return answer
 
 

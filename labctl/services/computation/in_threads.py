@@ -18,7 +18,7 @@ UNBOUNDED = Limits(at_once=40, waiting=1_000_000)
 
 
 class InThreads(Pool):
-    """Work is done in a thread; a job that nobody waits for ends at its next stage."""
+    """Work is done in a thread; a job that no caller waits for ends at its next stage."""
 
     def __init__(self, store: Store, limits: Limits = UNBOUNDED) -> None:
         super().__init__(limits)
@@ -39,6 +39,6 @@ class InThreads(Pool):
 
 
 def result_here(job: Job, store: Store) -> object:
-    """Do a job in this thread, in the name of whoever asked for it. Raises Cancelled at a stage, when all have left."""
+    """Do a job in this thread, in the name of the caller. Raises Cancelled at a stage, when all have left."""
     with acting(job.actor), reporting_to(job.report):
         return job.call(store)

@@ -85,7 +85,7 @@ class Job:
             end()
 
     def report(self, stage: str) -> None:
-        """Tell a stage to all who wait. Raises Cancelled where nobody does any more."""
+        """Tell a stage to all who wait. Raises Cancelled where no caller waits any more."""
         with self._guard:
             self._stage = stage
             waiting = list(self._waiting)
@@ -112,7 +112,7 @@ class Pending(Generic[T]):
         return self._job.future
 
     def leave(self) -> None:
-        """Wait no more; a job that nobody waits for is ended. Without effect on a job that is done."""
+        """Wait no more; a job that no caller waits for is ended. Without effect on a job that is done."""
         self._job.leave(self)
         if self._job.is_abandoned:
             self._drop(self._job)

@@ -27,7 +27,7 @@ ENDS = "the service ends; ask again when it is back"
 
 
 def _ignore(_stage: str) -> None:
-    """Take in a stage that nobody wants to hear."""
+    """Discard a stage."""
 
 
 class Pool(ABC):
@@ -143,7 +143,7 @@ class Pool(ABC):
             del self._by_key[job.key]
 
     def _drop(self, job: Job) -> None:
-        """Take a job that nobody waits for out of the queue."""
+        """Remove a job that no caller waits for from the queue."""
         with self._guard:
             self._forget(job)
             with suppress(ValueError):

@@ -1,4 +1,4 @@
-"""The worker: a process that does one piece of work with limits of its own, and sends back what came of it."""
+"""The worker: a process that does one piece of work with limits of its own, and sends back its result."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Outcome:
 
 
 def carry_out(connection: Connection, task: Task) -> None:
-    """Do a task in this process, which has nothing else to do; its stages and what came of it are sent."""
+    """Do a task in this process, which has nothing else to do; its stages and its result are sent."""
     os.environ.clear()
     os.environ.update(task.environment)
     for number in (signal.SIGINT, signal.SIGHUP):  # the service decides when it ends

@@ -25,7 +25,7 @@ WEEK = timedelta(days=6)
 
 
 def visits_s(plan: Plan, bench: BenchFile) -> list[float]:
-    """Return when a plan asks a person to turn or switch the units, s from its begin; empty where nobody is asked."""
+    """Return when a plan asks a person to turn or switch the units, s from its begin; empty without questions."""
     if not bench.needs_person:
         return []
     visits: list[float] = []
@@ -86,7 +86,7 @@ def _warning(offsets_s: Sequence[float], night: Sequence[datetime], better: date
     if better is None:
         return f"{text}; no start has fewer times at night"
     left = sum(_is_night(time) for time in _times(offsets_s, better, zone))
-    return f"{text}; a start at {better:%a %H:%M} needs {'nobody at night' if not left else f'only {left} at night'}"
+    return f"{text}; a start at {better:%a %H:%M} needs {'no person at night' if not left else f'only {left} at night'}"
 
 
 def _listed(times: Sequence[datetime]) -> str:

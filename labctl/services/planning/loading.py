@@ -44,7 +44,7 @@ def load_recipe(source: str) -> Recipe:
 
 
 def own_text(source: str) -> str:
-    """Return the text of a recipe file, for somebody who does not read it himself or later; a name stays as it is.
+    """Return the text of a recipe file, for a process that cannot read the file, or only later; a name is kept.
 
     Raises RecipeError.
     """

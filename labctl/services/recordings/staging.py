@@ -1,6 +1,6 @@
 """Folders for files on their way in or out. One that a killed process left is removed by the next service.
 
-A folder is locked (`flock`) for as long as its process, or a child of it, uses it: the kernel lets go of the lock with
+A folder is locked (`flock`) for as long as its process, or a child of it, uses it: the kernel releases the lock with
 the process, also of one in another container that shares the folder for temporary files. A process id would not tell.
 """
 

@@ -13,6 +13,7 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 from labctl.errors import BadRecording
 from labctl.recording import RecordingInfo, read_recording, write_recording
+from labctl.recording.files import FILE_NAMES
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.staging import staging_folder
 from labctl.services.schemas.recordings import ImportResponse
@@ -21,8 +22,6 @@ from labctl.store import Store
 CHUNK_BYTES = 1 << 20
 #: CSV shrinks to a fifth at the quickest; Parquet is packed already.
 EFFORT = 1
-STEMS = ("samples", "points", "coefficients", "environment")
-FILE_NAMES = frozenset({"recording.toml", *(f"{stem}.{suffix}" for stem in STEMS for suffix in ("csv", "parquet"))})
 
 
 def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
@@ -89,7 +88,7 @@ class Download:
     content: IO[bytes]
 
     def chunks(self) -> Iterator[bytes]:
-        """Yield the bytes, then close the file; also when whoever reads goes away."""
+        """Yield the bytes, then close the file; also when the reader disconnects."""
         with self.content:
             while chunk := self.content.read(CHUNK_BYTES):
                 yield chunk

@@ -1,8 +1,8 @@
 """Begins scheduled campaigns on a service's bench: one at a time, highest priority first, each start at most once.
 
 A start is claimed in the database before anything is opened, and concluded when its campaign is written down. What a
-process claimed and did not conclude is settled at the next start of a service: begun if a campaign came of it, else due
-again.
+process claimed and did not conclude is settled at the next start of a service: begun if there is a campaign of it, else
+due again.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Scheduler:
         self.trouble = trouble
 
     def settle(self) -> None:
-        """Conclude what an earlier process claimed: begun if a campaign came of it, else due again."""
+        """Conclude what an earlier process claimed: begun if there is a campaign of it, else due again."""
         now = self._clock.utc()
         for event in self._store.starts.open_claims(self._bench):
             came = [

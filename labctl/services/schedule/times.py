@@ -25,7 +25,7 @@ NOW = "now"
 
 
 def time_zone(name: str | None) -> ZoneInfo:
-    """Return a time zone by its name in the tz database, or the local one. Raises BadInput."""
+    """Return a time zone by its name in the tz database, or else that of this computer. Raises BadInput."""
     try:
         return ZoneInfo(name) if name is not None else ZoneInfo(tzlocal.get_localzone_name())
     except (KeyError, ValueError, OSError) as error:  # unknown, not a name, a folder

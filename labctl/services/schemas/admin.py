@@ -71,7 +71,7 @@ class AuditResponse(ResponseModel):
 
 
 class AuditVerificationResponse(ResponseModel):
-    """Whether the trail is whole; the anchor is worth noting down where nobody here can write."""
+    """Whether the trail is whole; note the anchor in a place that no user of this database can write to."""
 
     ok: bool
     rows: int

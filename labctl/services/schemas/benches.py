@@ -30,7 +30,7 @@ class BenchStatus(ResponseModel):
         description="When such an attempt confirmed the safe state; a person has still to look and clear it.",
     )
     left: list[str] = Field(
-        default_factory=list, description="Campaigns that no process runs any more and nobody has ended."
+        default_factory=list, description="Campaigns that no process runs any more and that have not been ended."
     )
 
 

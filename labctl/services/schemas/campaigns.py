@@ -33,7 +33,9 @@ class CampaignRequest(Request):
     )
     cron: str | None = Field(default=None, max_length=200, description="Begin again and again: five fields of cron.")
     time_zone: str | None = Field(
-        default=None, max_length=100, description="Of `at` and `cron`, such as Europe/Berlin; default: the local one."
+        default=None,
+        max_length=100,
+        description="Time zone of `at` and `cron`, such as Europe/Berlin; default: that of the service's computer.",
     )
     priority: int = Field(default=0, ge=-100, le=100, description="Of starts that are due, the highest goes first.")
     late_limit_s: float | None = Field(
@@ -171,7 +173,7 @@ class CampaignResponse(ResponseModel):
     )
     unrecorded: str = Field(default="", description="Of a request that was carried out: what could not be written.")
     simulated_time: bool = Field(
-        default=False, description="Its times are those of a simulated bench, which may run faster than the wall's."
+        default=False, description="Its times are those of a simulated bench, which may run faster than real time."
     )
     advice: AdviceResponse | None = Field(default=None, description="Of a failed campaign.")
     ended: bool = Field(

@@ -120,7 +120,7 @@ def _end_broken(connection: sa.Connection, found: Head, last: int) -> Broken | N
     if found.length < head.length:
         return Broken(last + 1, f"{head.length - found.length} rows are missing at the end")
     if found != head:
-        return Broken(last, "it is not the last row by the head of the trail: rows were added past the house")
+        return Broken(last, "it is not the last row that the head of the trail names: rows were added without labctl")
     return None
 
 

@@ -125,7 +125,7 @@ class Imports:
 
     @transaction
     def claim(self, ticket: ImportTicket) -> ImportTicket:
-        """Return a ticket that only the caller has: whoever had it before can write no further part.
+        """Return a ticket that only the caller has: the process that had it before can write no further part.
 
         Raises Conflict when the import was discarded or finished meanwhile.
         """

@@ -27,12 +27,12 @@ OPEN = {("get", "/health"), ("get", "/health/heartbeat")}
 
 def operations() -> list[tuple[str, str]]:
     """Every operation of the API, from its own description: a new path is tested as soon as it is there."""
-    document = create_app(None).openapi()  # type: ignore[arg-type]  # nothing is asked of the house
+    document = create_app(None).openapi()  # type: ignore[arg-type]  # the description needs no service
     return sorted((method, path) for path, item in document["paths"].items() for method in item)
 
 
 def needs(method: str, path: str) -> Role:
-    """What an operation asks for, as the house promises it."""
+    """What an operation asks for, as the access policy states it."""
     if path.startswith("/api/keys") or path.endswith(("/certify", "/calibrations/{version}/revoke")):
         return Role.APPROVER
     return Role.VIEWER if method == "get" or path in ASKING else Role.OPERATOR

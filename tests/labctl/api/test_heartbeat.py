@@ -37,7 +37,7 @@ def test_a_plan_says_when_a_start_needs_a_person(client: TestClient, monkeypatch
     assert found["text"].endswith("(Europe/Berlin)")
     assert found["at_night"] == found["needed_at"]
     assert found["better_start"] == "2199-07-02T07:00:00+02:00"
-    assert "between 20:00 and 07:00; a start at Tue 07:00 needs nobody at night" in found["warning"]
+    assert "between 20:00 and 07:00; a start at Tue 07:00 needs no person at night" in found["warning"]
     weekly = {"recipe": "short", "cron": "0 9 * * FRI", "time_zone": "Europe/Berlin"}
     assert client.post("/api/plans", json=weekly).json()["attendance"]["warning"] == ""
     assert client.post("/api/plans", json={**asked, **weekly}).status_code == 400

@@ -7,16 +7,16 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from instruments.clock import VirtualClock
 from labctl.api import create_app
 from labctl.errors import BadRecording, Conflict
+from labctl.service_connection import ServiceConnection, ServiceRefused
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.commands.encoding import json_body, recording_files
 from labctl.services.commands.registry import COMMANDS, FIT, IMPORT_RECORDING, IMPROVE, START_CAMPAIGN
-from labctl.services.commands.remote import HttpExecutor, ServiceRefused
+from labctl.services.commands.remote import HttpExecutor
 from labctl.services.commands.requests import CampaignStart, RecordingFolder, ToNewestOrVersion, ToStart, ToUnit
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
@@ -27,6 +27,7 @@ from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.commands import local_executor
 from tests.helpers.paths import EXAMPLES
+from tests.helpers.service import transport_to
 
 
 @pytest.fixture
@@ -41,16 +42,8 @@ def remote(service: LabService) -> HttpExecutor:
     """Return an executor whose requests reach the service without a port."""
     from fastapi.testclient import TestClient
 
-    executor = HttpExecutor("http://testserver")
     inside = TestClient(create_app(service))  # not entered: the service stays open
-
-    def answer(request: httpx.Request) -> httpx.Response:
-        request.read()
-        given = inside.request(request.method, str(request.url), content=request.content, headers=dict(request.headers))
-        return httpx.Response(given.status_code, content=given.content)
-
-    executor._client = httpx.Client(base_url="http://testserver", transport=httpx.MockTransport(answer))
-    return executor
+    return HttpExecutor(ServiceConnection("http://testserver", transport=transport_to(inside)))
 
 
 def test_every_command_has_exactly_one_route_with_its_responses() -> None:

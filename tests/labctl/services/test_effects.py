@@ -1,4 +1,4 @@
-"""The catalogue as it leaves the house."""
+"""The catalogue as the services report it."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ def test_a_mounting_that_nobody_does_is_left_out_where_the_recipe_says_so(rig: A
 
     outcome = rig.run(recipe, observer=answer)
     assert outcome.state == CampaignState.DONE
-    assert "left out as nobody turned the units" in outcome.reason
+    assert "left out as the units were not turned" in outcome.reason
     assert [header.step.position for header in rig.journal.headers] == ["z", "z"]
     steps = rig.engine.plan.steps
     outcomes = [result.outcome for result in rig.journal.results()]

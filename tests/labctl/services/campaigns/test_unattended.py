@@ -142,7 +142,7 @@ def test_ending_by_hand_what_no_process_runs_says_that_nobody_made_the_bench_saf
     answer = local_executor(store, VirtualClock()).execute(
         ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason="the computer died"))
     )
-    assert (answer.state, "Nobody has made bench" in answer.reason) == ("aborted", True)
+    assert (answer.state, "has not been made safe" in answer.reason) == ("aborted", True)
     assert f"campaign {campaign} ended before" in store.benches.unconfirmed(BENCH.name)
 
 

@@ -55,7 +55,9 @@ def test_times_are_of_the_bench_and_those_at_night_are_warned_of() -> None:
     assert answer is not None
     assert answer.text == "needs a person at Tue 03:10 and Tue 09:40 (Europe/Berlin)"
     assert [f"{time:%H:%M}" for time in answer.at_night] == ["03:10"]
-    assert answer.warning.startswith("Tue 03:10 is between 20:00 and 07:00; a start at Tue 00:30 needs nobody at night")
+    assert answer.warning.startswith(
+        "Tue 03:10 is between 20:00 and 07:00; a start at Tue 00:30 needs no person at night"
+    )
     assert answer.better_start == datetime(2026, 3, 24, 0, 30, tzinfo=BERLIN)
 
 

@@ -179,7 +179,7 @@ function shapeCard(effect) {
   const orders =
     effect.max_order === null
       ? null
-      : h("p", {}, `A polynomial up to order ${effect.max_order}; ${effect.order} where nobody says.`);
+      : h("p", {}, `A polynomial up to order ${effect.max_order}; ${effect.order} by default.`);
   if (!effect.parameters.length)
     return card("Its shape", orders ?? h("p", {}, "It has no shape to choose: one size says all."));
   return card(

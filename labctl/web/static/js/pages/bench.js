@@ -109,7 +109,7 @@ function unconfirmedNotice(bench, simulated_time) {
     h(
       "p",
       {},
-      `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Go and look at it; no campaign starts before somebody has.`,
+      `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Check it; no campaign starts before a person has.`,
     ),
     bench.attempts
       ? h(

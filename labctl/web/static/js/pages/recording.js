@@ -56,7 +56,7 @@ export async function page({ params, query, signal }) {
     element.append(
       notice(
         "",
-        "This recording is a table that somebody published: scale factors and offsets over temperature. It has no data sets and no readings to look at; it can be fitted.",
+        "This recording is a published table: scale factors and offsets over temperature. It has no data sets and no readings to look at; it can be fitted.",
       ),
     );
     return element;

@@ -63,7 +63,7 @@ export async function askCertification(serial, version) {
   ];
   if (needed) fields.push({ name: "override", label: "Certify it all the same", type: "checkbox" });
   const answers = await dialog(`Put version ${version} in force`, fields, {
-    text: "Whoever asks for this unit's calibration gets this version from now on. It is written to the audit trail.",
+    text: "Every request for this unit's calibration gets this version from now on. It is written to the audit trail.",
     body: assessed(known),
     confirm: "Certify",
     kind: needed ? "danger" : "primary",

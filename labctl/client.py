@@ -1,0 +1,247 @@
+"""A client of a labctl service: calibrations by serial number, recordings, fits and campaigns.
+
+Every method sends one HTTP request and returns a typed answer. Three errors are common to all of them:
+`ServiceRefused` (the service refuses the request and says why), `labctl.errors.StoreError` (it does not answer) and
+`pydantic.ValidationError` (a value of a request is wrong; nothing was sent).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from urllib.parse import quote
+
+import httpx
+from httpx_sse import ServerSentEvent, connect_sse
+
+from instruments.clock import Clock, SystemClock
+from labctl.calibration import Calibration, read_calibration
+from labctl.recording.files import recording_parts
+from labctl.service_connection import TIMEOUT_S, ServiceConnection, ServiceRefused, json_of, refusal
+from labctl.services.schemas.base import Request
+from labctl.services.schemas.calibrations import CalibrationRow, FitRequest, FitResponse
+from labctl.services.schemas.campaigns import (
+    CampaignRequest,
+    CampaignResponse,
+    ConfirmRequest,
+    EventResponse,
+    ReasonRequest,
+    ResumeRequest,
+)
+from labctl.services.schemas.recordings import ImportResponse, RecordingResponse
+from labctl.services.schemas.schedule import ScheduledResponse
+from labctl.services.schemas.units import UnitResponse
+
+__all__ = [
+    "CalibrationFile",
+    "CalibrationRow",
+    "CampaignRequest",
+    "CampaignResponse",
+    "Client",
+    "EventResponse",
+    "FitRequest",
+    "FitResponse",
+    "ImportResponse",
+    "RecordingResponse",
+    "ResumeRequest",
+    "ScheduledResponse",
+    "ServiceRefused",
+    "UnitResponse",
+]
+
+#: Address of `labctl serve` without options.
+DEFAULT_URL = "http://127.0.0.1:8420"
+#: Pauses before `Client.watch` connects again, s; after the last one it gives up.
+RECONNECT_AFTER_S = (1.0, 2.0, 4.0, 8.0, 15.0)
+#: An event stream that is silent for longer is broken, s: the service sends a sign of life every 10 s.
+SILENT_S = 30.0
+
+
+@dataclass(frozen=True)
+class CalibrationFile:
+    """A calibration as the service serves it: immutable bytes, and their ETag (the document's SHA-256, quoted)."""
+
+    serial: str
+    content: bytes
+    etag: str
+    media_type: str
+
+    @property
+    def calibration(self) -> Calibration:
+        """The calibration in a JSON file. Raises BadCalibrationFile for another format."""
+        return read_calibration(self.content)
+
+
+class Client:
+    """A connection to one service, to be closed or used in a `with` statement.
+
+    `url` is the address of the service. `api_key` defaults to the environment variable `LABCTL_KEY`; a service on
+    loopback needs none unless it was started with `--require-keys`. `timeout_s` bounds each answer, in seconds.
+    """
+
+    def __init__(
+        self,
+        url: str = DEFAULT_URL,
+        *,
+        api_key: str | None = None,
+        timeout_s: float = TIMEOUT_S,
+        transport: httpx.BaseTransport | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self._connection = ServiceConnection(url, api_key, timeout_s=timeout_s, transport=transport)
+        self._clock = clock or SystemClock()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._connection.close()
+
+    def units(self) -> list[UnitResponse]:
+        """Return every unit that was measured or imported, by serial number."""
+        return self._connection.get_list("/api/units", UnitResponse)
+
+    def unit(self, serial: str) -> UnitResponse:
+        """Return one unit: its recordings, its calibration versions, and which version is certified."""
+        return self._connection.get(f"/api/units/{_part(serial)}", UnitResponse)
+
+    def calibrations(self, serial: str) -> list[CalibrationRow]:
+        """Return every calibration version of a unit, newest first, with its errors in deg/s."""
+        return self._connection.get_list(f"/api/units/{_part(serial)}/calibrations", CalibrationRow)
+
+    def calibration(
+        self,
+        serial: str,
+        version: int | None = None,
+        *,
+        file_format: str = "json",
+        held: CalibrationFile | None = None,
+    ) -> CalibrationFile:
+        """Fetch a calibration file: the certified version, or the one with number `version`.
+
+        With `held`, the file that the caller already has, its ETag is sent along; the same object is returned when it
+        is still current, and nothing is downloaded. Raises ServiceRefused with slug `not-certified` when the unit has
+        no certified version, `not-found` when it does not exist.
+        """
+        query = {"format": file_format} | ({} if version is None else {"version": str(version)})
+        headers = {} if held is None else {"If-None-Match": held.etag}
+        path = f"/api/units/{_part(serial)}/calibration"
+        response = self._connection.request("GET", path, params=query, headers=headers)
+        if held is not None and response.status_code == httpx.codes.NOT_MODIFIED:
+            return held
+        media_type = response.headers.get("content-type", "")
+        return CalibrationFile(serial, response.content, response.headers["etag"], media_type)
+
+    def recordings(self) -> list[RecordingResponse]:
+        """Return every recording, newest first."""
+        return self._connection.get_list("/api/recordings", RecordingResponse)
+
+    def import_recording(self, folder: Path | str) -> ImportResponse:
+        """Send the recording in `folder` (interchange format) and return its number and the warnings about it.
+
+        Raises BadRecording for a folder without a recording.
+        """
+        with ExitStack() as opened:
+            files = recording_parts(opened, Path(folder))
+            response = self._connection.request("POST", "/api/recordings", files=files)
+        return ImportResponse.model_validate(json_of(response))
+
+    def fit(self, serial: str, request: FitRequest | None = None) -> FitResponse:
+        """Fit a model to a recording of a unit; the result is the unit's next calibration version."""
+        path = f"/api/units/{_part(serial)}/calibrations"
+        return FitResponse.model_validate(json_of(self._post(path, request or FitRequest())))
+
+    def start_campaign(self, request: CampaignRequest) -> CampaignResponse | ScheduledResponse:
+        """Start a campaign now, or enter it into the schedule when the request has `at` or `cron`.
+
+        A bench that is not simulated needs `confirmed_by` and `checks`; without them ServiceRefused has the slug
+        `start-not-confirmed`.
+        """
+        response = self._post("/api/campaigns", request)
+        kind = ScheduledResponse if response.status_code == httpx.codes.ACCEPTED else CampaignResponse
+        return kind.model_validate(json_of(response))
+
+    def campaigns(self) -> list[CampaignResponse]:
+        """Return every campaign, newest first."""
+        return self._connection.get_list("/api/campaigns", CampaignResponse)
+
+    def campaign(self, campaign: int) -> CampaignResponse:
+        """Return state, step, progress and temperatures of one campaign."""
+        return self._connection.get(f"/api/campaigns/{campaign}", CampaignResponse)
+
+    def watch(self, campaign: int, *, after: int = 0) -> Iterator[EventResponse | CampaignResponse]:
+        """Yield the events of a campaign whose id is above `after`, and its status when it changes, until it ends.
+
+        It also ends when the service stops; the state in the last status tells. A connection that breaks is opened
+        again after 1, 2, 4, 8 and 15 s and goes on behind the last event. Raises StoreError when the service stays
+        silent.
+        """
+        pauses = iter(RECONNECT_AFTER_S)
+        while True:
+            try:
+                for told in self._events(campaign, after):
+                    after = told.id if isinstance(told, EventResponse) else after
+                    pauses = iter(RECONNECT_AFTER_S)
+                    yield told
+                return
+            except httpx.HTTPError as error:
+                pause_s = next(pauses, None)
+                if pause_s is None:
+                    raise self._connection.silent(error) from error
+                self._clock.sleep(pause_s)
+
+    def pause(self, campaign: int, reason: str, *, by: str = "") -> CampaignResponse:
+        """Ask a running campaign to hold after the present data set."""
+        return self._act(campaign, "pause", ReasonRequest(reason=reason, by=by))
+
+    def resume(self, campaign: int, request: ResumeRequest | None = None) -> CampaignResponse:
+        """Continue a paused campaign, or resume one that was interrupted, failed or aborted."""
+        return self._act(campaign, "resume", request or ResumeRequest())
+
+    def abort(self, campaign: int, reason: str, *, by: str = "") -> CampaignResponse:
+        """End a running campaign now, in the safe state; what was measured is kept.
+
+        The answer comes within about a second; `wish` is `abort` until the campaign has ended.
+        """
+        return self._act(campaign, "abort", ReasonRequest(reason=reason, by=by))
+
+    def confirm(
+        self, campaign: int, prompt: str, *, by: str, confirmed: bool = True, reason: str = ""
+    ) -> CampaignResponse:
+        """Answer the question with the id `prompt`. `confirmed=False`: it cannot be done, and the campaign ends."""
+        return self._act(campaign, "confirm", ConfirmRequest(prompt=prompt, by=by, confirmed=confirmed, reason=reason))
+
+    def _act(self, campaign: int, act: str, request: Request) -> CampaignResponse:
+        return CampaignResponse.model_validate(json_of(self._post(f"/api/campaigns/{campaign}/{act}", request)))
+
+    def _post(self, path: str, request: Request) -> httpx.Response:
+        return self._connection.request("POST", path, json=request.model_dump(mode="json", exclude_unset=True))
+
+    def _events(self, campaign: int, after: int) -> Iterator[EventResponse | CampaignResponse]:
+        """Yield what one connection to the event stream tells."""
+        path = f"/api/campaigns/{campaign}/events"
+        headers = {"Last-Event-ID": str(after)} if after else {}
+        with connect_sse(self._connection.http, "GET", path, headers=headers, timeout=SILENT_S) as source:
+            if source.response.is_error:
+                source.response.read()
+                raise refusal(source.response)
+            yield from map(_told, source.iter_sse())
+
+
+def _told(event: ServerSentEvent) -> EventResponse | CampaignResponse:
+    kind = CampaignResponse if event.event == "progress" else EventResponse
+    return kind.model_validate_json(event.data)
+
+
+def _part(serial: str) -> str:
+    """Return a serial number as one part of a path."""
+    return quote(serial, safe="")

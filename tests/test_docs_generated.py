@@ -1,0 +1,53 @@
+"""The generated page of the command line is that of the program, and the site's contents are the index."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.paths import ROOT
+
+PAGE = ROOT / "docs" / "reference" / "command-line.md"
+WRITE = "typer labctl.cli.app utils docs --name labctl --output docs/reference/command-line.md"
+
+
+def test_the_reference_of_the_command_line_is_that_of_the_program() -> None:
+    command = [sys.executable, "-m", "typer", "labctl.cli.app", "utils", "docs", "--name", "labctl"]
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert told.strip() == PAGE.read_text(encoding="utf-8").strip(), f"write it again: python -m {WRITE}"
+
+
+def build(docs: Path, out: Path) -> str:
+    """Build a site as `make docs` does; returns its warnings, which end it with an error."""
+    options = ["--builder", "html", "--fail-on-warning", "--keep-going", "--quiet", "--no-color"]
+    command = [sys.executable, "-m", "sphinx", *options, str(docs), str(out)]
+    built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert bool(built.stderr) == bool(built.returncode)
+    return built.stderr
+
+
+@pytest.mark.timeout(300)
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    assert not build(ROOT / "docs", tmp_path)
+    contents = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert all(caption in contents for caption in ("Tutorials", "How-to", "Reference", "Explanation"))
+
+
+@pytest.mark.parametrize(
+    ("text", "warning"),
+    [
+        ("[no page](none.md)", "none.md"),
+        ("[no anchor](#none)", "none"),
+        ("![no picture](none.png)", "image file not readable: none.png"),
+    ],
+)
+def test_a_broken_link_anchor_or_picture_ends_the_build(text: str, warning: str, tmp_path: Path) -> None:
+    docs = tmp_path / "docs"
+    docs.mkdir()
+    shutil.copy(ROOT / "docs" / "conf.py", docs)
+    (docs / "index.md").write_text(f"# Page\n\n{text}\n", encoding="utf-8")
+    assert warning in build(docs, tmp_path / "site")

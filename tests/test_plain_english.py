@@ -1,0 +1,85 @@
+"""What a user or a maintainer reads is plain technical English: none of the banned words is in it.
+
+Banned are private metaphors, pronouns that stand for an unnamed person or process, and figures of speech of which a
+reader has to guess the meaning. Beside each is what to write.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from tests.helpers.written_text import Written, documentation, page_strings, python_strings
+
+BANNED = {
+    r"houses?": "name the package, the service or the laboratory",
+    r"rooms": "packages, layers",
+    r"crew": "operator, process",
+    r"shelf|shelves": "cache, catalogue",
+    r"(?:the|its) heart": "core, engine",
+    r"at the door": "where a request comes in",
+    r"in(?:to)? the shield": "name the limit or the check",
+    r"(?:the|a) wall(?:'s|’s)?": "real time, the system clock",
+    r"wall seconds?": "seconds of real time",
+    r"what there is": "catalogue, list",
+    r"the local one": "that of this computer",
+    r"nobody(?:'s)?|no-one": "say which user, process or answer is missing",
+    r"somebody(?:'s)?|someone(?:'s)?": "a person, another process",
+    r"anybody(?:'s)?|anyone(?:'s)?|everybody(?:'s)?|everyone(?:'s)?": "every user, every caller",
+    r"whoever|whomever": "the caller, the process that",
+    r"of one's own|one's own": "your own, its own",
+    r"onlookers?": "clients, viewers",
+    r"strangers?": "other users, other sites",
+    r"glance[sd]?(?: at)?": "read, poll",
+    r"the story": "name what is printed",
+    r"(?:came|come|comes) of it": "result, campaign that began",
+    r"let(?:s|ting)? go of": "release",
+    r"for ever": "without end, permanently",
+}
+WORDS = {phrase: re.compile(rf"\b(?:{phrase})\b", re.IGNORECASE) for phrase in BANNED}
+#: Data of the database and of requests that stay as they are.
+KEPT = {("labctl/api/middleware.py", "nobody")}
+
+
+def hits(texts: list[Written]) -> list[str]:
+    """Return where a banned word is, with what to write."""
+    return [
+        f"{where}: {found[0]!r}: write {BANNED[phrase]}"
+        for where, text in texts
+        for phrase, pattern in WORDS.items()
+        for found in pattern.finditer(text)
+        if (where.partition(":")[0], text) not in KEPT
+    ]
+
+
+@pytest.mark.parametrize("written", [documentation, python_strings, page_strings], ids=lambda each: each.__name__)
+def test_no_banned_word_is_read(written: Callable[[], Iterator[Written]]) -> None:
+    texts = list(written())
+    assert len(texts) > 100
+    found = hits(texts)
+    assert not found, "\n".join(["plain technical English, please:", *found])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "It leaves the house",
+        "X times as fast as the wall",
+        "Of TIME and LINE; default: the local one",
+        "Nobody has made the bench safe",
+        "Ask whoever is at the terminal.",
+        "the rooms people enter",
+    ],
+)
+def test_a_banned_word_is_found(text: str) -> None:
+    assert hits([("page.md:1", text)])
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["Close the chamber's door.", "room temperature", "make room on the disk", "/health/heartbeat", "a wallpaper"],
+)
+def test_a_plain_word_is_left_alone(text: str) -> None:
+    assert not hits([("page.md:1", text)])
