@@ -29,6 +29,7 @@ class Log:
     """The log of this process."""
 
     writer: LogWriter
+    level: int
     limit: RepetitionLimit  #: of what other libraries log
 
 
@@ -71,6 +72,11 @@ class _ForeignRecords(logging.Handler):
 _stack: list[Log] = []
 #: What is never left: a log that lasts as long as its process.
 _to_the_end = ExitStack()
+
+
+def present_level() -> int | None:
+    """Return the level of the log that runs in this process; None where none does."""
+    return _stack[-1].level if _stack else None
 
 
 def held_back() -> tuple[int, int]:
@@ -122,7 +128,7 @@ def _log_to(output: int | None, process: str, level: int, locations: Iterable[st
         for source, count in limit.take_counts().items():
             yield rendering(None, "warning", {"event": "log.held_back", "source": source, "records": count})
 
-    log = Log(LogWriter(output, notes=notes), limit)
+    log = Log(LogWriter(output, notes=notes), level, limit)
     before = structlog.get_config() if _stack else None
     structlog.configure(
         processors=[rendering],

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import uvicorn
-from starlette.types import Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from labctl.api.connection_limits import RESERVED, ConnectionLimits
 from labctl.api.connection_table import ConnectionTable
@@ -23,7 +23,7 @@ CHUNK = bytes(1 << 16)
 
 @dataclass
 class SmallApp:
-    """Answers `/` at once, `/body` after the body, `/endless` for ever."""
+    """Answers `/` at once, `/body` after the body, `/endless` for ever; fails at `/mistake`."""
 
     left: threading.Event = field(default_factory=threading.Event)  #: a client of `/endless` is gone
     streams: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))  #: one for each that began
@@ -34,6 +34,8 @@ class SmallApp:
         message: Message = {"more_body": scope["path"] == "/body"}
         while message.get("more_body"):
             message = await receive()
+        if scope["path"] == "/mistake":
+            raise RuntimeError("a mistake of the program")
         if scope["path"] == "/endless":
             await send({"type": "http.response.start", "status": 200, "headers": []})
             await self._stream(receive, send)
@@ -98,9 +100,16 @@ def rest_of(client: socket.socket) -> bytes:
 
 @contextmanager
 def bounded_server(
-    limits: ConnectionLimits, loop: str = "auto", *, log_level: str = "critical"
+    limits: ConnectionLimits,
+    loop: str = "auto",
+    *,
+    log_level: str = "critical",
+    within: Callable[[ASGIApp], ASGIApp] = lambda app: app,
 ) -> Iterator[BoundedServer]:
-    """Serve the small application while the block runs; what uvicorn logs goes where the test has it go."""
+    """Serve the small application while the block runs; what uvicorn logs goes where the test has it go.
+
+    `within` puts the application into another one.
+    """
     app, ready, protocol = SmallApp(), threading.Event(), bounded_http(limits)
 
     class Server(uvicorn.Server):
@@ -110,7 +119,7 @@ def bounded_server(
 
     with socket.create_server(("127.0.0.1", 0), backlog=limits.backlog) as listener:
         config = uvicorn.Config(
-            app, http=protocol, ws="none", lifespan="off", log_config=None, log_level=log_level,
+            within(app), http=protocol, ws="none", lifespan="off", log_config=None, log_level=log_level,
             proxy_headers=False, loop=loop, backlog=limits.backlog, timeout_keep_alive=limits.idle_s,
             timeout_graceful_shutdown=1,
         )  # fmt: skip

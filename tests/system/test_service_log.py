@@ -48,7 +48,10 @@ def end(service: ServiceProcess) -> int:
     return service.process.wait(timeout=WAIT_S)
 
 
-def test_a_campaign_is_followed_through_all_processes_and_no_key_is_in_it(tmp_path: Path) -> None:
+def test_a_campaign_is_followed_through_all_processes_and_no_key_is_in_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LABCTL_LOG_LEVEL", "debug")  # all that there is
     database, log = tmp_path / "lab.sqlite", tmp_path / "log"
     with open_store(str(database), write=True) as store:
         keys = {role: create_key(store, KeyRequest(name=role.value, role=role), AT).key for role in Role}

@@ -72,7 +72,7 @@ class InWorkers(Pool):
     def _result_of(self, job: Job) -> object:
         if job.writes and not self._address.can_write:
             return result_here(job, self._store)
-        task = Task(job.call, self._address, job.actor, self.limits)
+        task = Task(job.call, self._address, job.actor, self.limits, request_id=job.request_id)
         receiving, sending = self._context.Pipe(duplex=False)
         worker = self._context.Process(target=carry_out, args=(sending, task), name="labctl worker", daemon=True)
         with receiving:

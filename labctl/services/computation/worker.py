@@ -8,8 +8,8 @@ import resource
 import signal
 import threading
 import traceback
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
@@ -17,6 +17,8 @@ from pathlib import Path
 
 from labctl.acting_user import Actor, acting
 from labctl.errors import ComputationEnded
+from labctl.log.context import for_request
+from labctl.log.setup import present_level, running_log
 from labctl.progress import reporting_to
 from labctl.services.computation.job import Call
 from labctl.services.computation.limits import Limits
@@ -36,6 +38,8 @@ class Task:
     actor: Actor
     limits: Limits
     environment: Mapping[str, str] = field(default_factory=lambda: dict(os.environ))
+    request_id: str = ""
+    log_level: int | None = field(default_factory=present_level)  #: None: the service has no log
 
 
 @dataclass(frozen=True)
@@ -69,10 +73,21 @@ def carry_out(connection: Connection, task: Task) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_the_service, daemon=True).start()
     os.nice(task.limits.niceness)
-    _bound_memory(task.limits.memory_mib)
-    outcome = _outcome(connection, task)
+    with _log_of(task):  # which is written when this ends: who has got the outcome kills the worker
+        _bound_memory(task.limits.memory_mib)
+        outcome = _outcome(connection, task)
     with suppress(BrokenPipeError):
         connection.send(outcome)
+
+
+@contextmanager
+def _log_of(task: Task) -> Iterator[None]:
+    """Log what the libraries say, and what nobody catches; the service itself logs start and end of a worker."""
+    if task.log_level is None:
+        yield
+        return
+    with running_log("worker", task.log_level), for_request(task.request_id):
+        yield
 
 
 def _end_with_the_service() -> None:

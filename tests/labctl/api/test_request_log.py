@@ -7,15 +7,13 @@ from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
+from starlette.types import ASGIApp
 
-from labctl.api import create_app
 from labctl.api.connection_limits import ConnectionLimits
-from labctl.api.request_log import MOST_REFUSED
+from labctl.api.request_log import MOST_REFUSED, RequestFigures, RequestLogMiddleware
 from labctl.log.repetition import MOST_FOREIGN
-from labctl.services.lab_service import LabService
-from tests.helpers.bounded_server import bounded_server, rest_of
+from tests.helpers.bounded_server import bounded_server, request, rest_of
 from tests.helpers.log_records import logged
-from tests.helpers.service import service_of
 
 
 def test_an_act_is_one_record_with_the_number_of_its_request(client: TestClient, tmp_path: Path) -> None:
@@ -56,21 +54,26 @@ def test_refused_requests_are_bounded_and_counted(client: TestClient, tmp_path: 
     assert f"labctl_log_records_held_back_total {500 - MOST_REFUSED}.0" in client.get("/metrics").text
 
 
-def test_an_error_of_the_program_is_logged_with_its_traceback_and_the_request(
-    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_an_error_of_the_program_is_logged_with_its_traceback_and_the_number_of_the_request(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(_: LabService) -> None:
-        raise RuntimeError("a mistake")
+    monkeypatch.setattr(logging.getLogger("uvicorn"), "propagate", True)  # a server of another test may have ended it
 
-    monkeypatch.setattr(LabService, "pulse", fail)
-    quiet = TestClient(create_app(service_of(client)), raise_server_exceptions=False)
-    with logged(tmp_path) as records:
-        answer = quiet.get("/health", headers={"X-Request-ID": "r-9"})
-    assert answer.status_code == 500
-    (ended,) = records.named("request.ended")
-    assert (ended["level"], ended["status"], ended["error"], ended["request_id"]) == (
-        "error", 500, "RuntimeError", "r-9",
+    def numbered(app: ASGIApp) -> ASGIApp:
+        return RequestLogMiddleware(app, RequestFigures())
+
+    with (
+        logged(tmp_path) as records,
+        bounded_server(ConnectionLimits(), log_level="warning", within=numbered) as server,
+        server.connect(request("/mistake", "X-Request-ID: r-9", "Connection: close")) as client,
+    ):
+        assert b" 500 " in rest_of(client)
+    ended, traceback = records.all()
+    assert (ended["event"], ended["level"], ended["status"], ended["error"]) == (
+        "request.ended", "error", 500, "RuntimeError",
     )  # fmt: skip
+    assert "a mistake of the program" in traceback["exception"]
+    assert {ended["request_id"], traceback["request_id"]} == {"r-9"}
 
 
 def test_a_flood_of_requests_that_cannot_be_read_is_a_few_records(

@@ -153,7 +153,7 @@ def test_what_is_begun_again_says_so(tmp_path: Path) -> None:
 
 
 def test_a_day_of_a_bench_is_less_than_ten_megabytes(tmp_path: Path) -> None:
-    """A tri-axial campaign of two nights, in virtual time; its log is scaled to 24 h."""
+    """A campaign of eight hours in virtual time; its log is scaled to 24 h."""
     with logged(tmp_path) as records:
         answer = run_here(str(tmp_path / "lab.sqlite"), StartRequest(recipe="ojeda2000-121"))
     assert (answer.state, answer.t_s) == ("done", pytest.approx(8 * 3600.0, rel=0.1))
