@@ -15,7 +15,7 @@ from labctl.fitting.data.temperature_history import TemperatureHistory
 from labctl.fitting.effects import CATALOGUE, Effect, Formula, Reference, Term, checked_formulas, formulas
 from labctl.fitting.models.error_model import is_exported
 from labctl.json_types.effects import CataloguedEffect
-from labctl.services.schemas.effects import CatalogueResponse
+from labctl.services.schemas.calibrations import CatalogueResponse
 
 #: Sizes that are not told as a coefficient: how far the thermometer is off.
 OTHER_UNITS = {"thermometer_error": "K"}

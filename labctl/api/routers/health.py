@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import PlainTextResponse
 
 from labctl.api.dependencies import ServiceDep
-from labctl.services.schemas.health import HealthResponse, HeartbeatResponse, PulseResponse
+from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
 
 router = APIRouter(tags=["service"])
 
