@@ -84,9 +84,9 @@ def _number(value: float | None) -> str:
 
 def _errors(error: CriticisedErrors) -> str:
     figures = (
-        ("left after the fit", error["rms_dps"]),
-        ("at temperatures that the fit has not seen", error["heldout_rms_dps"]),
-        ("noise floor", error["noise_floor_dps"]),
+        ("left after the fit", error.get("rms_dps")),
+        ("at temperatures that the fit has not seen", error.get("heldout_rms_dps")),
+        ("noise floor", error.get("noise_floor_dps")),
     )
     return _table(("RMS error", "deg/s"), [(word, _number(figure)) for word, figure in figures])
 

@@ -11,7 +11,7 @@ from labctl.fitting.effects import CATALOGUE, Effect, Formula, Term, checked_for
 from labctl.fitting.effects.trial import first_column
 from labctl.fitting.models.error_model import is_exported
 from labctl.json_types.effects import CataloguedEffect
-from labctl.services.schemas.effects import CatalogueResponse
+from labctl.services.schemas.calibrations import CatalogueResponse
 
 #: Sizes that are not told as a coefficient: how far the thermometer is off.
 OTHER_UNITS = {"thermometer_error": "K"}

@@ -28,7 +28,7 @@ from labctl.services.schemas.campaigns import (
     CampaignResponse,
     EventResponse,
 )
-from labctl.services.schemas.health import HealthResponse, HeartbeatResponse, PulseResponse
+from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
 from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED
 from procedures.execution.signals import shutdown_hook

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from labctl.services.effects import catalogue
-from labctl.services.schemas.effects import CatalogueResponse
+from labctl.services.schemas.calibrations import CatalogueResponse
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
 

@@ -9,7 +9,7 @@ from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 from labctl.api.access_policy import DECLARES_KEY
 from labctl.api.dependencies import ServiceDep
 from labctl.api.metrics import text_of
-from labctl.services.schemas.health import HealthResponse, HeartbeatResponse, PulseResponse
+from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
 
 router = APIRouter(tags=["service"])
 

@@ -39,7 +39,7 @@ def serve(
     """Serve calibrations over HTTP and run campaigns on the bench. Stops with Ctrl-C, bench left safe."""
     from labctl.processes.settings import ServeRequest
     from labctl.processes.supervisor import Ready, serve_forever
-    from labctl.services.schemas.processes import ServiceReady
+    from labctl.services.schemas.service import ServiceReady
 
     request = ServeRequest(
         bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
@@ -93,7 +93,7 @@ def simulator(
 ) -> None:
     """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until Ctrl-C."""
     from labctl.services.benches.check import serve_simulator
-    from labctl.services.schemas.processes import SimulatorReady
+    from labctl.services.schemas.service import SimulatorReady
 
     def ready(addresses: dict[str, str]) -> None:
         if as_json:

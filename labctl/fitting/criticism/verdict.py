@@ -293,9 +293,8 @@ def coefficients_of(comparison: Comparison, candidate: Candidate) -> dict[str, d
         option = comparison.designs[axis].options[index]
         values, covariance = solve_option(comparison.axes[axis].best, comparison.axes[axis].slices[index])
         u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        plain: dict[str, Coefficient] = {
+        found[axis] = with_derived({
             name: {"value": float(value), "u": float(error), "unit": unit}
             for name, unit, value, error in zip(option.names, option.units, values, u, strict=True)
-        }
-        found[axis] = with_derived(plain)
+        })  # fmt: skip
     return found

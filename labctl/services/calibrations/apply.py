@@ -14,7 +14,7 @@ from labctl.errors import BadInput
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.data_files import read_table
 from labctl.recording.recording import Column
-from labctl.services.schemas.compensation import CompensationResponse
+from labctl.services.schemas.calibrations import CompensationResponse
 
 
 def compensate_file(calibration: Path, source: Path, target: Path, outside: str) -> CompensationResponse:

@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from labctl.json_types.effects import CataloguedEffect, PresetJson
 from labctl.json_types.models import (
     AxisCoefficients,
     AxisNoiseJson,
@@ -217,3 +218,18 @@ class SurfaceResponse(ResponseModel):
     held: dict[str, float] = Field(description="Channels that the model needs besides: their means in its recording.")
     left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
     axes: dict[str, Surface]
+
+
+class CatalogueResponse(ResponseModel):
+    """Every effect that a model can be made of, and every model that a fit can be asked for by name."""
+
+    effects: list[CataloguedEffect]
+    models: list[PresetJson]
+
+
+class CompensationResponse(ResponseModel):
+    """How many rows were corrected, how many of them lay outside the calibration, and where they are."""
+
+    rows: int
+    outside: int = Field(description="Rows outside the calibrated rates or temperatures.")
+    file: str

@@ -1,4 +1,4 @@
-"""Whether the service is well."""
+"""The service: whether it is well, and what its processes say once they are ready."""
 
 from __future__ import annotations
 
@@ -34,3 +34,20 @@ class HeartbeatResponse(ResponseModel):
     status: Literal["ok"] = "ok"
     version: str
     heard_s: float = Field(description="How long ago the process that drives the bench was last heard of, s.")
+
+
+class ServiceReady(ResponseModel):
+    """A service that listens."""
+
+    url: str
+    bench_pid: int
+    web_pid: int
+    unconfirmed: str = Field(description="What is wrong with its bench; empty when all is well.")
+    cut_short: str = Field(description="Which campaign was left there; empty when none was.")
+
+
+class SimulatorReady(ResponseModel):
+    """Simulated instruments that answer."""
+
+    addresses: dict[str, str] = Field(description="Instrument -> port or address.")
+    bench_file: str | None
