@@ -9,11 +9,15 @@ import signal
 import threading
 from multiprocessing.connection import Connection
 
+from instruments.clock import WallClock
 from labctl.processes.calls import Call, Caller
 from labctl.processes.children import Child
-from labctl.processes.elapsed import Elapsed
-from labctl.processes.settings import CALLS, BenchSettings
+from labctl.processes.liveness import Elapsed
+from labctl.processes.settings import CALLS, BenchSettings, ServeRequest
 from labctl.services.benches.bench_left import BenchLeft
+from labctl.services.benches.lease import driver_of, this_machine
+from labctl.services.planning.loading import load_bench
+from labctl.store import Holder, holder_of, is_url, open_store
 
 ANSWER_S = 10.0
 
@@ -83,3 +87,19 @@ class BenchLine:
         os.close(self._handle)
         if self._child is not None:
             self._child.kill()
+
+
+def bench_process_of(request: ServeRequest) -> Holder | None:
+    """Return who holds the database; of one that several processes hold: who drives the bench from this machine.
+
+    Raises BadBench, StoreError.
+    """
+    if not is_url(request.location):
+        return holder_of(request.location)
+    if request.bench_name is None:
+        return None
+    with open_store(request.location, write=False) as store:
+        driver = driver_of(store, load_bench(request.bench_name).name, WallClock().utc())
+    if driver is None or driver.machine != this_machine():
+        return None
+    return Holder(driver.pid, driver.url, calls=driver.calls)

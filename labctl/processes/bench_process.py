@@ -19,7 +19,7 @@ from labctl.log import get_logger
 from labctl.processes.bench_calls import BenchCalls
 from labctl.processes.calls import CallServer
 from labctl.processes.children import begin_child_log, line_to_parent, tell
-from labctl.processes.engine_watch import EngineWatch
+from labctl.processes.liveness import EngineWatch
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.processes.waker import Waker

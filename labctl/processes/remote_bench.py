@@ -13,7 +13,7 @@ from labctl.errors import BenchSilent
 from labctl.log import get_logger
 from labctl.processes.bench_calls import Beat
 from labctl.processes.calls import Call, Caller
-from labctl.processes.elapsed import Elapsed
+from labctl.processes.liveness import Elapsed
 from labctl.processes.settings import CALLS, STOP
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.campaigns.listeners import ChangeListeners

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 
 from labctl.errors import Conflict, StoreError
-from labctl.processes.elapsed import Elapsed
+from labctl.processes.liveness import Elapsed
 from labctl.processes.settings import BenchSettings
 from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft

@@ -20,11 +20,10 @@ from pathlib import Path
 from labctl.errors import BenchInDoubt, BenchSilent, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
-from labctl.processes.bench_holder import bench_process_of
-from labctl.processes.bench_line import BenchLine
+from labctl.processes.bench_line import BenchLine, bench_process_of
 from labctl.processes.children import Child
-from labctl.processes.elapsed import Elapsed
 from labctl.processes.listening import Listening, listening
+from labctl.processes.liveness import Elapsed
 from labctl.processes.settings import BenchSettings, ServeRequest, WebSettings
 from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft

@@ -10,7 +10,7 @@ import pytest
 
 from instruments.clock import VirtualClock
 from labctl.processes import supervision
-from labctl.processes.engine_watch import ENGINE_SILENT_S, EngineWatch
+from labctl.processes.liveness import ENGINE_SILENT_S, EngineWatch
 from labctl.processes.settings import BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.processes.waker import Waker

@@ -1,19 +1,38 @@
-"""Whether the engine still moves: a driver call that never returns leaves its process alive and its table turning."""
+"""How long ago something was heard of, and whether the engine still moves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from instruments.clock import Clock
-from labctl.processes.elapsed import Elapsed
+from instruments.clock import Clock, SystemClock
 
 #: An engine asks for requests once a second, except in its safe state (at most 120 s) and while it waits for its
 #: database (at most 45 s). One that asked for none in so long hangs, s.
 ENGINE_SILENT_S = 180.0
 
 
+class Elapsed:
+    """Seconds since it was made or last restarted; any thread may do either."""
+
+    def __init__(self, clock: Clock | None = None) -> None:
+        self._clock = clock or SystemClock()
+        self._since_s = self._clock.now_s()
+
+    def restart(self) -> None:
+        """Count from now on."""
+        self._since_s = self._clock.now_s()
+
+    @property
+    def s(self) -> float:
+        """The seconds."""
+        return self._clock.now_s() - self._since_s
+
+
 class EngineWatch:
-    """Follows how often the engine has asked: `polls` returns campaign and count, None while none runs."""
+    """Follows how often the engine has asked: `polls` returns campaign and count, None while none runs.
+
+    A driver call that never returns leaves its process alive and its table turning.
+    """
 
     def __init__(self, polls: Callable[[], tuple[int, int] | None], clock: Clock | None = None) -> None:
         self._polls = polls
