@@ -99,3 +99,12 @@ def test_a_free_value_is_seen(schema: dict[str, Any]) -> None:
 @pytest.mark.parametrize("schema", [{"type": "string"}, {"type": "object", "additionalProperties": {"type": "number"}}])
 def test_a_declared_value_is_not(schema: dict[str, Any]) -> None:
     assert not list(free_places(schema, {}, "Answer", set()))
+
+
+def test_keys_that_are_always_there_are_required_and_those_that_may_be_absent_are_not(document: dict[str, Any]) -> None:
+    schemas = document["components"]["schemas"]
+    for name in ("CampaignResponse", "CriticismResponse", "ImproveResponse", "BenchResponse"):
+        assert set(schemas[name]["required"]) == set(schemas[name]["properties"]), name
+    assert set(schemas["ChannelLine"]["properties"]) - set(schemas["ChannelLine"]["required"]) == {"position"}
+    assert "required" not in schemas["Views"]
+    assert "required" not in schemas["PlanRequest"] or "clip" not in schemas["PlanRequest"]["required"]

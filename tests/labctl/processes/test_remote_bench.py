@@ -112,6 +112,6 @@ def test_a_bench_process_that_was_never_heard_is_silent_and_unconfirmed(tmp_path
     assert (access.running, access.status(1), access.runs(1)) == (None, None, False)
     described = access.describe()
     assert described is not None
-    assert described["name"] == BENCH.name
+    assert described.name == BENCH.name
     with pytest.raises(BenchSilent):
         RemoteWriter(tmp_path).run("Audit.record", (), {})
