@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import metadata
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 #: Entry-point groups of labctl begin with this.
 PREFIX = "labctl."
@@ -57,7 +57,7 @@ class Plugin:
     def __str__(self) -> str:
         return f"entry point {self.name!r} ({self.target}) of {self.release} in group {self.group}"
 
-    def load(self) -> Any:
+    def load(self) -> object:
         """Import it and return the object; raises whatever the import raises."""
         return metadata.EntryPoint(self.name, self.target, self.group).load()
 
@@ -104,7 +104,7 @@ class PluginGroup(Generic[PluginT]):
     raises TypeError or ValueError saying what it has to be. `advice` ends the message about an unknown name.
     """
 
-    def __init__(self, group: str, noun: str, check: Callable[[Any], PluginT], advice: str = "") -> None:
+    def __init__(self, group: str, noun: str, check: Callable[[object], PluginT], advice: str = "") -> None:
         self.group, self.noun = group, noun
         self._check = check
         self._advice = advice or f"install the package that has it in its group {group}, or correct the name"
@@ -127,7 +127,7 @@ class PluginGroup(Generic[PluginT]):
     def plugin(self, name: str) -> Plugin:
         """Return the entry point of a name; nothing is imported. Raises UnknownPlugin, PluginError for a doubled name.
 
-        A name of labctl's own stays labctl's own, whoever else has it.
+        A name of labctl's own stays labctl's own, also where another distribution has it.
         """
         found = self._by_name.get(name)
         if not found:
@@ -229,10 +229,10 @@ class PluginGroup(Generic[PluginT]):
             return PluginError(failure(plugin, f"load this {self.noun}", error))
 
 
-def instance_of(kind: type[PluginT]) -> Callable[[Any], PluginT]:
+def instance_of(kind: type[PluginT]) -> Callable[[object], PluginT]:
     """Return a check that an object is an instance of a class."""
 
-    def check(found: Any) -> PluginT:
+    def check(found: object) -> PluginT:
         if not isinstance(found, kind):
             raise TypeError(f"{found!r} is not a {kind.__module__}.{kind.__qualname__}"[:LONGEST_ERROR])
         return found

@@ -1,7 +1,7 @@
 """A number for every request, in its answer and in every record that it leads to; and one record of its end.
 
-What acts is logged at INFO, what only reads at DEBUG: every open page asks once a second. What anybody can send as
-often as he likes is bounded in number, and what is held back is counted.
+What acts is logged at INFO, what only reads at DEBUG: every open page asks once a second. What any client can send
+without limit is bounded in number, and what is held back is counted.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A bound on records that anybody can cause as often as he likes: some are let through, the others are counted."""
+"""A bound on records that any client can cause without limit: some are let through, the others are counted."""
 
 from __future__ import annotations
 

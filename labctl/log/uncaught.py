@@ -1,4 +1,4 @@
-"""Errors that nobody caught, of the process and of its threads, become records."""
+"""Uncaught errors of the process and of its threads become records."""
 
 from __future__ import annotations
 

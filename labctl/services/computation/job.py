@@ -34,7 +34,7 @@ class Client(Protocol):
 
     @property
     def progress(self) -> Progress:
-        """What is told of a stage; raises Cancelled where nobody wants to hear it any more."""
+        """What is told of a stage; raises Cancelled once no caller waits for the result."""
         ...
 
 

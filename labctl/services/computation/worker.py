@@ -82,7 +82,7 @@ def carry_out(connection: Connection, task: Task) -> None:
 
 @contextmanager
 def _log_of(task: Task) -> Iterator[None]:
-    """Log what the libraries say, and what nobody catches; the service itself logs start and end of a worker."""
+    """Log what the libraries say, and uncaught errors; the service itself logs start and end of a worker."""
     if task.log_level is None:
         yield
         return
