@@ -1,4 +1,4 @@
-"""An importer, as an entry point of the group `labctl.importers` gives it: a file of another format becomes a recording."""
+"""An importer, as an entry point of `labctl.importers` gives it: a file of another format becomes a recording."""
 
 from __future__ import annotations
 
