@@ -25,6 +25,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc"]
 exclude_patterns = ["_build"]
 myst_heading_anchors = 4
 autodoc_typehints = "signature"
+default_role = "code"  # docstrings write code in single backticks
 autodoc_member_order = "bysource"
 
 html_theme = "furo"
@@ -45,7 +46,9 @@ def add_contents(_: Sphinx, page: str, text: list[str]) -> None:
     if page != "index":
         return
     for section in re.split(r"^## ", text[0], flags=re.MULTILINE)[1:]:
-        caption, pages = section.partition("\n")[0], re.findall(r"^- \[.*?\]\((.*?)\.md\)", section, re.MULTILINE)
+        caption = section.partition("\n")[0]
+        links = re.findall(r"^- \[(.*?)\]\((.*?)\.md\)", section, re.MULTILINE)
+        pages = [f"{title} <{name}>" for title, name in links]
         text[0] += "\n".join(["", "```{toctree}", ":hidden:", f":caption: {caption}", "", *pages, "```", ""])
 
 

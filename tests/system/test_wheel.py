@@ -11,6 +11,7 @@ import tarfile
 import venv
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import pytest
 
@@ -85,3 +86,8 @@ def test_an_installed_labctl_creates_a_database_by_its_own_migrations(
         assert list(raw.execute("SELECT version_num FROM alembic_version")) == [(migrate.HEAD,)]
     raw.close()
     assert made >= set(tables.metadata.tables)
+
+
+def test_a_wheel_tells_type_checkers_that_it_has_types(built: dict[str, Path]) -> None:
+    with ZipFile(built["wheel"]) as wheel:
+        assert {f"{package}/py.typed" for package in ("instruments", "procedures", "labctl")} <= set(wheel.namelist())
