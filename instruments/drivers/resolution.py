@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, LiteralString
 
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
@@ -83,5 +83,5 @@ def _settings_of(driver: Driver) -> str:
     return ", ".join(driver.settings.model_fields)
 
 
-def _detail(kind: str, text: str, place: Place, given: Any) -> InitErrorDetails:
+def _detail(kind: LiteralString, text: str, place: Place, given: Any) -> InitErrorDetails:
     return {"type": PydanticCustomError(kind, "{text}", {"text": text}), "loc": place, "input": given}

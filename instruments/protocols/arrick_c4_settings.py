@@ -18,7 +18,8 @@ class StepperSettings(TableSettings):
 class ArrickC4Settings(StepperSettings):
     """Serial port and command templates of a C4."""
 
-    port: str
+    #: Required here; a frozen model is never assigned to, so a narrower type is sound.
+    port: str  # pyright: ignore[reportGeneralTypeIssues, reportIncompatibleVariableOverride]
     baudrate: int = 9600
     direction: Literal[1, -1] = 1  #: 1: `f` turns the table counter-clockwise seen from above
     clock_u_ppm: float = Field(default=50.0, ge=0)  #: standard uncertainty of the step clock

@@ -6,7 +6,7 @@ They are the entry points of the group `labctl.simulators`: sim://KIND, or sim:/
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import cast
 
 from instruments.plugins import PluginGroup
 from instruments.simulators.links.device import SimulatedDevice
@@ -15,11 +15,10 @@ from instruments.simulators.setup import InstrumentSetup
 MakeDevice = Callable[[InstrumentSetup], SimulatedDevice]
 
 
-def _checked(found: Any) -> MakeDevice:
+def _checked(found: object) -> MakeDevice:
     if not callable(found):
         raise TypeError(f"{found!r} is nothing that makes a simulated instrument of an InstrumentSetup")
-    make: MakeDevice = found
-    return make
+    return cast(MakeDevice, found)
 
 
 SIMULATORS: PluginGroup[MakeDevice] = PluginGroup("labctl.simulators", "simulated instrument", _checked)

@@ -33,7 +33,7 @@ class Child:
     """A process that this one has started. It loads its modules, then waits for its settings."""
 
     def __init__(self, module: str, pass_fds: Sequence[int] = ()) -> None:
-        """Start `python -m module` in a process group of its own: a Ctrl-C in the terminal is not for it."""
+        """Start `python -m module` in a session of its own: what happens to the terminal is not for it."""
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(  # noqa: S603  this very program
@@ -41,7 +41,7 @@ class Child:
                 pass_fds=[theirs.fileno(), *pass_fds],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # the supervisor's carries one document
-                process_group=0,
+                start_new_session=True,
             )
         self.line: Line = Connection(ours.detach())
         self.name = module.rpartition(".")[2].replace("_", " ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -44,6 +45,11 @@ def test_commands_ask_the_service_that_holds_the_database(service: ServiceProces
     assert again.status_code == 304
     service.run("revoke", "OSU-FOG-2024", "1", "--by", "A. Person", "--reason", "thought again")
     assert service.http.get("/api/units/OSU-FOG-2024/calibration").status_code == 404
+
+
+def test_what_happens_to_the_terminal_of_a_service_is_not_for_its_processes(service: ServiceProcess) -> None:
+    for pid in (service.bench_pid, service.web_pid):
+        assert os.getsid(pid) == pid
 
 
 def test_a_second_service_is_refused_and_told_where_the_first_is(service: ServiceProcess) -> None:

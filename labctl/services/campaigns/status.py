@@ -7,14 +7,24 @@ from dataclasses import asdict
 from datetime import timedelta
 from typing import Literal
 
+from pydantic import TypeAdapter
+
 from instruments.bench_config import BenchFile
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.campaigns.advice import advice_of
-from labctl.services.schemas.campaigns import CampaignResponse, EventResponse, OutputResponse, PromptResponse
+from labctl.services.schemas.campaigns import (
+    CampaignResponse,
+    DriverResponse,
+    EventResponse,
+    OutputResponse,
+    PromptResponse,
+)
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
 from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.control import ControlRequest
 from procedures.monitoring.progress import Progress
+
+_DRIVERS = TypeAdapter(dict[str, DriverResponse])
 
 
 def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | None = None) -> CampaignResponse:
@@ -45,10 +55,15 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
-        drivers=row.bench.get("drivers", {}),
+        drivers=_drivers(row),
         simulated_time=has_simulated_time(row.bench),
         advice=advice_of(state, progress.reason),
     )
+
+
+def _drivers(row: CampaignRow) -> dict[str, DriverResponse]:
+    """Return which release drove each instrument; empty for a campaign of before they were kept."""
+    return _DRIVERS.validate_python(row.bench.get("drivers", {}))
 
 
 def _open_request(request: ControlRequest, state: CampaignState) -> Literal["pause", "abort"] | None:
@@ -92,7 +107,7 @@ def _from_summary(row: CampaignRow, seen: CampaignSummary) -> CampaignResponse:
         started_at=row.started_at,
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
-        drivers=row.bench.get("drivers", {}),
+        drivers=_drivers(row),
         simulated_time=has_simulated_time(row.bench),
         advice=advice_of(row.state, row.reason),
     )
