@@ -23,6 +23,7 @@ LabctlError              exit 2, HTTP 400
 ├── TooBusy              as much is computed, and waits, as there is place for; says when to ask again   HTTP 429
 ├── ComputationEnded     a worker process ended before its result: memory, time, a crash     HTTP 503
 └── StoreError           the database cannot be used: newer, damaged, locked         HTTP 503
+    ├── DatabaseUnreachable     its server does not answer: it is restarted, or the network is cut     HTTP 503
     └── DiskFull         nothing of the act was kept                                 HTTP 507
 """
 
@@ -186,6 +187,12 @@ class StoreError(LabctlError):
     def __init__(self, text: str, *, cause: str = "") -> None:
         super().__init__(text)
         self.cause = cause or text
+
+
+class DatabaseUnreachable(StoreError):
+    """The server of the database does not answer; nothing of the act was kept, and it can be tried again."""
+
+    slug = "database-unreachable"
 
 
 class DiskFull(StoreError):

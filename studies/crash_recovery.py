@@ -20,6 +20,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import Store
 from studies.crashable_process import Killed, Life, MortalDatabase, World, all_readings, complete_data_sets
+from studies.databases import new_database
 
 KILLS = int(os.environ.get("LABCTL_STUDY_KILLS", "240"))
 SEED = 20
@@ -118,7 +119,7 @@ def first_process(world: World, location: str, life: Life) -> tuple[MortalDataba
 def undisturbed(folder: Path) -> tuple[int, Fitted]:
     """Return how many instants the campaign has, and what is fitted to it."""
     life = Life()
-    database, campaign = first_process(World(bench()), str(folder / "lab.sqlite"), life)
+    database, campaign = first_process(World(bench()), new_database(folder), life)
     assert campaign is not None
     store = Store(database)
     found = fitted(store, campaign)
@@ -145,7 +146,7 @@ def judge(kill: Kill, expected: Fitted, folder: Path) -> Verdict:
     """Kill one campaign, let the next process take it up, and hold the result against what is promised."""
     world, rng = World(bench()), np.random.default_rng(kill.seed)
     life = Life(kill.at)
-    database, campaign = first_process(world, str(folder / "first" / "lab.sqlite"), life)
+    database, campaign = first_process(world, new_database(folder / "first"), life)
     world.pass_gap(kill.gap_s, power_cut=kill.power_cut)
     location = database.abandoned_campaigns(folder / "next", power_cut=kill.power_cut, rng=rng)
     database.close()

@@ -19,8 +19,10 @@ from instruments.clock import VirtualClock
 from instruments.simulation import Simulation, open_simulation
 from instruments.simulators.links.device import SimulatedDevice
 from labctl.store.connection.database import Database
+from labctl.store.connection.location import is_url
 from labctl.store.repositories.sample_blocks import blocks_of
 from labctl.store.schema import tables
+from studies import databases
 
 
 class Killed(BaseException):
@@ -92,6 +94,8 @@ class MortalDatabase(Database):
         super().__init__(location, write=True)
         self.life = life
         self.synced_bytes = 0
+        if is_url(location):
+            return
         with self._engine.connect() as connection:  # the log only grows, so that its length says what is on the disk
             connection.exec_driver_sql("PRAGMA wal_autocheckpoint=0")
 
@@ -116,6 +120,11 @@ class MortalDatabase(Database):
 
         Between the last sync and the end of the log a power cut may leave any byte as the last one.
         """
+        if is_url(self.location):
+            self._engine.dispose()
+            if power_cut:
+                databases.server().crash()
+            return self.location
         folder.mkdir(parents=True)
         copy = folder / "lab.sqlite"
         shutil.copy(self.location, copy)

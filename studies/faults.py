@@ -23,6 +23,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.store import Store, StoreJournal
 from labctl.store.connection.database import Database
 from studies.crashable_process import all_readings
+from studies.databases import new_database
 
 CAMPAIGNS = int(os.environ.get("LABCTL_STUDY_FAULTS", "500"))
 RECIPE = """
@@ -160,7 +161,7 @@ def one(seed: int) -> End:
 def _campaign(seed: int, bench: BenchFile, armed: tuple[Armed, ...], folder: Path) -> End:
     clock = LimitedClock()
     simulation: Simulation = open_simulation(bench, clock)
-    database = Database(str(folder / "lab.sqlite"), write=True)
+    database = Database(new_database(folder), write=True)
     store = Store(database)
     hung = False
     opened = open_bench(bench, clock, simulation)

@@ -20,6 +20,7 @@ import tomli_w
 from instruments.bench_config import read_bench
 from labctl.store.connection.database import Database
 from studies.crashable_process import all_readings, complete_data_sets
+from studies.databases import close_server, new_database
 
 KILLS = int(os.environ.get("LABCTL_STUDY_REAL_KILLS", "30"))
 SPEED = 5.0
@@ -83,9 +84,9 @@ def simulators(folder: Path) -> Iterator[Path]:
             process.terminate()
 
 
-def labctl(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+def labctl(database: str, *arguments: str) -> subprocess.Popen[str]:
     """Start a command on the study's database."""
-    command = [sys.executable, "-m", "labctl", *arguments, "--json", "--database", str(folder / "lab.sqlite")]
+    command = [sys.executable, "-m", "labctl", *arguments, "--json", "--database", database]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -93,22 +94,23 @@ def kill_once(folder: Path, bench: Path, after_s: float) -> Heir:
     """Kill a campaign after so many seconds, let the next process take it up, and look at what is there then."""
     recipe = folder / "killed.toml"
     recipe.write_text(RECIPE)
+    location = new_database(folder)
     start = ("start", str(recipe), "--clear-confirmed-by", "the study")  # what is far is not known to be simulated
-    with labctl(folder, "campaign", *start, "--bench", str(bench)) as first:
+    with labctl(location, "campaign", *start, "--bench", str(bench)) as first:
         with suppress(subprocess.TimeoutExpired):
             first.wait(after_s)
         first.send_signal(signal.SIGKILL)
         first.communicate()
-    database = Database(str(folder / "lab.sqlite"), write=False)
+    database = Database(location, write=False)
     before = all_readings(database)
     database.close()
-    answer = _status(folder)
+    answer = _status(location)
     if answer is None or answer["state"] != "done":
         verb = ("resume",) if answer is not None else start
-        with labctl(folder, "campaign", *verb, "--bench", str(bench)) as heir:
+        with labctl(location, "campaign", *verb, "--bench", str(bench)) as heir:
             said, complaint = heir.communicate(timeout=300)
         answer = json.loads(said) if said else {"state": "none", "reason": complaint}
-    database = Database(str(folder / "lab.sqlite"), write=False)
+    database = Database(location, write=False)
     counts = complete_data_sets(database)
     wrong = sum(counts[number] != 1 for number in range(1, DATA_SETS + 1))
     missing = len(before - all_readings(database))
@@ -116,8 +118,8 @@ def kill_once(folder: Path, bench: Path, after_s: float) -> Heir:
     return Heir(after_s, answer["state"], answer["reason"], missing, wrong, "NOT confirmed" not in answer["reason"])
 
 
-def _status(folder: Path) -> dict[str, Any] | None:
-    with labctl(folder, "campaign", "status") as asked:
+def _status(database: str) -> dict[str, Any] | None:
+    with labctl(database, "campaign", "status") as asked:
         said, _ = asked.communicate(timeout=60)
     return dict(json.loads(said)) if asked.returncode == 0 else None
 
@@ -132,6 +134,7 @@ def run() -> dict[str, float]:
             heirs.append(kill_once(Path(name), bench, after_s))
         if not heirs[-1].well:
             print(f"   not as promised: {heirs[-1]}", flush=True)
+    close_server()
     return {
         "kills": float(len(heirs)),
         "finished_as_promised": float(sum(heir.well for heir in heirs)),

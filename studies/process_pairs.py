@@ -25,6 +25,7 @@ import numpy as np
 from labctl.services.schemas.campaigns import BENCH_CHECKS
 from labctl.store.connection.database import Database
 from studies.crashable_process import all_readings, complete_data_sets
+from studies.databases import close_server, new_database
 from studies.process_kill import DATA_SETS, RECIPE, WHOLE_S, simulators
 
 PAIRS = int(os.environ.get("LABCTL_STUDY_PAIRS", "100"))
@@ -73,8 +74,8 @@ class Service:
     """`labctl serve` as a service manager runs it."""
 
     def __init__(self, folder: Path, bench: Path) -> None:
-        self.database = folder / "lab.sqlite"
-        words = ["serve", "--bench", str(bench), "--port", "0", "--json", "--database", str(self.database)]
+        self.database = new_database(folder)
+        words = ["serve", "--bench", str(bench), "--port", "0", "--json", "--database", self.database]
         self._command = [sys.executable, "-m", "labctl", *words]
         self._start()
 
@@ -138,7 +139,7 @@ def suffer(folder: Path, bench: Path, faults: tuple[Fault, ...]) -> Outcome:
         unconfirmed = service.http.get("/health").json()["bench"]["unconfirmed"]
     finally:
         service.close()
-    database = Database(str(service.database), write=False)
+    database = Database(service.database, write=False)
     counts = complete_data_sets(database)
     wrong = sum(counts[number] != 1 for number in range(1, DATA_SETS + 1))
     missing = len(before - all_readings(database))
@@ -146,8 +147,8 @@ def suffer(folder: Path, bench: Path, faults: tuple[Fault, ...]) -> Outcome:
     return Outcome(faults, answer["state"], answer["reason"], missing, wrong, unconfirmed, answers_after_s)
 
 
-def _readings(location: Path) -> set[Any]:
-    database = Database(str(location), write=False)
+def _readings(location: str) -> set[Any]:
+    database = Database(location, write=False)
     found = all_readings(database)
     database.close()
     return found
@@ -166,6 +167,7 @@ def run() -> dict[str, float]:
             outcomes.append(suffer(Path(name), bench, faults))
         if not outcomes[-1].well:
             print(f"   not as promised: {', '.join(map(str, faults))}: {outcomes[-1]}", flush=True)
+    close_server()
     return {
         "pairs": float(len(outcomes)),
         "finished_as_promised": float(sum(outcome.well for outcome in outcomes)),

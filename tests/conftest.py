@@ -60,8 +60,13 @@ def in_a_loop() -> Callable[[Coroutine[Any, Any, Any]], Any]:
     return run
 
 
+#: Folders whose tests mostly wait (for a browser, a process, a serial line): first, so that others compute meanwhile.
+WAITING = ("tests/system/", "tests/web/")
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave out what this machine cannot do, and say so."""
+    """Begin with the tests that wait; leave out what this machine cannot do, and say so."""
+    items.sort(key=lambda item: not item.nodeid.startswith(WAITING))
     if shutil.which("cc") is not None:
         return
     for item in items:

@@ -19,6 +19,7 @@ from labctl.log import get_logger
 from labctl.processes.bench_calls import BenchCalls
 from labctl.processes.calls import CallServer
 from labctl.processes.children import begin_child_log, line_to_parent, tell
+from labctl.processes.engine_watch import EngineWatch
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.processes.waker import Waker
@@ -80,7 +81,7 @@ class BenchProcess:
     def __init__(self, settings: BenchSettings, store: Store, local: LocalBench) -> None:
         self._store, self._local = store, local
         self._waker = Waker()
-        self._supervision = Supervision(settings, store, self._waker)
+        self._supervision = Supervision(settings, store, self._waker, EngineWatch(lambda: local.polls).is_stuck)
         if local.scheduler is not None:
             local.scheduler.attended = lambda: self._supervision.alone_s == 0.0
         calls = BenchCalls(store, local, self._supervision)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 
-from labctl.errors import Conflict
+from labctl.errors import Conflict, StoreError
 from labctl.processes.elapsed import Elapsed
 from labctl.processes.settings import BenchSettings
 from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft
+from labctl.services.benches.lease import this_machine
 from labctl.store import ServiceAddress, Store
 
 BEAT_S = 1.0
@@ -19,8 +22,10 @@ BEAT_S = 1.0
 class Supervision:
     """The bench process's side: one supervisor at a time, or none."""
 
-    def __init__(self, settings: BenchSettings, store: Store, waker: Waker) -> None:
+    def __init__(self, settings: BenchSettings, store: Store, waker: Waker, is_stuck: Callable[[], bool]) -> None:
+        """`is_stuck`: whether this process lives and its engine does not; then no beat is sent, and it is replaced."""
         self._settings, self._store, self._waker = settings, store, waker
+        self._is_stuck = is_stuck
         self._guard = threading.Lock()
         self._line: Connection | None = None
         self._alone = Elapsed()
@@ -45,6 +50,8 @@ class Supervision:
             self._line = line
         self._settings = wanted
         self._store.note_address(ServiceAddress(wanted.url, str(wanted.folder)))
+        with contextlib.suppress(StoreError):  # a hint for other processes; a stop does not need it
+            self._store.leases.note_address(this_machine(), os.getpid())
         threading.Thread(target=self._hear, args=(line,), name="supervisor", daemon=True).start()
         threading.Thread(target=self._beat, args=(line,), name="beat", daemon=True).start()
 
@@ -62,9 +69,11 @@ class Supervision:
     def _beat(self, line: Connection) -> None:
         never = threading.Event()
         with contextlib.suppress(OSError):
+            line.send("beat")  # the answer that it is in charge
             while self._line is line:
-                line.send("beat")
                 never.wait(BEAT_S)
+                if not self._is_stuck():
+                    line.send("beat")
 
     def _let_go(self, line: Connection) -> None:
         with self._guard:

@@ -1,8 +1,8 @@
 """The supervisor: what `labctl serve` runs. It starts the bench process and the web process, and watches both.
 
-It opens no database and computes nothing, so that little can stop it. A process that has ended, or has not been heard
-of for `SILENT_S`, is started again; a bench process starts with the safe state. An end of the supervisor itself ends
-the web process, not the bench process: the next supervisor on the same database takes charge of it.
+It computes nothing and has no database open, so that little can stop it. A process that has ended, or has not been
+heard of for `SILENT_S`, is started again; a bench process starts with the safe state. An end of the supervisor itself
+ends the web process, not the bench process: the next supervisor on the same database takes charge of it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pathlib import Path
 from labctl.errors import BenchInDoubt, BenchSilent, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
+from labctl.processes.bench_holder import bench_process_of
 from labctl.processes.bench_line import BenchLine
 from labctl.processes.children import Child
 from labctl.processes.elapsed import Elapsed
@@ -27,7 +28,6 @@ from labctl.processes.listening import Listening, listening
 from labctl.processes.settings import BenchSettings, ServeRequest, WebSettings
 from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft
-from labctl.store.connection.writer_lock import holder_of
 from procedures.execution.signals import ENDING, restore
 
 log = get_logger()
@@ -133,7 +133,7 @@ class Supervisor:
 
     def _open_bench(self) -> BenchLine:
         """Take charge of the bench process that outlived its service, or start one."""
-        holder = holder_of(self._request.location)
+        holder = bench_process_of(self._request)
         if holder is not None and holder.calls is not None:
             with contextlib.suppress(BenchSilent):
                 self._folder = Path(holder.calls)

@@ -48,6 +48,7 @@ def create_service(settings: WebSettings) -> LabService:
     request, folder = settings.request, settings.folder
     bench = load_bench(request.bench_name) if request.bench_name is not None else None
     store = Store(Database(request.location, write=False, writer=RemoteWriter(folder)))
+    store.imports.discard_unfinished()  # of a web process that was killed
     computation = InWorkers(store, preload=WORKER_MODULES)
     return LabService(store, WallClock(), computation=computation, access=RemoteBench(folder, bench))
 

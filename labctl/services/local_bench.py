@@ -80,6 +80,11 @@ class LocalBench:
         """
         return self.runner is not None and self.runner.stop_now(campaign, reason)
 
+    @property
+    def polls(self) -> tuple[int, int] | None:
+        """The campaign that runs, and how often its engine has asked for requests; None while none runs."""
+        return None if self.runner is None else self.runner.polls
+
     def end_soon(self) -> None:
         """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
         self.stops = True

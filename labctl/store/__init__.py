@@ -93,6 +93,7 @@ __all__ = [
     "check",
     "copy_database",
     "holder_of",
+    "is_url",
     "open_store",
 ]
 

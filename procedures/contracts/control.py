@@ -34,6 +34,7 @@ class Control:
         self._end: ControlRequest | None = None  # beside the lock: an abort waits for nothing
         self._heard = threading.Event()
         self._loss = loss
+        self.polls = 0  #: how often the thread that drives the bench has asked: it moves
 
     @property
     def request(self) -> ControlRequest:
@@ -45,6 +46,7 @@ class Control:
 
         For the thread that drives the bench.
         """
+        self.polls += 1
         if reason := self._loss():
             self.interrupt(reason)
         request = self.request

@@ -11,10 +11,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import httpx
 
-from labctl.store import holder_of, open_store
+from labctl.store import holder_of, is_url, open_store
 from tests.helpers.signal_defaults import default_signals
 
 #: For what a process does on a busy machine.
@@ -22,7 +23,7 @@ WAIT_S = 100.0
 REQUEST_S = 30.0
 
 
-def labctl(database: Path, *arguments: str) -> list[str]:
+def labctl(database: Path | str, *arguments: str) -> list[str]:
     """Return the words of a command on a database."""
     return [sys.executable, "-m", "labctl", *arguments, "--database", str(database)]
 
@@ -46,7 +47,7 @@ def kill(process: subprocess.Popen[str]) -> None:
     process.communicate()
 
 
-def end_of(database: Path, campaign: int = 1) -> tuple[str, str]:
+def end_of(database: Path | str, campaign: int = 1) -> tuple[str, str]:
     """Return state and reason of a campaign, as they were written."""
     with open_store(str(database), write=False) as store:
         row = store.campaigns.get(campaign)
@@ -57,7 +58,12 @@ class ServiceProcess:
     """`labctl serve` in a process of its own, and other commands beside it on the same database."""
 
     def __init__(
-        self, database: Path, *options: str, open_files: int | None = None, log: Path | None = None, shell: str = ""
+        self,
+        database: Path | str,
+        *options: str,
+        open_files: int | None = None,
+        log: Path | None = None,
+        shell: str = "",
     ) -> None:
         self.database = database
         command = ["serve", "--bench", "single-axis-sim", "--speed", "30", "--port", "0", "--json", *options]
@@ -88,20 +94,40 @@ class ServiceProcess:
         with self.following(campaign) as lines:
             assert any('"step_text":"data set' in line for line in lines)
 
+    def until_ended(self, campaign: int) -> dict[str, Any]:
+        """Follow a campaign to its end, also past the death of a process that runs it; returns its status."""
+        while True:
+            with contextlib.suppress(httpx.TransportError, json.JSONDecodeError):
+                with self.following(campaign) as lines:
+                    for _ in lines:
+                        pass
+                found: dict[str, Any] = self.http.get(f"/api/campaigns/{campaign}").json()
+                if found.get("state") in {"done", "failed", "aborted"}:
+                    return found
+
     def close(self) -> None:
         """End all processes of the service at once, as a power cut would."""
         self.http.close()
         self.process.kill()  # first: it would start the others again
-        holder = holder_of(str(self.database))
-        for pid in {self.bench_pid, self.web_pid, holder.pid if holder else self.bench_pid}:
+        for pid in {self.bench_pid, self.web_pid, self._bench_pid_now()}:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
         kill(self.process)
 
+    def _bench_pid_now(self) -> int:
+        """Return the bench process, which may be another than at the start."""
+        location = str(self.database)
+        if not is_url(location):
+            holder = holder_of(location)
+            return holder.pid if holder else self.bench_pid
+        with open_store(location, write=False) as store:
+            lease = store.leases.holder("single-axis-sim")
+            return lease.pid if lease else self.bench_pid
+
 
 @contextmanager
 def running(
-    database: Path, *options: str, open_files: int | None = None, log: Path | None = None, shell: str = ""
+    database: Path | str, *options: str, open_files: int | None = None, log: Path | None = None, shell: str = ""
 ) -> Iterator[ServiceProcess]:
     """Serve a database while the block runs; `open_files` is all that the process may open.
 

@@ -19,9 +19,9 @@ from labctl.services.campaigns.execution import run_here
 from labctl.services.schemas.campaigns import BENCH_CHECKS, StartRequest
 from labctl.store import open_store
 
-#: A unit counts as silent after 2 s of the bench, a quarter of a second of the wall: a machine that is busy otherwise
-#: stalls for less.
-SPEED = 8.0
+#: A unit counts as silent after 2 s of the bench, half a second of the wall: a machine that is busy otherwise stalls
+#: for less.
+SPEED = 4.0
 RECIPE = """
 format = "labctl-recipe/1"
 name = "two-processes"
@@ -34,7 +34,7 @@ max_drift_c = 2.0
 drift_window_s = 30
 timeout_s = 1800
 [acquire]
-duration_s = 20
+duration_s = 10
 settle_s = 2
 [guards]
 stale_s = 600
@@ -91,7 +91,7 @@ def test_the_same_data_sets_within_noise(far_bench: Path, tmp_path: Path) -> Non
     assert np.all(np.diff(far["dataset"]) > 0)  # one that a stall of a busy machine ended is taken again, as the next
     assert far["table_rate_dps"] == pytest.approx(near["table_rate_dps"], rel=1e-12)
     # a reading counts by when it came: on a busy machine some come too late for the gate
-    assert np.abs(np.asarray(far["n"]) - 200).max() <= 20
+    assert np.abs(np.asarray(far["n"]) - 100).max() <= 10
     # the output differs by noise and drift (0.0014 deg/s/rtHz, 0.0011 deg/s) and a little by temperature
     assert np.asarray(far["gyro_z"]) == pytest.approx(np.asarray(near["gyro_z"]), abs=0.02)
     assert np.asarray(far["temperature_c"]) == pytest.approx(np.asarray(near["temperature_c"]), abs=1.0)

@@ -15,7 +15,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 from uuid import uuid4
 
@@ -74,6 +74,7 @@ class BenchHold:
         mine = LeaseRow(
             self._bench, self._owner, socket.gethostname(), this_machine(), os.getpid(), since=now,
             beat=1 if found is None else found.beat + 1, beat_at=now, expires_at=now + timedelta(seconds=TERM_S),
+            url=self._store.leases.address.url, calls=self._store.leases.address.calls,
         )  # fmt: skip
         if not self._store.leases.claim(mine, replacing=found):
             raise Conflict(f"bench {self._bench}: somebody else took it this moment; try again")
@@ -155,8 +156,11 @@ class BenchHold:
 
 
 def hold_bench(store: Store, bench: BenchFile, clock: Clock | None = None) -> BenchHold | None:
-    """Take the lease on a bench and keep it; None for one that exists in this process only. Raises Conflict."""
-    if bench.is_simulated:
+    """Take the lease on a bench and keep it. Raises Conflict.
+
+    None for a simulated bench of a database to which no other process writes: nobody else can take up its campaign.
+    """
+    if bench.is_simulated and store.is_sole_writer:
         return None
     hold = BenchHold(store, bench.name, clock or WallClock())
     hold.take()
@@ -193,9 +197,17 @@ def open_for(bench: BenchFile, location: str) -> Iterator[Store]:
         opened.close()
 
 
+def driver_of(store: Store, bench_name: str, now: datetime) -> LeaseRow | None:
+    """Return the lease of the process that drives a bench now; None where nobody does."""
+    found = store.leases.holder(bench_name)
+    return None if found is None or found.expires_at <= now or _is_dead(found) else found
+
+
 def described(lease: LeaseRow) -> str:
     """Say who holds a bench."""
     who = f"process {lease.pid} on {lease.host} since {lease.since:%Y-%m-%d %H:%M:%S} UTC"
+    if lease.url is not None:
+        who = f"the service at {lease.url}, {who}"
     return f"bench {lease.bench_name} is held by {who}, last heard of at {lease.beat_at:%H:%M:%S}"
 
 

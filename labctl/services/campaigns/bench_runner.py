@@ -267,6 +267,12 @@ class BenchRunner:
             "unconfirmed": self._store.benches.unconfirmed(self._bench.name),
         }
 
+    @property
+    def polls(self) -> tuple[int, int] | None:
+        """The campaign that runs, and how often its engine has asked for requests; None while none runs."""
+        job = self._job
+        return None if job is None else (job.row.id, job.control.polls)
+
     def end_soon(self) -> None:
         """Begin nothing more, and let what runs go to its end in the safe state; returns at once."""
         self._stops = True

@@ -6,6 +6,7 @@ from datetime import datetime
 
 from labctl.errors import Conflict
 from labctl.log import get_logger
+from labctl.services.benches.lease import described, driver_of
 from labctl.services.campaigns.status import ENDED, campaign_status, outlives_its_process
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
@@ -26,6 +27,8 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
     answer = campaign_status(store, campaign)
     if answer.state in ENDED:
         raise Conflict(f"campaign {campaign} is over already: {answer.state}")
+    if not store.is_sole_writer and (driver := driver_of(store, answer.bench, at)) is not None:
+        raise Conflict(f"campaign {campaign} may run: {described(driver)}; abort it there. Nothing was changed")
     record_action(store, at, "abort", campaign, reason)
     row = store.campaigns.get(campaign)
     said = f"left unfinished; {reason}"

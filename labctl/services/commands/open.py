@@ -13,7 +13,7 @@ from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.command import Command, CommandExecutor, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
 from labctl.services.schemas.campaigns import CampaignResponse
-from labctl.store import Store, holder_of, open_store
+from labctl.store import Store, holder_of, is_url, open_store
 
 if TYPE_CHECKING:
     from labctl.services.commands.foreground_control import OpenTerminal
@@ -26,10 +26,24 @@ def open_readonly(database: str | None) -> Iterator[Store]:
         yield store
 
 
-def service_url(database: str | None) -> str | None:
-    """Return the address of the service that holds the database; None when no service does."""
-    holder = holder_of(database or default_database())
+def service_url(database: str | None, campaign: int | None = None) -> str | None:
+    """Return the address of the service that holds the database; None when no service does.
+
+    A database to which several processes write has a service for each bench: of that on which the campaign runs.
+    """
+    location = database or default_database()
+    if is_url(location):
+        return None if campaign is None else _url_of_driver(location, campaign)
+    holder = holder_of(location)
     return holder.url if holder is not None else None
+
+
+def _url_of_driver(location: str, campaign: int) -> str | None:
+    from labctl.services.benches.lease import driver_of  # noqa: PLC0415  loads drivers
+
+    with open_readonly(location) as store:
+        driver = driver_of(store, store.campaigns.get(campaign).bench_name, SystemClock().utc())
+    return None if driver is None else driver.url
 
 
 @contextmanager
@@ -51,9 +65,16 @@ def open_commands(database: str | None, open_terminal: OpenTerminal | None = Non
         def open_writable() -> Store:
             return opened.enter_context(open_store(location, write=True))
 
-        yield LocalExecutor(
-            CommandContext(open_writable, SystemClock(), ForegroundControl(location, open_terminal or no_terminal))
-        )
+        control = ForegroundControl(location, open_terminal or no_terminal)
+        local = LocalExecutor(CommandContext(open_writable, SystemClock(), control))
+        yield _routed(local, location) if is_url(location) else local
+
+
+def _routed(local: CommandExecutor, location: str) -> CommandExecutor:
+    from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415  as above
+    from labctl.services.commands.routing import RoutedExecutor  # noqa: PLC0415  as above
+
+    return RoutedExecutor(local, HttpExecutor, lambda: open_readonly(location), SystemClock())
 
 
 def execute(database: str | None, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
@@ -69,7 +90,7 @@ def current_status(database: str | None, campaign: int | None) -> CampaignRespon
     """
     with open_readonly(database) as store:
         answer = with_resume(store, campaign_status(store, campaign))
-    if url := service_url(database):
+    if url := service_url(database, answer.id):
         from labctl.services.commands.remote import HttpExecutor  # noqa: PLC0415
 
         return HttpExecutor(url).fetch(f"/api/campaigns/{answer.id}", CampaignResponse)

@@ -1,32 +1,31 @@
-"""One database, one writer. SQLite in a file by default; the same statements run on PostgreSQL.
-
-SQLite before 3.51.3 can damage a write-ahead log when two connections write at once, so exactly one connection of one
-process writes; `writer_lock` enforces it.
-"""
+"""One database: SQLite in a file by default; the same statements run on PostgreSQL."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import sqlalchemy as sa
 from sqlalchemy.exc import DatabaseError
 
-from labctl.errors import DiskFull, StoreError
+from instruments.clock import Clock, WallClock
+from labctl.errors import DatabaseUnreachable, DiskFull, StoreError
 from labctl.store import migrate
-from labctl.store.connection.commit_seal import count_commit, missing, seal
-from labctl.store.connection.engines import make_engine
-from labctl.store.connection.file_identity import FileIdentity
+from labctl.store.connection.backend import Backend
 from labctl.store.connection.location import is_url, shown
-from labctl.store.connection.private_files import close_to_others, make_private
-from labctl.store.connection.start_check import first_damage
-from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress, WriterLock
+from labctl.store.connection.postgresql_server import PostgresqlServer
+from labctl.store.connection.sqlite_file import SqliteFile
+from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress
 from labctl.store.connection.writer_turn import WriterTurn
 
-#: What SQLite and PostgreSQL call a full disk.
-SQLITE_FULL, POSTGRESQL_DISK_FULL = 13, "53100"
+ResultT = TypeVar("ResultT")
+
+#: What SQLite and PostgreSQL call a full disk, and PostgreSQL a lock that it gave nobody in time.
+SQLITE_FULL, POSTGRESQL_DISK_FULL, LOCK_NOT_AVAILABLE = 13, "53100", "55P03"
+#: A server that does not answer is asked again after so long, s.
+RETRY_S = 0.5
 
 
 class Writer(Protocol):
@@ -41,7 +40,8 @@ class Database:
     """A migrated database. `write` holds it for this process; without, only `reading` may be used.
 
     `writer` runs the transactions of a process that does not hold it. `address` is written into the note that tells
-    other processes who holds it.
+    other processes who holds it, and into the leases that it takes. `clock` times how long a server that does not
+    answer is asked again.
 
     `as_it_is` opens a database without making or migrating it: the file may be of any kind.
     """
@@ -54,66 +54,46 @@ class Database:
         address: ServiceAddress = NO_SERVICE,
         writer: Writer | None = None,
         as_it_is: bool = False,
+        clock: Clock | None = None,
     ) -> None:
         self.location, self._shown = location, shown(location)
         self.writes = write
         self.writer = writer
+        self.address = address
+        self._clock = clock or WallClock()
         self._turn = WriterTurn(self._shown)
-        self._lock: WriterLock | None = None
-        self._sqlite = not is_url(location)
-        self._synced = True
-        self._identity: FileIdentity | None = None
-        if self._sqlite and not as_it_is:
-            Path(location).parent.mkdir(parents=True, exist_ok=True)
-        if write and self._sqlite:
-            self._lock = WriterLock(location, address)
-        elif self._sqlite and not Path(location).exists():
-            if as_it_is:
-                raise StoreError(f"{location}: there is no such file; name the database with --database")
-            Database(location, write=True).close()
+        self._backend = self._open_backend(address, as_it_is=as_it_is)
         try:
-            if write and self._sqlite and not Path(location).exists():
-                self._refuse_loss(None)
-            self._make_private()
-            self._engine = make_engine(location, write=write)
+            self._engine, self._reader = self._backend.engines()
             if not as_it_is:
-                self._migrate(write=write)
-            #: Reading has connections of its own: it neither waits for the writer nor makes it wait.
-            self._reader = make_engine(location, write=False) if write and self._sqlite else self._engine
-            self._make_private()
-            self._remember_files()
+                self._migrate()
+            self._backend.opened(self._engine)
         except BaseException:
-            self._release()
+            self._backend.close()
             raise
 
-    def _make_private(self) -> None:
-        """Give the files of the database to their owner alone; SQLite makes its log as it finds the database."""
-        if self._lock is None:
-            return
-        make_private(Path(self.location))
-        close_to_others(*(Path(f"{self.location}{end}") for end in ("", "-wal", "-shm", ".lock", ".seal")))
+    def _open_backend(self, address: ServiceAddress, *, as_it_is: bool) -> Backend:
+        if is_url(self.location):
+            return PostgresqlServer(self.location, write=self.writes)
+        if not as_it_is:
+            Path(self.location).parent.mkdir(parents=True, exist_ok=True)
+        if not self.writes and not Path(self.location).exists():
+            if as_it_is:
+                raise StoreError(f"{self.location}: there is no such file; name the database with --database")
+            Database(self.location, write=True).close()
+        return SqliteFile(self.location, address if self.writes else None)
 
-    def _remember_files(self) -> None:
-        if self._lock is None:
-            return
-        self._identity = identity = FileIdentity(self.location)
-        for event in ("connect", "close"):  # an interrupt inside a write opens the connection anew
-            sa.event.listen(self._engine, event, lambda *_: identity.forget_log())
-
-    def _migrate(self, *, write: bool) -> None:
+    def _migrate(self) -> None:
         try:
-            with self._engine.connect() as connection:
-                if write:
-                    self._refuse_loss(connection)
-                    self._refuse_damage(connection)
-                found = migrate.revision_of(connection)
+            found = self.outlast(self._revision)
             if found == migrate.HEAD:
                 return
             migrate.refuse_unknown(found, self._shown)
-            if not write:
+            if not self.writes and not is_url(self.location):
                 Database(self.location, write=True).close()
                 return
             with self._engine.begin() as connection:
+                self._backend.before_migration(connection)
                 migrate.upgrade(connection)
         except DatabaseError as error:
             if (full := self._trouble(error)) and isinstance(full, DiskFull):
@@ -123,23 +103,29 @@ class Database:
                 "restore a backup, or name another file with --database"
             ) from error
 
-    def _refuse_loss(self, connection: sa.Connection | None) -> None:
-        """Raise StoreError when commits are missing: nothing is written to an archive that lost some."""
-        if self._sqlite and (text := missing(connection, self.location)):
-            raise StoreError(f"{self.location}: {text}")
+    def _revision(self) -> str | None:
+        try:
+            with self._engine.connect() as connection:
+                self._backend.before_opening(connection)
+                return migrate.revision_of(connection)
+        except DatabaseError as error:
+            if self._backend.is_unreachable(error):
+                raise self._trouble(error) from error
+            raise
 
-    def _refuse_damage(self, connection: sa.Connection) -> None:
-        """Raise StoreError for a file whose pages do not fit together."""
-        if self._sqlite and (text := first_damage(connection)):
-            raise StoreError(
-                f"{self.location}: damaged ({text}); nothing was changed. Restore the newest backup, or save what can "
-                "be read with `sqlite3 FILE .recover`; `labctl check` lists what is found"
-            )
+    def outlast(self, work: Callable[[], ResultT]) -> ResultT:
+        """Do something again for as long as the server does not answer, at most `patience_s`.
 
-    def _refuse_other_file(self) -> None:
-        """Raise StoreError when the database was deleted or replaced since it was opened."""
-        if self._identity is not None and (text := self._identity.changed()):
-            raise StoreError(f"{text}. Nothing of this act was kept", cause=text)
+        Returns what `work` does. Raises DatabaseUnreachable after that time; then, too, nothing of it was kept.
+        """
+        end_s = self._clock.now_s() + self._backend.patience_s
+        while True:
+            try:
+                return work()
+            except DatabaseUnreachable:
+                if self._clock.now_s() >= end_s:
+                    raise
+                self._clock.sleep(RETRY_S)
 
     @contextmanager
     def writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
@@ -147,70 +133,80 @@ class Database:
 
         What is not `synced` outlives this process at once, but a power cut only when the next synced transaction ends:
         a log is written in order, so that one carries all before it to the disk. Raises StoreError, naming who holds
-        the connection, when it does not come free within 20 s.
+        the connection, when it does not come free within 20 s, and DatabaseUnreachable.
         """
         if self.writer is not None:
             raise StoreError(
                 f"{self._shown}: another process writes to it; only a marked transaction can be sent there"
             )
-        counted = synced and self._sqlite
+        number, ended = 0, False
         with self._turn.take():
             try:
-                self._sync(synced)
+                self._backend.before_begin(self._engine, synced=synced)
                 with self._engine.begin() as connection:
+                    number = self._backend.begun(connection, synced=synced)
                     yield connection
-                    self._refuse_other_file()
-                    commits = count_commit(connection) if counted else 0
+                    commits = self._backend.before_commit(connection, synced=synced)
+                    ended = True
             except sa.exc.DatabaseError as error:
                 if isinstance(error, sa.exc.IntegrityError | sa.exc.ProgrammingError):
                     raise
-                self._refuse_other_file()
-                raise self._trouble(error) from error
-            if counted:
-                seal(self.location, commits)
+                self._backend.refuse_other()
+                if not (ended and self._backend.is_unreachable(error) and self.outlast(lambda: self._is_kept(number))):
+                    raise self._trouble(error) from error
+                commits = 0
+            self._backend.committed(commits)
+
+    def _is_kept(self, number: int) -> bool:
+        """Return whether a transaction was committed whose commit was not answered. Raises DatabaseUnreachable."""
+        try:
+            return self._backend.was_committed(number)
+        except DatabaseError as error:
+            raise self._trouble(error) from error
 
     def _trouble(self, error: sa.exc.DatabaseError) -> StoreError:
-        full = getattr(error.orig, "sqlite_errorcode", None) == SQLITE_FULL
-        if full or getattr(error.orig, "sqlstate", None) == POSTGRESQL_DISK_FULL:
+        state = getattr(error.orig, "sqlstate", None)
+        if getattr(error.orig, "sqlite_errorcode", None) == SQLITE_FULL or state == POSTGRESQL_DISK_FULL:
             cause = f"{self._shown}: the disk is full"
             return DiskFull(f"{cause}; nothing of this act was kept. Make room, then go on", cause=cause)
-        cause = f"{self._shown}: {error.orig}"
+        said = " ".join(str(error.orig).split())
+        if self._backend.is_unreachable(error):
+            cause = f"{self._shown}: the database server does not answer ({said})"
+            return DatabaseUnreachable(f"{cause}; nothing of this act was kept. Try again once it runs", cause=cause)
+        cause = f"{self._shown}: {said}"
+        if state == LOCK_NOT_AVAILABLE:
+            cause = f"{self._shown}: no turn to write within 20 s: another process has it ({said})"
         return StoreError(f"{cause}; nothing of this act was kept", cause=cause)
-
-    def _sync(self, synced: bool) -> None:
-        if not self._sqlite or synced == self._synced:
-            return
-        driver = self._engine.raw_connection()
-        try:
-            driver.cursor().execute(f"PRAGMA synchronous={'FULL' if synced else 'NORMAL'}")
-        finally:
-            driver.close()
-        self._synced = synced
 
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:
         """Give a connection to read with. Raises StoreError."""
-        self._refuse_other_file()  # a new connection would make an empty file, or read another one's rows
+        self._backend.refuse_other()  # a new connection would make an empty file, or read another one's rows
         try:
-            with self._reader.connect() as connection:
+            with self.outlast(self._connect_reader) as connection:
                 yield connection
         except sa.exc.DatabaseError as error:
-            raise StoreError(f"{self._shown}: {error.orig}") from error
+            raise self._unread(error) from error
+
+    def _connect_reader(self) -> sa.Connection:
+        try:
+            return self._reader.connect()
+        except sa.exc.DatabaseError as error:
+            raise self._unread(error) from error
+        except sa.exc.TimeoutError as error:
+            raise StoreError(f"{self._shown}: as many connections as there may be are in use; try again") from error
+
+    def _unread(self, error: sa.exc.DatabaseError) -> StoreError:
+        text = f"{self._shown}: {error.orig}"
+        return (DatabaseUnreachable if self._backend.is_unreachable(error) else StoreError)(text)
 
     def note_address(self, address: ServiceAddress) -> None:
         """Write down at which address the service that holds this database is reached now."""
-        if self._lock is not None:
-            with suppress(OSError):  # a full disk: the note is only a hint
-                self._lock.note(address)
+        self.address = address
+        self._backend.note_address(address)
 
     def close(self) -> None:
         """Close the database and let the next writer in."""
-        self._identity = None  # the log goes with the last connection
         self._reader.dispose()
         self._engine.dispose()
-        self._release()
-
-    def _release(self) -> None:
-        if self._lock is not None:
-            self._lock.release()
-            self._lock = None
+        self._backend.close()

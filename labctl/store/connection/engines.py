@@ -8,19 +8,22 @@ import sqlalchemy as sa
 from sqlalchemy.pool import StaticPool
 
 from labctl.errors import BadInput
-from labctl.store.connection.location import is_url, shown
+from labctl.store.connection.location import shown
 
 BUSY_MS = 5000
+#: Of libpq: how long a server may take to answer, and after how long without an answer a connection is lost.
+CONNECTION = {
+    "connect_timeout": 5,
+    "keepalives_idle": 5,
+    "keepalives_interval": 5,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 20_000,
+    "application_name": "labctl",
+}
 
 
-def make_engine(location: str, *, write: bool) -> sa.Engine:
-    """Return an engine for a database by path or URL. Raises BadInput for a URL that is not known here."""
-    if is_url(location):
-        return _engine_of_url(location)
-    return _sqlite_engine(location, write=write)
-
-
-def _sqlite_engine(location: str, *, write: bool) -> sa.Engine:
+def sqlite_engine(location: str, *, write: bool) -> sa.Engine:
+    """Return an engine for a database by path; without `write` it refuses to change anything."""
     options: dict[str, Any] = {"poolclass": StaticPool} if write else {}
     engine = sa.create_engine(
         f"sqlite:///{location}",
@@ -45,11 +48,19 @@ def _sqlite_engine(location: str, *, write: bool) -> sa.Engine:
     return engine
 
 
-def _engine_of_url(url: str) -> sa.Engine:
+def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> sa.Engine:
+    """Return an engine for a database by URL, whose server ends what waits or idles in a transaction for so long.
+
+    A connection is tried before it is used, and one whose other end is gone is noticed within 20 s. Raises BadInput
+    for a URL that is not known here.
+    """
     known = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
+    limits = {"lock_timeout": lock_timeout_s, "idle_in_transaction_session_timeout": idle_timeout_s}
+    options = " ".join(f"-c {name}={round(1000 * limit_s)}" for name, limit_s in limits.items())
+    arguments = {**CONNECTION, "options": options}
     try:
         if sa.make_url(url).get_backend_name() == "postgresql":
-            return sa.create_engine(url)
+            return sa.create_engine(url, pool_pre_ping=True, max_overflow=15, connect_args=arguments)
     except (sa.exc.ArgumentError, ValueError):  # ValueError: a port that is no number
         pass
     except ModuleNotFoundError as error:

@@ -39,9 +39,24 @@ def transaction(
     def run(self: RepositoryT, /, *args: ArgumentsP.args, **kwargs: ArgumentsP.kwargs) -> ResultT:
         writer = self._database.writer
         if writer is None:
-            return method(self, *args, **kwargs)
+            return self._database.outlast(lambda: method(self, *args, **kwargs))
         answer: ResultT = writer.run(name, args, kwargs)
         return answer
+
+    return run
+
+
+def outlasting(
+    method: Callable[Concatenate[RepositoryT, ArgumentsP], ResultT],
+) -> Callable[Concatenate[RepositoryT, ArgumentsP], ResultT]:
+    """Mark a method that writes in this process: it is done again where the server did not answer, nothing being kept.
+
+    So it may change nothing of its own object before its transaction is committed.
+    """
+
+    @functools.wraps(method)
+    def run(self: RepositoryT, /, *args: ArgumentsP.args, **kwargs: ArgumentsP.kwargs) -> ResultT:
+        return self._database.outlast(lambda: method(self, *args, **kwargs))
 
     return run
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from instruments.interfaces.gyro import Readings
 from labctl.store import sample_codec
 from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import outlasting
 from labctl.store.dataset_statistics import means_rows
 from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
@@ -62,6 +63,7 @@ class StoreJournal:
         with defer_signals(), self._database.writing(synced=synced) as connection:
             yield connection
 
+    @outlasting
     def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:
         """Record a change of state and why, as the campaign's state and as an event."""
         values: dict[str, Any] = {"state": state.value, "reason": reason}
@@ -83,19 +85,23 @@ class StoreJournal:
 
     def step_started(self, index: int, t_s: float, at: datetime) -> None:
         """Record that a step begins."""
-        self._mark(index, state="running", started_s=t_s, started_at=at)
+        self._mark(index, {"state": "running", "started_s": t_s, "started_at": at})
 
     def step_ended(self, index: int, result: StepResult, t_s: float, at: datetime) -> None:
         """Record how a step ended."""
-        self._mark(index, state=result.outcome, ended_s=t_s, ended_at=at, result=result.model_dump(mode="json"))
+        self._mark(
+            index, {"state": result.outcome, "ended_s": t_s, "ended_at": at, "result": result.model_dump(mode="json")}
+        )
 
-    def _mark(self, index: int, **values: Any) -> None:
+    @outlasting
+    def _mark(self, index: int, values: dict[str, Any]) -> None:
         s = tables.steps
         with self._writing() as connection:
             connection.execute(
                 sa.update(s).where(s.c.campaign_id == self._campaign, s.c.number == index).values(**values)
             )
 
+    @outlasting
     def session_began(self, run: int, t_s: float) -> None:  # noqa: ARG002  the number is the plan's and what was added
         """Record that the units were switched on."""
         self._power_on_s = t_s
@@ -103,12 +109,14 @@ class StoreJournal:
         with self._writing() as connection:
             connection.execute(sa.update(c).where(c.c.id == self._campaign).values(powered_on_s=t_s))
 
+    @outlasting
     def unit_dropped(self, gyro: str, reason: str) -> None:
         """Record that a unit takes no further part."""
         r = tables.recordings
         with self._writing() as connection:
             connection.execute(sa.update(r).where(r.c.id == self._recordings[gyro]).values(dropped=reason))
 
+    @outlasting
     def dataset_opened(self, header: DataSetHeader) -> int:
         """Record a data set of every unit before its first reading; returns its number."""
         s, d = header.step, tables.data_sets
@@ -143,25 +151,28 @@ class StoreJournal:
             )
         return number
 
+    @outlasting
     def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
         """Record one block of one unit; times are campaign time."""
         if not len(readings) and not readings.lost and not readings.damaged:
             return
         recording = self._recordings[gyro]
         parts = self._open.setdefault((dataset, gyro), [])
+        columns = _columns(readings, chamber_c)
         d = tables.data_sets
         with self._writing(synced=False) as connection:
             if len(readings):
-                columns = _columns(readings, chamber_c)
                 write_block(connection, recording, dataset, len(parts), sample_codec.pack(columns))
-                parts.append(columns)
             if readings.lost or readings.damaged:
                 connection.execute(
                     sa.update(d)
                     .where(d.c.recording_id == recording, d.c.number == dataset)
                     .values(lost=d.c.lost + readings.lost, damaged=d.c.damaged + readings.damaged)
                 )
+        if len(readings):
+            parts.append(columns)
 
+    @outlasting
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
         """Record that no more readings follow: figures are derived and blocks packed into one, in one transaction."""
         with self._writing() as connection:
@@ -173,12 +184,14 @@ class StoreJournal:
                 if recording in there:
                     raw = self._raw_of(connection, gyro, recording, dataset)
                     self._close_one(connection, gyro, recording, dataset, state, reason, raw)
+        for gyro in self._recordings:
+            self._open.pop((dataset, gyro), None)
 
     def _raw_of(
         self, connection: sa.Connection, gyro: str, recording: int, dataset: int
     ) -> dict[str, NDArray[Any]] | None:
         """Return a data set's readings as the device sent them; None when there are none."""
-        parts = self._open.pop((dataset, gyro), None) or blocks_of(connection, recording, dataset)
+        parts = self._open.get((dataset, gyro)) or blocks_of(connection, recording, dataset)
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else None
 
     def _close_one(
@@ -204,6 +217,7 @@ class StoreJournal:
             write_block(connection, recording, dataset, 0, sample_codec.pack(raw, sample_codec.FINAL))
         connection.execute(sa.update(d).where(*this).values(state=state.value, reason=reason, n=n))
 
+    @outlasting
     def environment(self, sample: EnvironmentSample) -> None:
         """Record the environment, once for each unit whose thermometer was read."""
         rows = [
@@ -222,6 +236,7 @@ class StoreJournal:
             with self._writing(synced=False) as connection:
                 connection.execute(_ADD_ENVIRONMENT, rows)
 
+    @outlasting
     def event(self, event: Event, t_s: float, at: datetime) -> None:
         """Record something worth telling a person; what is not safe stays on the bench's status from then on."""
         with self._writing() as connection:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from datetime import datetime
 
 import sqlalchemy as sa
 
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.connection.writer_lock import ServiceAddress
 from labctl.store.schema import tables
 
 
@@ -25,6 +26,8 @@ class LeaseRow:
     beat: int  #: counts renewals: a lease that lives is one whose beat changes
     beat_at: datetime
     expires_at: datetime
+    url: str | None = None  #: of the service that drives the bench
+    calls: str | None = None  #: folder of the Unix sockets of its bench process
 
 
 class Leases:
@@ -33,12 +36,15 @@ class Leases:
     def __init__(self, database: Database) -> None:
         self._database = database
 
+    @property
+    def address(self) -> ServiceAddress:
+        """Where this process is reached, for the leases that it takes."""
+        return self._database.address
+
     def holder(self, bench_name: str) -> LeaseRow | None:
         """Return who holds a bench; None when it is free."""
         x = tables.leases.c
-        query = sa.select(
-            x.bench_name, x.owner, x.host, x.machine, x.pid, x.since, x.beat, x.beat_at, x.expires_at
-        ).where(x.bench_name == bench_name)
+        query = sa.select(*(x[field.name] for field in fields(LeaseRow))).where(x.bench_name == bench_name)
         with self._database.reading() as connection:
             row = connection.execute(query).first()
         return None if row is None else LeaseRow(*row)
@@ -69,6 +75,14 @@ class Leases:
         with self._database.writing(synced=False) as connection:
             changed = connection.execute(mine.values(beat=x.c.beat + 1, beat_at=at, expires_at=expires_at))
         return changed.rowcount == 1
+
+    @transaction
+    def note_address(self, machine: str, pid: int) -> None:
+        """Write into the leases of a process where its service is reached now."""
+        x, address = tables.leases, self._database.address
+        with self._database.writing() as connection:
+            mine = sa.update(x).where(x.c.machine == machine, x.c.pid == pid)
+            connection.execute(mine.values(url=address.url, calls=address.calls))
 
     @transaction
     def release(self, bench_name: str, owner: str) -> None:

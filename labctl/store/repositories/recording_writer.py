@@ -106,8 +106,9 @@ class Imports:
     def discard_unfinished(self) -> int:
         """Discard what processes left that ended during an import; returns how many there were.
 
-        SQLite has one writing process, so its next one finds only what the one before left. Elsewhere an import may
-        be another process's, which lives: it is left alone until it gave no sign for 15 minutes, by the server's clock.
+        SQLite has one service or command at a time, so the next one finds only what the one before left. Elsewhere an
+        import may be another process's, which lives: it is left alone until it gave no sign for 15 minutes, by the
+        server's clock.
         """
         r = tables.recordings.c
         with self._database.reading() as connection:
@@ -117,11 +118,15 @@ class Imports:
             found = [ImportTicket(*row) for row in connection.execute(query)]
         for ticket in found:
             with suppress(Conflict):
-                self.discard(self._claimed(ticket))
+                self.discard(self.claim(ticket))
         return len(found)
 
-    def _claimed(self, ticket: ImportTicket) -> ImportTicket:
-        """Return a ticket that only this process has: whoever had it before can write no further part."""
+    @transaction
+    def claim(self, ticket: ImportTicket) -> ImportTicket:
+        """Return a ticket that only the caller has: whoever had it before can write no further part.
+
+        Raises Conflict when the import was discarded or finished meanwhile.
+        """
         mine = ImportTicket(ticket.recording, secrets.token_hex(16))
         with self._database.writing(synced=False) as connection:
             _give_sign(connection, ticket, token=mine.token)

@@ -33,4 +33,6 @@ leases = sa.Table(
     sa.Column("beat", sa.BigInteger, nullable=False),
     sa.Column("beat_at", Instant, nullable=False),
     sa.Column("expires_at", Instant, nullable=False),
+    sa.Column("url", sa.Text),  #: of the service that drives the bench; null where a terminal does
+    sa.Column("calls", sa.Text),  #: folder of the Unix sockets of its bench process
 )

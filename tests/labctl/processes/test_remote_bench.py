@@ -19,6 +19,7 @@ from labctl.processes.remote_bench import RemoteBench, RemoteWriter
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.processes.waker import Waker
+from labctl.recording import RecordingInfo
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench
@@ -37,7 +38,7 @@ def folder(tmp_path: Path) -> Iterator[Path]:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         settings = BenchSettings(store.location, BENCH.name, simulate=True, speed=0.0, folder=tmp_path, url="")
         local = LocalBench(store, WallClock(), BenchRunner(store, BENCH, VirtualClock))
-        calls = BenchCalls(store, local, Supervision(settings, store, waker))
+        calls = BenchCalls(store, local, Supervision(settings, store, waker, lambda: False))
         servers = CallServer(tmp_path / STOP, calls.stop, in_turn=True), CallServer(tmp_path / CALLS, calls.answer)
         for server in servers:
             server.start()
@@ -64,6 +65,14 @@ def test_a_transaction_runs_in_the_bench_process_in_the_name_of_who_asked(store:
     assert (row.who, row.action, row.detail["bytes"]) == ("Ada", "backup", 1)
     with pytest.raises(NotFound, match="was never used with this database"):
         store.benches.clear("nowhere", "Ada", "looked", AT)
+
+
+def test_what_a_killed_web_process_was_importing_is_discarded_by_the_next_one(store: Store) -> None:
+    left = store.imports.begin(RecordingInfo(serial="LEFT-1", axes=("z",), kind="samples", started_at=AT), AT)
+    assert store.imports.discard_unfinished() == 1
+    with pytest.raises(Conflict, match="its import was discarded"):
+        store.imports.claim(left)
+    assert store.imports.discard_unfinished() == 0
 
 
 def test_every_transaction_is_a_method_of_a_repository(store: Store) -> None:

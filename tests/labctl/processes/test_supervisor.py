@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from instruments.clock import WallClock
 from labctl.cli.app import app
-from labctl.errors import BadInput
+from labctl.errors import BadInput, LabctlError
 from labctl.processes import supervisor
 from labctl.processes.bench_process import open_bench_service
 from labctl.processes.listening import listening
@@ -128,3 +128,19 @@ def test_a_service_that_cannot_say_where_it_is_ends_its_processes(tmp_path: Path
     for pid in (service.bench_pid, service.web_pid):
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
+
+
+def test_a_process_that_ends_again_and_again_ends_the_service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(supervisor, "MOST_RESTARTS", 0)
+    location = str(tmp_path / "lab.sqlite")
+    told: list[supervisor.Ready] = []
+
+    def kill(service: supervisor.Ready) -> None:
+        told.append(service)
+        os.kill(service.web_pid, signal.SIGKILL)
+
+    with pytest.raises(LabctlError, match="the web process"):
+        supervisor.serve_forever(ServeRequest(port=0, database=location), kill)
+    assert holder_of(location) is None
+    with pytest.raises(ProcessLookupError):
+        os.kill(told[0].bench_pid, 0)

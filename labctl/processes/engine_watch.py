@@ -1,0 +1,29 @@
+"""Whether the engine still moves: a driver call that never returns leaves its process alive and its table turning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from instruments.clock import Clock
+from labctl.processes.elapsed import Elapsed
+
+#: An engine asks for requests once a second, except in its safe state (at most 120 s) and while it waits for its
+#: database (at most 45 s). One that asked for none in so long hangs, s.
+ENGINE_SILENT_S = 180.0
+
+
+class EngineWatch:
+    """Follows how often the engine has asked: `polls` returns campaign and count, None while none runs."""
+
+    def __init__(self, polls: Callable[[], tuple[int, int] | None], clock: Clock | None = None) -> None:
+        self._polls = polls
+        self._seen: tuple[int, int] | None = None
+        self._since = Elapsed(clock)
+
+    def is_stuck(self) -> bool:
+        """Return whether a campaign runs whose engine has not asked for `ENGINE_SILENT_S`."""
+        polls = self._polls()
+        if polls is None or polls != self._seen:
+            self._seen = polls
+            self._since.restart()
+        return self._since.s > ENGINE_SILENT_S

@@ -1,0 +1,46 @@
+"""Commands on a database to which several processes write: a bench's campaigns are commanded where it is driven."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import cast
+
+from instruments.clock import Clock
+from labctl.services.benches.lease import driver_of
+from labctl.services.commands.command import Command, CommandExecutor, RequestT, ResponseT
+from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.planning.loading import bench_for, load_bench, load_recipe
+from labctl.store import Store
+
+OpenStore = Callable[[], AbstractContextManager[Store]]
+
+
+def bench_of(store: Store, request: object) -> str | None:
+    """Return the bench that a request is about; None for any other. Raises NotFound, BadInput."""
+    if isinstance(request, CampaignStart):
+        return load_bench(request.bench or bench_for(load_recipe(request.body.recipe))).name
+    if isinstance(request, ToCampaign | CampaignResume) and request.campaign is not None:
+        return store.campaigns.get(request.campaign).bench_name
+    return None
+
+
+class RoutedExecutor:
+    """Sends what is about a bench to the service that drives it, and has everything else executed here."""
+
+    def __init__(
+        self, local: CommandExecutor, remote: Callable[[str], CommandExecutor], open_store: OpenStore, clock: Clock
+    ) -> None:
+        self._local, self._remote, self._open_store, self._clock = local, remote, open_store, clock
+
+    def execute(self, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
+        """Execute a command where it belongs. Raises LabctlError."""
+        with self._open_store() as store:
+            bench = bench_of(store, request)
+            driver = None if bench is None else driver_of(store, bench, self._clock.utc())
+        if driver is None or driver.url is None:
+            return self._local.execute(command, request)
+        if isinstance(request, CampaignStart | CampaignResume):  # it is this service's own
+            request = cast(RequestT, replace(request, bench=None))
+        return self._remote(driver.url).execute(command, request)

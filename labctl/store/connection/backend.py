@@ -1,0 +1,67 @@
+"""What a kind of database does besides running statements: SQLite guards its file, PostgreSQL is a server elsewhere."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import sqlalchemy as sa
+
+from labctl.store.connection.writer_lock import ServiceAddress
+
+
+class Backend(Protocol):
+    """The hooks of `Database`, in the order in which it calls them."""
+
+    patience_s: float  #: for how long a database that does not answer is asked again, s
+
+    def engines(self) -> tuple[sa.Engine, sa.Engine]:
+        """Return what writes, and what reads."""
+        ...
+
+    def before_opening(self, connection: sa.Connection) -> None:
+        """Refuse a database that must not be written to. Raises StoreError."""
+        ...
+
+    def before_migration(self, connection: sa.Connection) -> None:
+        """Wait for another process that migrates. Raises DatabaseError."""
+        ...
+
+    def opened(self, engine: sa.Engine) -> None:
+        """Take note that the database is there, at its newest revision."""
+        ...
+
+    def refuse_other(self) -> None:
+        """Raise StoreError when the database is no longer the one that was opened."""
+        ...
+
+    def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
+        """Prepare the writing connection for a transaction that has to outlive a power cut, or need not."""
+        ...
+
+    def begun(self, connection: sa.Connection, *, synced: bool) -> int:
+        """Begin a transaction; returns its number, 0 where it has none. Raises DatabaseError."""
+        ...
+
+    def before_commit(self, connection: sa.Connection, *, synced: bool) -> int:
+        """Return how many commits the database counts with this one, 0 where it counts none."""
+        ...
+
+    def committed(self, commits: int) -> None:
+        """Take note of what `before_commit` returned."""
+        ...
+
+    def is_unreachable(self, error: sa.exc.DatabaseError) -> bool:
+        """Return whether an error says that the database cannot be reached, and nothing of the statement."""
+        ...
+
+    def was_committed(self, number: int) -> bool:
+        """Return whether a transaction was committed whose commit was not answered. Raises DatabaseError."""
+        ...
+
+    def note_address(self, address: ServiceAddress) -> None:
+        """Write down at which address the service that holds this database is reached."""
+        ...
+
+    def close(self) -> None:
+        """Let the next writer in. Safe to call twice."""
+        ...

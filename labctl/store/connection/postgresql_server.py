@@ -1,0 +1,91 @@
+"""A PostgreSQL server: transactions one after the other, and a server that is restarted below a campaign.
+
+Writing transactions of all processes run one at a time, as on SQLite, held by an advisory lock that ends with the
+transaction: what a transaction reads cannot change before it commits. The server ends what waits for the lock, or does
+nothing while it has it, so that a process that hangs or a network that is cut stops no bench for good.
+
+PostgreSQL 15 documentation: 9.27.10 (advisory locks), 9.27.8 (pg_xact_status), 20.11 (client connection defaults).
+"""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+
+from labctl.store.connection.engines import server_engine
+from labctl.store.connection.writer_lock import ServiceAddress
+
+#: "labctl" in ASCII: the lock that a writing transaction has.
+WRITER_KEY = int.from_bytes(b"labctl", "big")
+#: A transaction waits so long for the one before, and one that does nothing is ended by the server after it, s.
+LOCK_TIMEOUT_S = IDLE_TIMEOUT_S = 20
+#: A server that is restarted within 30 s ends no campaign; who only reads is told soon that it does not answer, s.
+WRITER_PATIENCE_S, READER_PATIENCE_S = 45.0, 2.0
+#: The classes of errors that are about the connection and not about the statement, and what a server says that is
+#: shut down, was killed, starts, or drops its database. The codes are SQLSTATEs.
+CONNECTION_CLASS = "08"
+SERVER_AWAY = frozenset({"57P01", "57P02", "57P03", "57P05", "25P03", "53300"})
+
+_BEGIN = sa.text("SELECT pg_current_xact_id()::text FROM (SELECT pg_advisory_xact_lock(:key)) AS turn")
+_STATUS = sa.text("SELECT pg_xact_status(CAST(:number AS xid8))")
+
+
+class PostgresqlServer:
+    """The backend of a database by URL. It is held by no process; `write` says whether this one may wait for it."""
+
+    def __init__(self, url: str, *, write: bool) -> None:
+        """Raise BadInput for a URL that is not known here."""
+        self.patience_s = WRITER_PATIENCE_S if write else READER_PATIENCE_S
+        self._engine = server_engine(url, lock_timeout_s=LOCK_TIMEOUT_S, idle_timeout_s=IDLE_TIMEOUT_S)
+
+    def engines(self) -> tuple[sa.Engine, sa.Engine]:
+        """Return two that share their connections; a reader sees one state of the database and changes nothing."""
+        reader = self._engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+        return self._engine, reader
+
+    def before_opening(self, connection: sa.Connection) -> None:
+        """Do nothing: the server looks after its files."""
+
+    def before_migration(self, connection: sa.Connection) -> None:
+        """Wait for another process that migrates."""
+        self.begun(connection, synced=True)
+
+    def opened(self, engine: sa.Engine) -> None:
+        """Do nothing: other processes have it open too."""
+
+    def refuse_other(self) -> None:
+        """Do nothing: a connection is to one database."""
+
+    def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
+        """Do nothing: a transaction is told by itself."""
+
+    def begun(self, connection: sa.Connection, *, synced: bool) -> int:
+        """Wait for the turn to write; returns the number of the transaction."""
+        if not synced:
+            connection.exec_driver_sql("SET LOCAL synchronous_commit = off")
+        return int(connection.scalar(_BEGIN, {"key": WRITER_KEY}))
+
+    def before_commit(self, connection: sa.Connection, *, synced: bool) -> int:  # noqa: ARG002
+        """Return that no commits are counted."""
+        return 0
+
+    def committed(self, commits: int) -> None:
+        """Do nothing."""
+
+    def is_unreachable(self, error: sa.exc.DatabaseError) -> bool:
+        """Return whether the connection is lost, or the server shuts down, starts, or is not there."""
+        state = getattr(error.orig, "sqlstate", None)
+        if state is None:  # said by the client library: refused, lost, timed out
+            return isinstance(error, sa.exc.OperationalError)
+        return state in SERVER_AWAY or state.startswith(CONNECTION_CLASS)
+
+    def was_committed(self, number: int) -> bool:
+        """Ask the server what became of a transaction, once it is over: it had the turn until then."""
+        with self._engine.connect() as connection:
+            self.begun(connection, synced=True)
+            return connection.scalar(_STATUS, {"number": str(number)}) == "committed"
+
+    def note_address(self, address: ServiceAddress) -> None:
+        """Do nothing: a service is found by the lease on its bench."""
+
+    def close(self) -> None:
+        """Do nothing: nothing is held beside the connections."""

@@ -1,0 +1,133 @@
+"""An SQLite database as a file: one writing process, private files, and a file that is not lost, cut short or replaced.
+
+SQLite before 3.51.3 can damage a write-ahead log when two connections write at once, so exactly one connection of one
+process writes; `writer_lock` enforces it.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+import sqlalchemy as sa
+
+from labctl.errors import StoreError
+from labctl.store.connection.commit_seal import count_commit, missing, seal
+from labctl.store.connection.engines import sqlite_engine
+from labctl.store.connection.file_identity import FileIdentity
+from labctl.store.connection.private_files import close_to_others, make_private
+from labctl.store.connection.start_check import first_damage
+from labctl.store.connection.writer_lock import ServiceAddress, WriterLock
+
+
+class SqliteFile:
+    """The backend of a database by path. `address` given: it is held for writing, to be reached there."""
+
+    patience_s = 0.0  #: a file is there, or it is not
+
+    def __init__(self, location: str, address: ServiceAddress | None) -> None:
+        """Take the lock where it is held for writing. Raises Conflict, OSError, and StoreError for a lost file."""
+        self._location = location
+        self._lock = None if address is None else WriterLock(location, address)
+        self._identity: FileIdentity | None = None
+        self._synced = True
+        try:
+            if self._lock is not None and not Path(location).exists():
+                self._refuse_loss(None)
+            self._make_private()
+        except BaseException:
+            self.close()
+            raise
+
+    def engines(self) -> tuple[sa.Engine, sa.Engine]:
+        """Return two: reading has connections of its own, so it neither waits for the writer nor makes it wait."""
+        if self._lock is None:
+            engine = sqlite_engine(self._location, write=False)
+            return engine, engine
+        return sqlite_engine(self._location, write=True), sqlite_engine(self._location, write=False)
+
+    def before_opening(self, connection: sa.Connection) -> None:
+        """Refuse a file that lost commits, or whose pages do not fit together."""
+        if self._lock is None:
+            return
+        self._refuse_loss(connection)
+        if text := first_damage(connection):
+            raise StoreError(
+                f"{self._location}: damaged ({text}); nothing was changed. Restore the newest backup, or save what can "
+                "be read with `sqlite3 FILE .recover`; `labctl check` lists what is found"
+            )
+
+    def before_migration(self, connection: sa.Connection) -> None:
+        """Do nothing: who holds the file is the only one."""
+
+    def opened(self, engine: sa.Engine) -> None:
+        """Remember the files; from now on others that take their place are not written to."""
+        if self._lock is None:
+            return
+        self._make_private()
+        self._identity = identity = FileIdentity(self._location)
+        for event in ("connect", "close"):  # an interrupt inside a write opens the connection anew
+            sa.event.listen(engine, event, lambda *_: identity.forget_log())
+
+    def _make_private(self) -> None:
+        """Give the files of the database to their owner alone; SQLite makes its log as it finds the database."""
+        if self._lock is None:
+            return
+        make_private(Path(self._location))
+        close_to_others(*(Path(f"{self._location}{end}") for end in ("", "-wal", "-shm", ".lock", ".seal")))
+
+    def _refuse_loss(self, connection: sa.Connection | None) -> None:
+        """Raise StoreError when commits are missing: nothing is written to an archive that lost some."""
+        if text := missing(connection, self._location):
+            raise StoreError(f"{self._location}: {text}")
+
+    def refuse_other(self) -> None:
+        """Raise StoreError when the database was deleted or replaced since it was opened."""
+        if self._identity is not None and (text := self._identity.changed()):
+            raise StoreError(f"{text}. Nothing of this act was kept", cause=text)
+
+    def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
+        """Let the next commits reach the disk before they are answered, or with a later one: a log is in order."""
+        if synced == self._synced:
+            return
+        driver = engine.raw_connection()
+        try:
+            driver.cursor().execute(f"PRAGMA synchronous={'FULL' if synced else 'NORMAL'}")
+        finally:
+            driver.close()
+        self._synced = synced
+
+    def begun(self, connection: sa.Connection, *, synced: bool) -> int:  # noqa: ARG002
+        """Do nothing: the one writing connection began it with BEGIN IMMEDIATE."""
+        return 0
+
+    def before_commit(self, connection: sa.Connection, *, synced: bool) -> int:
+        """Count a synced commit, in the file that was opened and no other."""
+        self.refuse_other()
+        return count_commit(connection) if synced else 0
+
+    def committed(self, commits: int) -> None:
+        """Count it in the seal too."""
+        if commits:
+            seal(self._location, commits)
+
+    def is_unreachable(self, error: sa.exc.DatabaseError) -> bool:  # noqa: ARG002
+        """Return that every error is about the file itself."""
+        return False
+
+    def was_committed(self, number: int) -> bool:  # noqa: ARG002
+        """Return that a commit that failed was not made."""
+        return False
+
+    def note_address(self, address: ServiceAddress) -> None:
+        """Write the address into the note beside the file."""
+        if self._lock is not None:
+            with suppress(OSError):  # a full disk: the note is only a hint
+                self._lock.note(address)
+
+    def close(self) -> None:
+        """Let the next writer in."""
+        self._identity = None  # the log goes with the last connection
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None

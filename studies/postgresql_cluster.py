@@ -1,0 +1,96 @@
+"""A private PostgreSQL cluster in a temporary folder, on a Unix socket: no server of the machine is touched."""
+
+from __future__ import annotations
+
+import os
+import pwd
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from uuid import uuid4
+
+#: Where Debian keeps the programs of a server.
+DEBIAN = Path("/usr/lib/postgresql")
+USER = "labctl"
+#: More than a server needs to start on a busy machine, s.
+START_S = 120
+
+
+def programs() -> Path | None:
+    """Return the folder of the newest server's programs; None without one."""
+    found = sorted(DEBIAN.glob("*/bin/initdb"), key=lambda path: int(path.parts[-3]))
+    if found:
+        return found[-1].parent
+    where = shutil.which("initdb")
+    return None if where is None else Path(where).parent
+
+
+class Cluster:
+    """A server. PostgreSQL refuses to run as root, so as root it runs as the package's own user."""
+
+    def __init__(self, folder: Path, bin_folder: Path) -> None:
+        self._folder, self._bin = folder, bin_folder
+        self._data, self._sockets = folder / "data", folder / "s"
+        self._sockets.mkdir()
+        self._user = "postgres" if os.geteuid() == 0 else None
+        if self._user is not None:
+            owner = pwd.getpwnam(self._user)
+            for path in (folder, self._sockets):
+                os.chown(path, owner.pw_uid, owner.pw_gid)
+        self._run("initdb", "-D", self._data, "-U", USER, "-A", "trust", "-E", "UTF8", "--no-sync", "--no-instructions")
+
+    def _run(self, program: str, *arguments: object) -> None:
+        command = [str(self._bin / program), *map(str, arguments)]
+        with (self._folder / "said").open("ab") as said:
+            subprocess.run(command, user=self._user, check=True, cwd="/", stdout=said, stderr=said, timeout=START_S)
+
+    def start(self) -> None:
+        """Start the server; it answers when this returns.
+
+        It does not wait for the disk: it may crash here, the machine does not.
+        """
+        settings = {
+            "listen_addresses": "''",
+            "unix_socket_directories": self._sockets,
+            "max_connections": 200,
+            "fsync": "off",
+        }
+        options = " ".join(f"-c {name}={value}" for name, value in settings.items())
+        self._run("pg_ctl", "-D", self._data, "-w", "-t", START_S, "-l", self._folder / "log", "-o", options, "start")
+
+    def stop(self, *, how: str = "fast") -> None:
+        """Stop the server: `fast` ends every connection in order, `immediate` is a crash."""
+        self._run("pg_ctl", "-D", self._data, "-w", "-m", how, "stop")
+
+    def crash(self) -> None:
+        """Let the server crash and start again: what was not synced may be lost."""
+        self.stop(how="immediate")
+        self.start()
+
+    def url(self, database: str = "postgres") -> str:
+        """Return the URL of one of its databases."""
+        return f"postgresql+psycopg://{USER}@/{database}?host={self._sockets}"
+
+    def new_database(self) -> str:
+        """Make an empty database; returns its URL."""
+        name = f"t{uuid4().hex[:12]}"
+        self._run("createdb", "-h", self._sockets, "-U", USER, name)
+        return self.url(name)
+
+
+@contextmanager
+def running_cluster(bin_folder: Path) -> Iterator[Cluster]:
+    """Make a cluster, run it for the block, and remove it."""
+    folder = Path(tempfile.mkdtemp(prefix="labctl-pg-", dir="/tmp"))  # a socket's path has at most 107 bytes
+    folder.chmod(0o755)
+    cluster = Cluster(folder, bin_folder)
+    try:
+        cluster.start()
+        yield cluster
+    finally:
+        with suppress(subprocess.SubprocessError):
+            cluster.stop(how="immediate")
+        shutil.rmtree(folder, ignore_errors=True)

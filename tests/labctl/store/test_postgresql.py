@@ -1,0 +1,222 @@
+"""The same statements on a PostgreSQL server: equal rows, one writer at a time, and a server that goes away."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import psycopg
+import pytest
+import sqlalchemy as sa
+
+from labctl.errors import DatabaseUnreachable, StoreError
+from labctl.services.campaigns.execution import run_here
+from labctl.services.schemas.campaigns import StartRequest
+from labctl.store import Store, open_store
+from labctl.store.connection import postgresql_server
+from labctl.store.connection.database import Database
+from labctl.store.schema import tables
+from tests.helpers.postgresql import Cluster, running_cluster
+
+pytestmark = pytest.mark.timeout(300)
+
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Cluster]:
+    with running_cluster() as running:
+        yield running
+
+
+@pytest.fixture
+def url(cluster: Cluster) -> str:
+    return cluster.new_database()
+
+
+def note(store: Store, number: int) -> None:
+    store.audit.record(AT, "noted", f"row {number}", {"number": number})
+
+
+def subjects(store: Store) -> list[str]:
+    return [row.subject for row in store.audit.rows()]
+
+
+def rows_of(location: str) -> dict[str, list[Any]]:
+    """Return every row of every table but the leases, which a file needs for real benches alone.
+
+    Numbers of blocks are left out: SQLite gives those of deleted rows again.
+    """
+    blocks = tables.sample_blocks
+    shown = {table: list(table.columns) for table in tables.metadata.sorted_tables if table.name != "leases"}
+    shown[blocks].remove(blocks.c.id)
+    database = Database(location, write=False)
+    with database.reading() as connection:
+        found = {
+            table.name: sorted((tuple(row) for row in connection.execute(sa.select(*columns))), key=repr)
+            for table, columns in shown.items()
+        }
+    database.close()
+    return found
+
+
+def test_a_campaign_leaves_the_same_rows_as_in_a_file(url: str, tmp_path: Path) -> None:
+    path = str(tmp_path / "lab.sqlite")
+    for location in (path, url):
+        assert run_here(location, StartRequest(recipe="short", bench="single-axis-sim")).state == "done"
+    in_file, on_server = rows_of(path), rows_of(url)
+    assert sum(map(len, in_file.values())) > 100
+    for name in in_file:
+        assert on_server[name] == in_file[name], name
+
+
+def test_the_tables_are_what_the_code_declares(url: str) -> None:
+    from alembic.autogenerate import compare_metadata
+    from alembic.migration import MigrationContext
+
+    database = Database(url, write=True)
+    with database.reading() as connection:
+        differences = compare_metadata(MigrationContext.configure(connection), tables.metadata)
+    database.close()
+    assert differences == []
+
+
+def test_two_that_make_the_tables_at_the_same_time_do_not_meet(url: str) -> None:
+    with ThreadPoolExecutor(4) as threads:
+        opened = list(threads.map(lambda _: Database(url, write=True), range(4)))
+    for database in opened:
+        database.close()
+    assert len(opened) == 4
+
+
+def test_the_audit_trail_of_several_writers_is_one_chain(url: str) -> None:
+    def write(first: int) -> None:
+        with open_store(url, write=True) as store:
+            for number in range(first, first + 10):
+                note(store, number)
+
+    with ThreadPoolExecutor(4) as threads:
+        list(threads.map(write, range(0, 40, 10)))
+    with open_store(url, write=False) as store:
+        assert store.audit.first_broken() is None
+        assert sorted(subjects(store)) == sorted(f"row {k}" for k in range(40))
+
+
+def test_a_reader_can_change_nothing(url: str) -> None:
+    database = Database(url, write=True)
+    with database.reading() as connection, pytest.raises(sa.exc.DBAPIError, match="read-only"):
+        connection.execute(sa.delete(tables.audit))
+    database.close()
+
+
+@pytest.mark.parametrize("how", ["fast", "immediate"])
+def test_a_server_that_is_restarted_fails_no_write_and_no_read(cluster: Cluster, url: str, how: str) -> None:
+    with open_store(url, write=True) as store:
+        note(store, 1)
+        cluster.stop(how=how)
+        starting = threading.Thread(target=cluster.start)
+        starting.start()
+        try:
+            note(store, 2)
+            assert subjects(store) == ["row 1", "row 2"]
+        finally:
+            starting.join()
+
+
+def test_a_campaign_goes_on_while_its_server_is_restarted(
+    cluster: Cluster, url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from labctl.store.repositories.campaign_journal import StoreJournal
+
+    restarts: list[str] = []
+    before = StoreJournal.dataset_closed
+
+    def restart_first(self: StoreJournal, dataset: int, *args: Any) -> None:
+        if dataset in {2, 5}:
+            how = "immediate" if dataset == 2 else "fast"
+            cluster.stop(how=how)
+            cluster.start()
+            restarts.append(how)
+        before(self, dataset, *args)
+
+    monkeypatch.setattr(StoreJournal, "dataset_closed", restart_first)
+    ended = run_here(url, StartRequest(recipe="short", bench="single-axis-sim"))
+    assert (ended.state, restarts) == ("done", ["immediate", "fast"]), ended.reason
+    with open_store(url, write=False) as store:
+        sets = store.recordings.points(1).columns
+        assert len(sets["n"]) == 15
+        assert len(set(sets["dataset"].tolist())) == 15
+        assert store.audit.first_broken() is None
+
+
+class _LostCommit:
+    """A connection that is lost at the next commit, before or after the server has made it."""
+
+    def __init__(self, store: Store, *, kept: bool) -> None:
+        self._dialect = store.audit._database._engine.dialect
+        self._commit: Callable[[Any], None] = self._dialect.do_commit
+        self._kept, self.lost = kept, 0
+
+    def __call__(self, connection: Any) -> None:
+        if self.lost:
+            self._commit(connection)
+            return
+        self.lost += 1
+        if self._kept:
+            self._commit(connection)
+        connection.driver_connection.close()
+        raise psycopg.OperationalError("the connection is lost")
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_commit_that_was_not_answered_is_made_once(url: str, monkeypatch: pytest.MonkeyPatch, kept: bool) -> None:
+    with open_store(url, write=True) as store:
+        losing = _LostCommit(store, kept=kept)
+        monkeypatch.setattr(store.audit._database._engine.dialect, "do_commit", losing)
+        note(store, 1)
+        assert losing.lost == 1
+        assert subjects(store) == ["row 1"]
+
+
+def test_a_server_that_stays_away_is_told(cluster: Cluster, url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(postgresql_server, "WRITER_PATIENCE_S", 0.2)
+    with open_store(url, write=True) as store:
+        cluster.stop()
+        try:
+            with pytest.raises(DatabaseUnreachable, match=r"does not answer .*nothing of this act was kept"):
+                note(store, 1)
+            with pytest.raises(DatabaseUnreachable):
+                subjects(store)
+        finally:
+            cluster.start()
+        note(store, 2)
+        assert subjects(store) == ["row 2"]
+
+
+def opened(url: str, monkeypatch: pytest.MonkeyPatch, **limits: float) -> Store:
+    """Open the database with limits of its own."""
+    with monkeypatch.context() as changed:
+        for name, limit in limits.items():
+            changed.setattr(postgresql_server, name, limit)
+        return Store(Database(url, write=True))
+
+
+def test_a_writer_that_hangs_is_told_and_then_ended_by_the_server(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    hasty, patient = opened(url, monkeypatch, LOCK_TIMEOUT_S=0.2), opened(url, monkeypatch)
+    hanging = opened(url, monkeypatch, IDLE_TIMEOUT_S=3)
+
+    def hang() -> None:
+        with hanging.audit._database.writing():
+            with pytest.raises(StoreError, match=r"no turn to write within .*another process has it"):
+                note(hasty, 1)
+            note(patient, 2)
+
+    with pytest.raises(StoreError, match="does not answer"):
+        hang()
+    assert subjects(patient) == ["row 2"]
+    for store in (hasty, patient, hanging):
+        store.close()

@@ -1,0 +1,81 @@
+"""Services on one PostgreSQL server: one driver for each bench, commands that find it, and deaths of either side."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from labctl.store import open_store
+from studies.postgresql_cluster import Cluster
+from tests.helpers.postgresql import running_cluster
+from tests.helpers.processes import ServiceProcess, end_of, running
+
+pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Cluster]:
+    with running_cluster() as made:
+        yield made
+
+
+@pytest.fixture
+def service(cluster: Cluster) -> Iterator[ServiceProcess]:
+    with running(cluster.new_database(), "--speed", "100") as made:
+        yield made
+
+
+def begin(service: ServiceProcess) -> int:
+    campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
+    assert isinstance(campaign, int)
+    return campaign
+
+
+def test_a_second_service_on_the_bench_is_refused_and_leaves_its_campaign_alone(service: ServiceProcess) -> None:
+    campaign = begin(service)
+    refused = service.run("serve", "--bench", "single-axis-sim", "--port", "0", status=2)
+    assert service.url in refused.stderr
+    assert service.http.get(f"/api/campaigns/{campaign}").json()["state"] == "running"
+
+
+def test_commands_about_a_bench_go_to_the_service_that_drives_it(service: ServiceProcess) -> None:
+    started = json.loads(service.run("campaign", "start", "short", "--json").stdout)
+    assert json.loads(service.run("campaign", "status", "--json").stdout)["state"] in {"planned", "running"}
+    answer = json.loads(service.run("campaign", "abort", str(started["id"]), "--reason", "tea", "--json").stdout)
+    assert (answer["state"], "tea" in answer["reason"]) == ("aborted", True)
+    with open_store(service.database, write=False) as store:
+        assert store.benches.unconfirmed("single-axis-sim") == ""
+
+
+def test_another_process_closes_no_campaign_that_a_terminal_runs(service: ServiceProcess) -> None:
+    campaign = begin(service)
+    with open_store(service.database, write=True) as store:
+        store.note_address(store.leases.address)
+        found = store.leases.holder("single-axis-sim")
+        assert found is not None
+        store.leases.note_address(found.machine, found.pid)  # a driver without a service, as a terminal is
+    refused = service.run("campaign", "abort", str(campaign), status=2)
+    assert f"process {service.bench_pid}" in refused.stderr
+    assert service.http.get(f"/api/campaigns/{campaign}").json()["state"] == "running"
+
+
+def test_a_bench_process_that_was_killed_has_an_heir(service: ServiceProcess) -> None:
+    campaign = begin(service)
+    os.kill(service.bench_pid, signal.SIGKILL)
+    ended = service.until_ended(campaign)
+    assert ended["state"] == "done", ended["reason"]
+    with open_store(service.database, write=False) as store:
+        assert "taken_up" in {event.kind for event in store.campaigns.events(campaign)}
+
+
+def test_a_restart_of_the_server_fails_no_campaign(cluster: Cluster, service: ServiceProcess) -> None:
+    campaign = begin(service)
+    cluster.stop()
+    cluster.start()
+    ended = service.until_ended(campaign)
+    assert ended["state"] == "done", ended["reason"]
+    assert end_of(service.database, campaign)[0] == "done"
