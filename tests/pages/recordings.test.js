@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { channelName, channelTitle, channelUnit } from "../../labctl/web/static/js/recordings/channels.js";
 import { recordingFiles } from "../../labctl/web/static/js/recordings/file_input.js";
 import { continuousPieces, envelopeOutline, meanLine } from "../../labctl/web/static/js/recordings/trace_pieces.js";
-import { coefficientColumns } from "../../labctl/web/static/js/unit/coefficient_table.js";
+import { coefficientColumns, isSingle } from "../../labctl/web/static/js/unit/coefficient_table.js";
 
 test("a channel has the name and the unit of its column", () => {
   assert.equal(channelName("table_rate_dps"), "table rate");
@@ -56,11 +56,12 @@ test("of a folder only the files of a recording are taken", () => {
 });
 
 test("coefficients over temperature are columns, single ones are none", () => {
-  const column = { value: [1, 2], u: [0.1, 0.2], unit: "1" };
+  const column = { value: [1, 2], u: [0.1, null], unit: "1" };
+  const rest = { identified: [true, false], at_most: [null, null] };
+  const own = { temperature_c: [20, 40], scale_factor: { ...column, ...rest } };
   const found = { axis: "z", name: "scale_factor", temperature_c: [20, 40], ...column };
-  const own = { temperature_c: [20, 40], scale_factor: column };
-  assert.deepEqual(coefficientColumns({ axes: { z: own } }), [found]);
-  assert.deepEqual(coefficientColumns({ axes: { z: /** @type {any} */ ({ coefficients: own }) } }), [found]);
-  const single = { coefficients: { bias: { value: 1, u: null, unit: "deg/s" } } };
-  assert.deepEqual(coefficientColumns({ axes: { z: single } }), []);
+  assert.deepEqual(coefficientColumns({ axes: { z: { coefficients: own } } }), [found]);
+  const bias = { value: 1, u: null, unit: "deg/s", identified: true, at_most: null };
+  assert.deepEqual(coefficientColumns({ axes: { z: { coefficients: { bias } } } }), []);
+  assert.ok(isSingle(bias) && !isSingle(own.scale_factor) && !isSingle(own.temperature_c) && !isSingle(undefined));
 });

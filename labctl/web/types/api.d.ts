@@ -26,6 +26,7 @@ export type CalibrationRow = Schema<"CalibrationRow">;
 export type Campaign = Schema<"CampaignResponse">;
 export type CampaignPlan = Schema<"CampaignPlanResponse">;
 export type Certification = Schema<"CertificationResponse">;
+export type Comparison = Schema<"ComparisonResponse">;
 export type ComparisonColumns = Schema<"ComparisonColumns">;
 export type DataSets = Schema<"DataSetsResponse">;
 export type Imported = Schema<"ImportResponse">;
@@ -53,34 +54,25 @@ export type CampaignState = Campaign["state"];
 /** The columns of a plan; those of a campaign also say what has been done. */
 export type Timeline = Schema<"TimelineColumns"> & Partial<Schema<"RunColumns">>;
 
-/* What the OpenAPI document leaves open */
+export type Allan = Schema<"AllanResponse">;
+export type AllanAxis = Schema<"AllanJson">;
+export type Bench = Schema<"BenchResponse">;
+export type CampaignEvent = Schema<"EventResponse">;
+export type Coefficient = Schema<"Coefficient">;
+export type CoefficientAxis = Schema<"VersionResponse">["axes"][string];
+export type Criticism = Schema<"CriticismResponse">;
+export type Effect = Schema<"CataloguedEffect">;
+export type Heartbeat = Schema<"HeartbeatResponse">;
+export type NoiseFigure = Schema<"NoiseFigure">;
+export type Preview = Schema<"PreviewResponse">;
+export type ResidualMap = Schema<"ResidualMap">;
+export type Suspect = Schema<"Suspect">;
+export type Version = Schema<"VersionResponse"> | Schema<"ImprovedVersionResponse">;
+export type CoefficientTable = Schema<"CoefficientTable">;
+/** The unit of each output axis. */
+export type Outputs = Record<string, { unit?: string }>;
 
-export interface Bench {
-  name: string;
-  simulated: boolean;
-  units: { serial: string }[];
-  unconfirmed?: string | null;
-  campaign?: number | null;
-  start_questions?: Record<string, string>;
-}
-
-export interface Effect {
-  id: string;
-  term: string;
-  sentence: string;
-  origin: string;
-  rows: string;
-  needs: string[];
-  order: number | null;
-  max_order: number | null;
-  parameters: { name: string; unit: string; low: number; high: number }[];
-  plausible: Record<string, [number, number]>;
-  aliases: string[];
-  experiment: string;
-  draws: string[];
-  unit: string;
-  leaves: boolean;
-}
+/* What is open in the OpenAPI document, because it is open in a recording: its conditions, and its columns by name */
 
 export interface RecordingInfo {
   axes: string[];
@@ -93,132 +85,14 @@ export interface RecordingInfo {
   latitude_deg: number | null;
 }
 
-/** The unit of each output axis. */
-export type Outputs = Record<string, { unit?: string }>;
-
-export interface Recording extends RecordingRow {
-  info: RecordingInfo;
-}
-
-export interface Samples {
-  readings: number;
-  columns: SampleColumns;
-}
-
+export type Recording = Omit<Schema<"RecordingAlone">, "info"> & { info: RecordingInfo };
 /** Columns of equal length by name; most are numbers. */
 export type SampleColumns = Record<string, number[]>;
+export type Samples = Omit<Schema<"SamplesResponse">, "columns"> & { columns: SampleColumns };
 
-export interface Coefficient {
-  value: number;
-  u: number | null;
-  unit: string;
-}
-
-export interface CoefficientTable {
-  temperature_c?: number[];
-  [name: string]: unknown;
-}
-
-export interface CoefficientAxis extends CoefficientTable {
-  coefficients?: Record<string, Coefficient> & CoefficientTable;
-}
-
-export type Version = Omit<Schema<"VersionResponse">, "axes"> & { axes: Record<string, CoefficientAxis> };
-
-export type Preview = Omit<Schema<"PreviewResponse">, "axes" | "plausible" | "left_out"> & {
-  axes: Record<string, CoefficientAxis>;
-  plausible: Record<string, { from: number; to: number; inside: boolean } | undefined>;
-  left_out: { effect: string; origin?: string }[];
-};
-
-export type Comparison = Omit<Schema<"ComparisonResponse">, "left_out"> & { left_out: { effect: string }[] };
-
-export interface Suspect {
-  effect: string;
-  log_bayes_factor: number;
-  share_removed: number;
-  coefficients: Record<string, Record<string, Coefficient>>;
-  coefficients_from: string;
-  physical: boolean | null;
-  rms_after_dps: number | null;
-  heldout_rms_after_dps: number | null;
-  alias_group: string[];
-  explanation: string;
-}
-
-export interface ResidualMap {
-  axis: string;
-  position: string;
-  dataset: number[];
-  rate_level_dps: number[];
-  temperature_level_c: number[];
-  level_width_c: number;
-  over_floor: number[];
-}
-
-export interface DataSetViews {
-  of: number;
-  dataset: number[];
-  position: string[];
-  channels: Record<string, number[]>;
-  residual_dps: Record<string, number[]>;
-  over_floor: Record<string, number[]>;
-}
-
-export type Criticism = Omit<
-  Schema<"CriticismResponse">,
-  "error" | "noise" | "suspects" | "experiments" | "not_testable" | "views"
-> & {
-  error: { rms_dps: number; heldout_rms_dps: number | null; noise_floor_dps: number };
-  noise: { drift_dps: number | null; vs_datasheet: number | null };
-  suspects: Suspect[];
-  experiments: { do: string; hours?: number | null; separates: string[]; power: number; toml?: string | null }[];
-  not_testable: { effect: string; why: string; needs: string[] }[];
-  maps: ResidualMap[];
-  views: { sets: DataSetViews };
-};
-
-/** The Allan deviation of an axis, as columns of equal length, and its figures. */
-export type AllanAxis = Record<"tau_s" | "deviation_dps" | "low_dps" | "high_dps" | "model_dps", number[]> &
-  Partial<Record<"N" | "B" | "K", NoiseFigure | null>>;
-
-export type Allan = Omit<Schema<"AllanResponse">, "axes"> & { axes: Record<string, AllanAxis> };
-
-export interface NoiseFigure {
-  value: number | null;
-  u: number;
-  unit: string;
-  at_most?: number | null;
-  why?: string | null;
-}
-
-export interface CampaignEvent {
-  at: string;
-  t_s: number;
-  level: string;
-  message: string;
-  device?: string | null;
-  value?: number | null;
-  limit?: number | null;
-  unit?: string | null;
-}
-
-export interface Heartbeat {
-  heard_s?: number | null;
-}
-
-/** Answers that the OpenAPI document does not describe, or only in part, by method and path. */
 interface Untyped {
-  "get /health/heartbeat": Heartbeat;
-  "get /api/benches": Bench[];
-  "get /api/effects": { effects: Effect[] };
   "get /api/recordings/{recording}": Recording;
-  "get /api/recordings/{recording}/allan": Allan;
   "get /api/recordings/{recording}/samples": Samples;
-  "get /api/units/{serial}/calibrations/{version}": Version;
-  "get /api/units/{serial}/calibrations/{version}/comparison": Comparison;
-  "get /api/units/{serial}/calibrations/{version}/criticism": Criticism;
-  "post /api/units/{serial}/calibrations/{version}/preview": Preview;
 }
 
 /** Messages of the event streams: the data of each event by its name. */

@@ -1107,8 +1107,29 @@ export interface components {
              * @description What a person does next.
              */
             next: string;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * AllanJson
+         * @description The overlapping Allan deviation of an axis with its 95 % interval, the sum of the terms, and the figures.
+         */
+        AllanJson: {
+            /** Tau S */
+            tau_s: (number | null)[];
+            /** Deviation Dps */
+            deviation_dps: (number | null)[];
+            /** Low Dps */
+            low_dps: (number | null)[];
+            /** High Dps */
+            high_dps: (number | null)[];
+            /** Model Dps */
+            model_dps: (number | null)[];
+            N: components["schemas"]["NoiseFigure"];
+            B: components["schemas"]["NoiseFigure"];
+            K: components["schemas"]["NoiseFigure"];
+            /** Trend Dps */
+            trend_dps: number | null;
+            /** Replaces Datasheet */
+            replaces_datasheet: boolean;
         };
         /**
          * AllanResponse
@@ -1131,12 +1152,38 @@ export interface components {
              * @description tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K.
              */
             axes: {
-                [key: string]: {
-                    [key: string]: unknown;
-                };
+                [key: string]: components["schemas"]["AllanJson"];
             };
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * AngleLine
+         * @description A wave in the table angle: whole cycles per turn, and its amplitude.
+         */
+        AngleLine: {
+            /** Cycles Per Turn */
+            cycles_per_turn: number;
+            /** Amplitude Dps */
+            amplitude_dps: number | null;
+        };
+        /**
+         * AngleSpectrum
+         * @description Power of waves in the table angle over white noise, the limit of chance, and the lines above it.
+         */
+        AngleSpectrum: {
+            /** Axis */
+            axis: string;
+            /** Datasets */
+            datasets: number;
+            /** Cycles Per Turn */
+            cycles_per_turn: number[];
+            /** Over White */
+            over_white: (number | null)[];
+            /** Limit */
+            limit: (number | null)[];
+            /** Lines */
+            lines: components["schemas"]["AngleLine"][];
+            /** Stepper Lines */
+            stepper_lines: components["schemas"]["AngleLine"][];
         };
         /**
          * AssessmentResponse
@@ -1179,8 +1226,6 @@ export interface components {
             least_reason_characters: number;
             /** Least Reason Words */
             least_reason_words: number;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * AttendanceResponse
@@ -1221,8 +1266,6 @@ export interface components {
              * @description The next start with fewer of them at night.
              */
             better_start: string | null;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * AuditResponse
@@ -1242,14 +1285,41 @@ export interface components {
             action: string;
             /** Subject */
             subject: string;
-            /** Detail */
+            /**
+             * Detail
+             * @description What belongs to the act; its keys depend on `action`.
+             */
             detail: {
-                [key: string]: unknown;
+                [key: string]: components["schemas"]["JsonValue"];
             };
             /** Hash */
             hash: string;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * AxisCoefficients
+         * @description The coefficients of one output axis, by name.
+         */
+        AxisCoefficients: {
+            /** Coefficients */
+            coefficients: {
+                [key: string]: components["schemas"]["Coefficient"] | components["schemas"]["CoefficientTable"] | number[];
+            };
+        };
+        /**
+         * AxisNoiseJson
+         * @description The noise that weighted one axis of a fit.
+         */
+        AxisNoiseJson: {
+            /** White Dps */
+            white_dps: number | null;
+            /** Drift Dps */
+            drift_dps: number;
+            /** Drift Tau S */
+            drift_tau_s: number | null;
+            /** Per Rate */
+            per_rate: number;
+            /** Covariance Scale */
+            covariance_scale: number | null;
         };
         /**
          * AxisUncertainty
@@ -1298,8 +1368,6 @@ export interface components {
             unknown: {
                 [key: string]: string;
             };
-        } & {
-            [key: string]: unknown;
         };
         /**
          * AxisVerification
@@ -1312,8 +1380,6 @@ export interface components {
             max_dps: number;
             /** Bias Dps */
             bias_dps: number;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * BackupNote
@@ -1326,6 +1392,73 @@ export interface components {
             bytes: number;
             /** Sha256 */
             sha256: string;
+        };
+        /**
+         * BenchDescription
+         * @description A bench and what it is doing.
+         */
+        BenchDescription: {
+            /** Name */
+            name: string;
+            /** Simulated */
+            simulated: boolean;
+            /** Latitude Deg */
+            latitude_deg: number | null;
+            /** Units */
+            units: components["schemas"]["BenchUnit"][];
+            /**
+             * Campaign
+             * @description The campaign that runs now.
+             */
+            campaign: number | null;
+            /**
+             * Unconfirmed
+             * @description What its last safe state could not confirm; empty when all is well.
+             */
+            unconfirmed: string;
+            /**
+             * Heard S
+             * @description How long ago the process that drives it was last heard of, s; 0: it is this one.
+             * @default 0
+             */
+            heard_s: number;
+        };
+        /**
+         * BenchResponse
+         * @description The bench of a service, and what a person is asked before a campaign starts there.
+         */
+        BenchResponse: {
+            /** Name */
+            name: string;
+            /** Simulated */
+            simulated: boolean;
+            /** Latitude Deg */
+            latitude_deg: number | null;
+            /** Units */
+            units: components["schemas"]["BenchUnit"][];
+            /**
+             * Campaign
+             * @description The campaign that runs now.
+             */
+            campaign: number | null;
+            /**
+             * Unconfirmed
+             * @description What its last safe state could not confirm; empty when all is well.
+             */
+            unconfirmed: string;
+            /**
+             * Heard S
+             * @description How long ago the process that drives it was last heard of, s; 0: it is this one.
+             * @default 0
+             */
+            heard_s: number;
+            /**
+             * Start Questions
+             * @description Check -> question; empty for a simulated bench.
+             */
+            start_questions: {
+                [key: string]: string;
+            };
         };
         /**
          * BenchStatus
@@ -1365,8 +1498,32 @@ export interface components {
              * @description Campaigns that no process runs any more and nobody has ended.
              */
             left: string[];
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * BenchUnit
+         * @description A unit on a bench.
+         */
+        BenchUnit: {
+            /** Name */
+            name: string;
+            /** Serial */
+            serial: string;
+            /** Driver */
+            driver: string;
+        };
+        /**
+         * BetweenSets
+         * @description The amplitude of waves in the mean residuals by cycles per hour, and what noise alone gives, deg/s.
+         */
+        BetweenSets: {
+            /** Axis */
+            axis: string;
+            /** Per Hour */
+            per_hour: (number | null)[];
+            /** Amplitude Dps */
+            amplitude_dps: (number | null)[];
+            /** Noise Dps */
+            noise_dps: (number | null)[];
         };
         /** Body_import_recording_api_recordings_post */
         Body_import_recording_api_recordings_post: {
@@ -1399,8 +1556,6 @@ export interface components {
             rms_dps: number | null;
             /** Heldout Rms Dps */
             heldout_rms_dps: number | null;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * CampaignPlanResponse
@@ -1418,8 +1573,7 @@ export interface components {
             text: string;
             /** Bench */
             bench: string;
-            /** State */
-            state: string;
+            state: components["schemas"]["CampaignState"];
             /** Schedule Hash */
             schedule_hash: string;
             /** Steps */
@@ -1429,8 +1583,6 @@ export interface components {
             /** Expected S */
             expected_s: number;
             timeline: components["schemas"]["RunColumns"];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * CampaignRequest
@@ -1502,8 +1654,7 @@ export interface components {
             recipe: string;
             /** Bench */
             bench: string;
-            /** State */
-            state: string;
+            state: components["schemas"]["CampaignState"];
             /**
              * Reason
              * @default
@@ -1598,6 +1749,16 @@ export interface components {
             /** @description Of a failed campaign. */
             advice: components["schemas"]["AdviceResponse"] | null;
             /**
+             * Ended
+             * @description Over: nothing happens any more unless a person resumes it.
+             */
+            ended: boolean;
+            /**
+             * Active
+             * @description A process has it in hand: planned, running, paused or waiting, and not abandoned.
+             */
+            active: boolean;
+            /**
              * Resumable
              * @description Whether `resume` would be accepted here now; null in lists.
              */
@@ -1608,8 +1769,63 @@ export interface components {
              * @default
              */
             resume_reason: string;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * CampaignState
+         * @description Where a campaign is in its life.
+         * @enum {string}
+         */
+        CampaignState: "planned" | "running" | "paused" | "waiting" | "interrupted" | "done" | "aborted" | "failed";
+        /**
+         * CatalogueResponse
+         * @description Every effect that a model can be made of, and every model that a fit can be asked for by name.
+         */
+        CatalogueResponse: {
+            /** Effects */
+            effects: components["schemas"]["CataloguedEffect"][];
+            /** Models */
+            models: components["schemas"]["PresetJson"][];
+        };
+        /**
+         * CataloguedEffect
+         * @description The same, with the unit of its plausible sizes, and whether a calibration is exported with it.
+         */
+        CataloguedEffect: {
+            /** Id */
+            id: string;
+            /** Term */
+            term: string;
+            /** Sentence */
+            sentence: string;
+            /**
+             * Origin
+             * @enum {string}
+             */
+            origin: "sensor" | "package" | "fixture" | "bench" | "environment";
+            /** Rows */
+            rows: string;
+            /** Needs */
+            needs: string[];
+            /** Order */
+            order: number | null;
+            /** Max Order */
+            max_order: number | null;
+            /** Parameters */
+            parameters: components["schemas"]["ParameterJson"][];
+            /** Plausible */
+            plausible: {
+                [key: string]: number[];
+            };
+            /** Aliases */
+            aliases: string[];
+            /** Experiment */
+            experiment: string;
+            /** Draws */
+            draws: string[];
+            /** Unit */
+            unit: string;
+            /** Leaves */
+            leaves: boolean;
         };
         /**
          * CertificationResponse
@@ -1666,8 +1882,6 @@ export interface components {
             override: boolean | null;
             /** Objections */
             objections: components["schemas"]["Objection"][];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * CertifiedErrors
@@ -1682,8 +1896,6 @@ export interface components {
             heldout_rms_dps: number | null;
             /** Noise Floor Dps */
             noise_floor_dps: number | null;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * CertifyRequest
@@ -1715,8 +1927,28 @@ export interface components {
             mean: (number | null)[];
             /** Std */
             std: (number | null)[];
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * ChannelLine
+         * @description The same against one channel; against the table's rate, for one position.
+         */
+        ChannelLine: {
+            /** Axis */
+            axis: string;
+            /** Channel */
+            channel: string;
+            /** Position */
+            position: string;
+            /** At */
+            at: (number | null)[];
+            /** Mean Dps */
+            mean_dps: (number | null)[];
+            /** Low Dps */
+            low_dps: (number | null)[];
+            /** High Dps */
+            high_dps: (number | null)[];
+            /** Z */
+            z: number | null;
         };
         /**
          * ClearRequest
@@ -1730,6 +1962,40 @@ export interface components {
              * @default looked at the bench
              */
             reason?: string;
+        };
+        /**
+         * Coefficient
+         * @description One number with its standard uncertainty `u`; null where there were no more data sets than coefficients.
+         *
+         *     A root of an estimated square is `identified` or not; where it is not, `at_most` is its 95 % bound.
+         */
+        Coefficient: {
+            /** Value */
+            value: number;
+            /** U */
+            u: number | null;
+            /** Identified */
+            identified: boolean;
+            /** At Most */
+            at_most: number | null;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * CoefficientTable
+         * @description The same at each node of a temperature table.
+         */
+        CoefficientTable: {
+            /** Value */
+            value: number[];
+            /** U */
+            u: (number | null)[];
+            /** Identified */
+            identified: boolean[];
+            /** At Most */
+            at_most: (number | null)[];
+            /** Unit */
+            unit: string;
         };
         /**
          * ComparisonColumns
@@ -1792,8 +2058,6 @@ export interface components {
              * @description The same after the calibration.
              */
             turn_after_deg: (number | null)[];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * ComparisonResponse
@@ -1825,11 +2089,9 @@ export interface components {
             };
             /**
              * Left Out
-             * @description Effects of the fit that do not leave with the calibration.
+             * @description Effects of the fit that are not exported with the calibration.
              */
-            left_out: {
-                [key: string]: unknown;
-            }[];
+            left_out: components["schemas"]["LeftOut"][];
             /**
              * Least Turn Rate Dps
              * @description The error per turn is given from this rate on.
@@ -1851,8 +2113,6 @@ export interface components {
              * @description A line over temperature for each level of the table rate.
              */
             over_temperature: components["schemas"]["ModelLines"][];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * ConfirmRequest
@@ -1876,6 +2136,39 @@ export interface components {
             reason?: string;
         };
         /**
+         * CriticisedErrors
+         * @description RMS errors of the model refitted, deg/s; `explained`: share of the raw excess chi2 that the model explains.
+         */
+        CriticisedErrors: {
+            /** Rms Dps */
+            rms_dps: number | null;
+            /** Heldout Rms Dps */
+            heldout_rms_dps: number | null;
+            /** Noise Floor Dps */
+            noise_floor_dps: number | null;
+            /** Noise Floor Source */
+            noise_floor_source: string;
+            /** Explained */
+            explained: number | null;
+            /** Direct Form Rms Dps */
+            direct_form_rms_dps: number | null;
+        };
+        /**
+         * CriticisedNoise
+         * @description Noise of the recording; `vs_datasheet`: the drift over what the data sheet lets expect.
+         */
+        CriticisedNoise: {
+            /** White Dps */
+            white_dps: number | null;
+            /** Drift Dps */
+            drift_dps: number | null;
+            /** Drift Tau S */
+            drift_tau_s: number | null;
+            /** Vs Datasheet */
+            vs_datasheet: number | null;
+            static: components["schemas"]["StaticRecordJson"] | null;
+        };
+        /**
          * CriticismResponse
          * @description A model held against a recording: the verdict in one of five forms, and what it stands on.
          */
@@ -1896,29 +2189,16 @@ export interface components {
              * @description The verdict in words, the answer first.
              */
             text: string[];
-            /** Error */
-            error: {
-                [key: string]: unknown;
-            };
-            /** Noise */
-            noise: {
-                [key: string]: unknown;
-            };
-            /** Lack Of Fit */
-            lack_of_fit: {
-                [key: string]: number | null;
-            };
+            error: components["schemas"]["CriticisedErrors"];
+            noise: components["schemas"]["CriticisedNoise"];
+            lack_of_fit: components["schemas"]["LackOfFit"];
             /**
              * Where
              * @description Ranges of channels in which the residual is far from 0.
              */
-            where: {
-                [key: string]: unknown;
-            }[];
+            where: components["schemas"]["FailingRange"][];
             /** Suspects */
-            suspects: {
-                [key: string]: unknown;
-            }[];
+            suspects: components["schemas"]["Suspect"][];
             /**
              * Named
              * @description The effects that the verdict stands on.
@@ -1929,14 +2209,50 @@ export interface components {
              * @description Channels that the residual hangs on, strongest first.
              */
             depends_on: string[];
+            /**
+             * Confounded With
+             * @description Channels that this schedule cannot tell from the first of `depends_on`.
+             */
+            confounded_with: string[];
+            /** @description What remains beside all that was named. */
+            remainder: components["schemas"]["Remainder"] | null;
+            /**
+             * Not Physical
+             * @description Effects that look alike in these data, at a size that the unit cannot have.
+             */
+            not_physical: string[];
+            /**
+             * Named Axes
+             * @description Effect -> the axes on which it was found.
+             */
+            named_axes: {
+                [key: string]: string[];
+            };
+            /**
+             * Further
+             * @description What could be tried beside an adequate model; effects that are alike in one.
+             */
+            further: string[][];
             /** Not Testable */
-            not_testable: {
-                [key: string]: unknown;
-            }[];
+            not_testable: components["schemas"]["NotTestable"][];
             /** Experiments */
-            experiments: {
-                [key: string]: unknown;
-            }[];
+            experiments: components["schemas"]["Experiment"][];
+            /**
+             * Worst
+             * @description Data sets furthest from the model.
+             */
+            worst: components["schemas"]["WorstDataSet"][];
+            /**
+             * Maps
+             * @description Residual over floor in rate x temperature.
+             */
+            maps: components["schemas"]["ResidualMap"][];
+            /**
+             * Readings Left Out
+             * @description Readings far outside their data set.
+             * @default 0
+             */
+            readings_left_out: number;
             /**
              * Warnings
              * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
@@ -1944,15 +2260,38 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /** @description The version as it is on this recording; everything else is of a refit to it. */
             applied: components["schemas"]["VerificationResponse"] | null;
-            /**
-             * Views
-             * @description Where and how the model fails, as numbers for pictures, by view.
-             */
-            views: {
-                [key: string]: unknown;
+            /** @description Where and how the model fails, as numbers for pictures, by view. */
+            views: components["schemas"]["Views"];
+        };
+        /**
+         * DataSetColumns
+         * @description The data sets one by one, as columns of equal length; `of`: how many the recording has.
+         *
+         *     Where no time is known (`timed`), the channel `order` counts the data sets from 1. Empty without any axis.
+         */
+        DataSetColumns: {
+            /** Of */
+            of: number;
+            /** Timed */
+            timed: boolean;
+            /** Dataset */
+            dataset: number[];
+            /** Position */
+            position: string[];
+            /** Run */
+            run: number[];
+            /** Channels */
+            channels: {
+                [key: string]: (number | null)[];
             };
-        } & {
-            [key: string]: unknown;
+            /** Residual Dps */
+            residual_dps: {
+                [key: string]: (number | null)[];
+            };
+            /** Over Floor */
+            over_floor: {
+                [key: string]: (number | null)[];
+            };
         };
         /**
          * DataSetsResponse
@@ -1994,8 +2333,6 @@ export interface components {
             channels: {
                 [key: string]: components["schemas"]["ChannelColumns"];
             };
-        } & {
-            [key: string]: unknown;
         };
         /**
          * DataWarning
@@ -2033,8 +2370,6 @@ export interface components {
              * @description All of it as one sentence.
              */
             text: string;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * ErrorFigures
@@ -2061,8 +2396,53 @@ export interface components {
              * @description Root of the mean variance of a data-set mean: white and drift.
              */
             noise_floor_dps: number | null;
-        } & {
-            [key: string]: unknown;
+            /**
+             * Noise Floor Source
+             * @description What the noise floor was found from.
+             * @default none
+             */
+            noise_floor_source: string;
+        };
+        /**
+         * EventResponse
+         * @description Something that happened in a campaign.
+         */
+        EventResponse: {
+            /** Id */
+            id: number;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** T S */
+            t_s: number;
+            /** Kind */
+            kind: string;
+            /**
+             * Level
+             * @enum {string}
+             */
+            level: "info" | "warning" | "error";
+            /** Message */
+            message: string;
+            /**
+             * Device
+             * @description The instrument or unit that it is about.
+             */
+            device: string | null;
+            /**
+             * Value
+             * @description What was measured, in `unit`.
+             */
+            value: number | null;
+            /**
+             * Limit
+             * @description Which limit it was held against, in `unit`.
+             */
+            limit: number | null;
+            /** Unit */
+            unit: string | null;
         };
         /**
          * ExampleRequest
@@ -2074,6 +2454,28 @@ export interface components {
              * @description osu-fog: a real fibre-optic gyro; weiss-gyrostar: a published table.
              */
             name: string;
+        };
+        /**
+         * Experiment
+         * @description A changed recipe that would separate effects which the recording cannot.
+         */
+        Experiment: {
+            /** Separates */
+            separates: string[];
+            /** Do */
+            do: string;
+            /** Recipe */
+            recipe: {
+                [key: string]: components["schemas"]["JsonValue"];
+            };
+            /** Toml */
+            toml: string;
+            /** Power */
+            power: number;
+            /** Hours */
+            hours: number;
+            /** Per Hour */
+            per_hour: number;
         };
         /**
          * ExportFormatResponse
@@ -2092,8 +2494,41 @@ export interface components {
              * @description Of a file name, without the dot.
              */
             suffix: string;
-        } & {
-            [key: string]: unknown;
+        };
+        /** FailingRange */
+        FailingRange: {
+            /** Axis */
+            axis: string;
+            /** Channel */
+            channel: string;
+            /** From */
+            from: number;
+            /** To */
+            to: number;
+            /** Rms Dps */
+            rms_dps: number;
+            /** Z */
+            z: number;
+        };
+        /**
+         * FitEnvironment
+         * @description Which thermometer a fit went by, and how the Earth's rate was treated.
+         */
+        FitEnvironment: {
+            /** Temperature */
+            temperature: string;
+            /** Earth Rate */
+            earth_rate: string;
+            /** Latitude Deg */
+            latitude_deg: number;
+            /** Along Table Axis Dps */
+            along_table_axis_dps: number;
+            /** Once Per Turn Dps */
+            once_per_turn_dps: {
+                [key: string]: number[];
+            };
+            /** Once Per Turn Expected Dps */
+            once_per_turn_expected_dps: number;
         };
         /**
          * FitRequest
@@ -2129,15 +2564,13 @@ export interface components {
         FitResponse: {
             /** Serial */
             serial: string;
-            /** Version */
-            version: number;
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
              * @description axis -> coefficients with value, standard uncertainty u, and unit.
              */
             axes: {
-                [key: string]: unknown;
+                [key: string]: components["schemas"]["AxisCoefficients"];
             };
             error: components["schemas"]["ErrorFigures"];
             validity: components["schemas"]["Validity"];
@@ -2146,13 +2579,110 @@ export interface components {
              * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
              */
             warnings: components["schemas"]["DataWarning"][];
-        } & {
-            [key: string]: unknown;
+            /**
+             * Noise
+             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             */
+            noise: {
+                [key: string]: components["schemas"]["AxisNoiseJson"];
+            };
+            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            environment: components["schemas"]["FitEnvironment"];
+            /**
+             * Reference Temperature C
+             * @description Temperature terms are centred on it.
+             */
+            reference_temperature_c: number | null;
+            /**
+             * Recording
+             * @description The recording that it was fitted to.
+             */
+            recording: number | null;
+            /** Version */
+            version: number;
+            /**
+             * Campaign
+             * @description The campaign of the recording; null: it was imported.
+             */
+            campaign: number | null;
+            /** Recipe */
+            recipe: string | null;
+            /** Bench */
+            bench: string | null;
+            /**
+             * Hash
+             * @description SHA-256 of the calibration file.
+             */
+            hash: string;
+        };
+        /**
+         * FrequencySpectrum
+         * @description Power of waves in time within data sets over white noise, by frequency in Hz, and the limit of chance.
+         */
+        FrequencySpectrum: {
+            /** Axis */
+            axis: string;
+            /** Datasets */
+            datasets: number;
+            /** Hz */
+            hz: (number | null)[];
+            /** Over White */
+            over_white: (number | null)[];
+            /** Limit */
+            limit: (number | null)[];
         };
         /** HTTPValidationError */
         HTTPValidationError: {
             /** Detail */
             detail?: components["schemas"]["ValidationError"][];
+        };
+        /**
+         * HealthResponse
+         * @description Whether the service is well: its database, its bench and its schedule.
+         */
+        HealthResponse: {
+            /**
+             * Status
+             * @enum {string}
+             */
+            status: "ok" | "look at the bench";
+            /** Version */
+            version: string;
+            /**
+             * Database
+             * @description Name of the file, without folder, or of the database.
+             */
+            database: string;
+            /**
+             * Since
+             * @description When the service was started, ISO 8601, UTC.
+             */
+            since: string;
+            bench: components["schemas"]["BenchDescription"] | null;
+            /**
+             * Schedule Trouble
+             * @description Why the schedule could not be looked at; empty when all is well.
+             */
+            schedule_trouble: string;
+        };
+        /**
+         * HeartbeatResponse
+         * @description What every open page asks once a second.
+         */
+        HeartbeatResponse: {
+            /**
+             * Status
+             * @default ok
+             * @constant
+             */
+            status: "ok";
+            /** Version */
+            version: string;
+            /**
+             * Heard S
+             * @description How long ago the process that drives the bench was last heard of, s.
+             */
+            heard_s: number;
         };
         /**
          * ImportResponse
@@ -2178,8 +2708,6 @@ export interface components {
              * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
              */
             warnings: components["schemas"]["DataWarning"][];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * ImproveRequest
@@ -2219,6 +2747,161 @@ export interface components {
             accept_warnings?: boolean;
         };
         /**
+         * ImproveResponse
+         * @description The version that a change of effects made, as `labctl improve --json` and `POST .../improve` give it.
+         */
+        ImproveResponse: {
+            /** Serial */
+            serial: string;
+            model: components["schemas"]["ModelResponse"];
+            /**
+             * Axes
+             * @description axis -> coefficients with value, standard uncertainty u, and unit.
+             */
+            axes: {
+                [key: string]: components["schemas"]["AxisCoefficients"];
+            };
+            error: components["schemas"]["ErrorFigures"];
+            validity: components["schemas"]["Validity"];
+            /**
+             * Warnings
+             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             */
+            warnings: components["schemas"]["DataWarning"][];
+            /**
+             * Noise
+             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             */
+            noise: {
+                [key: string]: components["schemas"]["AxisNoiseJson"];
+            };
+            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            environment: components["schemas"]["FitEnvironment"];
+            /**
+             * Reference Temperature C
+             * @description Temperature terms are centred on it.
+             */
+            reference_temperature_c: number | null;
+            /**
+             * Recording
+             * @description The recording that it was fitted to.
+             */
+            recording: number | null;
+            /**
+             * Improved From
+             * @description The version that was changed.
+             */
+            improved_from: number;
+            /** @description Errors of the version that was changed, fitted to the same recording. */
+            before: components["schemas"]["ErrorFigures"];
+            /**
+             * Plausible
+             * @description Effect -> the usual range, and whether it is inside.
+             */
+            plausible: {
+                [key: string]: components["schemas"]["UsualRange"];
+            };
+            /**
+             * Left Out
+             * @description Effects of the fit that are not exported with the calibration.
+             */
+            left_out: components["schemas"]["LeftOut"][];
+            /** Version */
+            version: number;
+            /** Parent */
+            parent: number;
+            /**
+             * Hash
+             * @description SHA-256 of the calibration file.
+             */
+            hash: string;
+        };
+        /**
+         * ImprovedVersionResponse
+         * @description A calibration version that a change of effects made, and whether it is in force.
+         */
+        ImprovedVersionResponse: {
+            /** Serial */
+            serial: string;
+            model: components["schemas"]["ModelResponse"];
+            /**
+             * Axes
+             * @description axis -> coefficients with value, standard uncertainty u, and unit.
+             */
+            axes: {
+                [key: string]: components["schemas"]["AxisCoefficients"];
+            };
+            error: components["schemas"]["ErrorFigures"];
+            validity: components["schemas"]["Validity"];
+            /**
+             * Warnings
+             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             */
+            warnings: components["schemas"]["DataWarning"][];
+            /**
+             * Noise
+             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             */
+            noise: {
+                [key: string]: components["schemas"]["AxisNoiseJson"];
+            };
+            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            environment: components["schemas"]["FitEnvironment"];
+            /**
+             * Reference Temperature C
+             * @description Temperature terms are centred on it.
+             */
+            reference_temperature_c: number | null;
+            /**
+             * Recording
+             * @description The recording that it was fitted to.
+             */
+            recording: number | null;
+            /**
+             * Improved From
+             * @description The version that was changed.
+             */
+            improved_from: number;
+            /** @description Errors of the version that was changed, fitted to the same recording. */
+            before: components["schemas"]["ErrorFigures"];
+            /**
+             * Plausible
+             * @description Effect -> the usual range, and whether it is inside.
+             */
+            plausible: {
+                [key: string]: components["schemas"]["UsualRange"];
+            };
+            /**
+             * Left Out
+             * @description Effects of the fit that are not exported with the calibration.
+             */
+            left_out: components["schemas"]["LeftOut"][];
+            /** Version */
+            version: number;
+            /** Parent */
+            parent: number;
+            /**
+             * Hash
+             * @description SHA-256 of the calibration file.
+             */
+            hash: string;
+            /**
+             * Created At
+             * Format: date-time
+             */
+            created_at: string;
+            /** In Force */
+            in_force: boolean;
+            /**
+             * Due
+             * @description Until when it is in force as certified; null: no date.
+             */
+            due: string | null;
+            /** @description The newest act on this version; null: there was none. */
+            certification: components["schemas"]["CertificationResponse"] | null;
+        };
+        JsonValue: unknown;
+        /**
          * KeyRequest
          * @description A key to make.
          */
@@ -2245,8 +2928,16 @@ export interface components {
             created_at: string;
             /** Revoked At */
             revoked_at: string | null;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * LackOfFit
+         * @description Chi2 of the whitened residual over its degrees of freedom, and its p-value.
+         */
+        LackOfFit: {
+            /** Statistic */
+            statistic: number | null;
+            /** P Value */
+            p_value: number | null;
         };
         /**
          * LadderResponse
@@ -2269,8 +2960,6 @@ export interface components {
             others: components["schemas"]["LadderRow"][];
             /** Noise Floor Dps */
             noise_floor_dps: number | null;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * LadderRow
@@ -2303,8 +2992,43 @@ export interface components {
             heldout_rms_dps: number | null;
             /** Noise Floor Dps */
             noise_floor_dps: number | null;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * LeftOut
+         * @description An effect of a fit that is not exported with its calibration, because it does not belong to the unit.
+         */
+        LeftOut: {
+            /** Effect */
+            effect: string;
+            /**
+             * Origin
+             * @enum {string}
+             */
+            origin: "sensor" | "package" | "fixture" | "bench" | "environment";
+            /** Term */
+            term: string;
+        };
+        /**
+         * LegLine
+         * @description The residual reached from a lower temperature minus that from a higher, deg/s, along a channel.
+         */
+        LegLine: {
+            /** Axis */
+            axis: string;
+            /** Channel */
+            channel: string;
+            /** Pairs */
+            pairs: number;
+            /** At */
+            at: (number | null)[];
+            /** Mean Dps */
+            mean_dps: (number | null)[];
+            /** Low Dps */
+            low_dps: (number | null)[];
+            /** High Dps */
+            high_dps: (number | null)[];
+            /** Z */
+            z: number | null;
         };
         /**
          * ModelLines
@@ -2334,12 +3058,10 @@ export interface components {
             at: number[];
             /** Error Dps */
             error_dps: number[][];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * ModelResponse
-         * @description Which effects a calibration is made of.
+         * @description Which effects a calibration is made of; null: made by an older labctl, which did not say.
          */
         ModelResponse: {
             /** Name */
@@ -2352,8 +3074,15 @@ export interface components {
              * @enum {string}
              */
             argument: "rate" | "output";
-        } & {
-            [key: string]: unknown;
+            /**
+             * Terms
+             * @description The effects with orders and nonlinear parameters.
+             */
+            terms: components["schemas"]["TermJson"][] | null;
+            /** @description How temperature enters. */
+            temperature: components["schemas"]["TemperatureBasisJson"] | null;
+            /** @description What the terms are centred on. */
+            reference: components["schemas"]["ReferenceJson"] | null;
         };
         /**
          * NewKeyResponse
@@ -2372,8 +3101,39 @@ export interface components {
             revoked_at: string | null;
             /** Key */
             key: string;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * NoiseFigure
+         * @description One figure of IEEE Std 952 with its standard uncertainty; without one `at_most` may bound it, `why` says why.
+         */
+        NoiseFigure: {
+            /** Value */
+            value: number | null;
+            /** U */
+            u: number | null;
+            /** Unit */
+            unit: string;
+            /** At Most */
+            at_most: number | null;
+            /** Why */
+            why: string;
+        };
+        /**
+         * NotTestable
+         * @description An effect that the recording cannot show, because a channel is missing or the schedule hides it.
+         */
+        NotTestable: {
+            /** Effect */
+            effect: string;
+            /**
+             * Why
+             * @enum {string}
+             */
+            why: "channel" | "schedule";
+            /** Needs */
+            needs: string[];
+            /** Visible */
+            visible: number;
         };
         /**
          * Objection
@@ -2395,8 +3155,6 @@ export interface components {
              * @description What to do instead of certifying it.
              */
             do: string;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * OutputResponse
@@ -2426,8 +3184,20 @@ export interface components {
              * @description Time of the last reading since the campaign began.
              */
             t_s: number;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * ParameterJson
+         * @description A nonlinear parameter of an effect, and between which values it is searched.
+         */
+        ParameterJson: {
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
         };
         /**
          * PictureResponse
@@ -2447,13 +3217,11 @@ export interface components {
             effects: string[];
             /**
              * Figure
-             * @description Plotly: data and layout.
+             * @description A figure as Plotly describes it: data and layout.
              */
             figure: {
-                [key: string]: unknown;
+                [key: string]: components["schemas"]["JsonValue"];
             };
-        } & {
-            [key: string]: unknown;
         };
         /**
          * PlanRequest
@@ -2523,8 +3291,16 @@ export interface components {
             /** @description When it needs a person; null: the bench turns and switches the units itself. */
             attendance: components["schemas"]["AttendanceResponse"] | null;
             timeline: components["schemas"]["TimelineColumns"];
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * PresetJson
+         * @description A model that a fit can be asked for by name.
+         */
+        PresetJson: {
+            /** Name */
+            name: string;
+            /** Sentence */
+            sentence: string;
         };
         /**
          * PreviewResponse
@@ -2533,20 +3309,15 @@ export interface components {
         PreviewResponse: {
             /** Serial */
             serial: string;
-            /** Improved From */
-            improved_from: number;
-            /** Recording */
-            recording: number;
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
              * @description axis -> coefficients with value, standard uncertainty u, and unit.
              */
             axes: {
-                [key: string]: unknown;
+                [key: string]: components["schemas"]["AxisCoefficients"];
             };
             error: components["schemas"]["ErrorFigures"];
-            before: components["schemas"]["ErrorFigures"];
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
@@ -2554,25 +3325,63 @@ export interface components {
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
+             * Noise
+             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             */
+            noise: {
+                [key: string]: components["schemas"]["AxisNoiseJson"];
+            };
+            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            environment: components["schemas"]["FitEnvironment"];
+            /**
+             * Reference Temperature C
+             * @description Temperature terms are centred on it.
+             */
+            reference_temperature_c: number | null;
+            /**
+             * Recording
+             * @description The recording that it was fitted to.
+             */
+            recording: number | null;
+            /**
+             * Improved From
+             * @description The version that was changed.
+             */
+            improved_from: number;
+            /** @description Errors of the version that was changed, fitted to the same recording. */
+            before: components["schemas"]["ErrorFigures"];
+            /**
              * Plausible
              * @description Effect -> the usual range, and whether it is inside.
              */
             plausible: {
-                [key: string]: {
-                    [key: string]: unknown;
-                };
+                [key: string]: components["schemas"]["UsualRange"];
             };
             /**
              * Left Out
-             * @description Effects that would not leave the house with a calibration.
+             * @description Effects of the fit that are not exported with the calibration.
              */
-            left_out: {
-                [key: string]: unknown;
-            }[];
+            left_out: components["schemas"]["LeftOut"][];
             /** @description What the changed model leaves, data set by data set. */
             residuals: components["schemas"]["ResidualColumns"];
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * PreviousRateLine
+         * @description The same against the rate before.
+         */
+        PreviousRateLine: {
+            /** Axis */
+            axis: string;
+            /** At */
+            at: (number | null)[];
+            /** Mean Dps */
+            mean_dps: (number | null)[];
+            /** Low Dps */
+            low_dps: (number | null)[];
+            /** High Dps */
+            high_dps: (number | null)[];
+            /** Z */
+            z: number | null;
         };
         /**
          * PromptResponse
@@ -2587,8 +3396,20 @@ export interface components {
             text: string;
             /** Position */
             position: string | null;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * PulseResponse
+         * @description What a caller without a key may know: that the service answers, and its version.
+         */
+        PulseResponse: {
+            /**
+             * Status
+             * @default ok
+             * @constant
+             */
+            status: "ok";
+            /** Version */
+            version: string;
         };
         /**
          * ReasonRequest
@@ -2636,8 +3457,38 @@ export interface components {
              * @default
              */
             remark: string;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * RecordingAlone
+         * @description What a recording is, without the means of its data sets.
+         */
+        RecordingAlone: {
+            /** Id */
+            id: number;
+            /** Serial */
+            serial: string;
+            /** Campaign */
+            campaign: number | null;
+            /**
+             * Kind
+             * @description samples, points or coefficients.
+             */
+            kind: string;
+            /**
+             * Info
+             * @description Its `recording.toml`: unit, axes, bench, data sheet, notes.
+             */
+            info: {
+                [key: string]: components["schemas"]["JsonValue"];
+            };
+            /** Created At */
+            created_at: string;
+            /** Simulated Time */
+            simulated_time: boolean;
+            /** Datasets */
+            datasets: number;
+            /** Readings */
+            readings: number;
         };
         /**
          * RecordingResponse
@@ -2678,8 +3529,89 @@ export interface components {
              * @default false
              */
             simulated_time: boolean;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * RecordingWithPoints
+         * @description What a recording is, with the means of its data sets.
+         */
+        RecordingWithPoints: {
+            /** Id */
+            id: number;
+            /** Serial */
+            serial: string;
+            /** Campaign */
+            campaign: number | null;
+            /**
+             * Kind
+             * @description samples, points or coefficients.
+             */
+            kind: string;
+            /**
+             * Info
+             * @description Its `recording.toml`: unit, axes, bench, data sheet, notes.
+             */
+            info: {
+                [key: string]: components["schemas"]["JsonValue"];
+            };
+            /** Created At */
+            created_at: string;
+            /** Simulated Time */
+            simulated_time: boolean;
+            /** Datasets */
+            datasets: number;
+            /** Readings */
+            readings: number;
+            /**
+             * Points
+             * @description Column -> one value per data set, or piece of a long one.
+             */
+            points: {
+                [key: string]: (number | null)[] | number[] | string[] | boolean[];
+            };
+        };
+        /**
+         * ReferenceJson
+         * @description What the terms of a model are centred on.
+         */
+        ReferenceJson: {
+            /** Temperature C */
+            temperature_c: number;
+        };
+        /**
+         * Remainder
+         * @description What remains beside all that was named: its share of the excess chi2, and what it follows.
+         */
+        Remainder: {
+            /** Share */
+            share: number;
+            /** Over Floor */
+            over_floor: number;
+            /** Depends On */
+            depends_on: string[];
+        };
+        /**
+         * Repeats
+         * @description How far data sets at one rate, temperature and position scatter, deg/s; `apart_s` only where times are known.
+         */
+        Repeats: {
+            /** Axis */
+            axis: string;
+            /** Pairs */
+            pairs: number;
+            /** Scatter Dps */
+            scatter_dps: number | null;
+            /** Floor Dps */
+            floor_dps: number | null;
+            /** Over Floor */
+            over_floor: number | null;
+            /** Datasets */
+            datasets: number[][];
+            /** Apart Sets */
+            apart_sets: number[];
+            /** Apart S */
+            apart_s: (number | null)[];
+            /** Difference Dps */
+            difference_dps: (number | null)[];
         };
         /**
          * ResidualColumns
@@ -2732,8 +3664,32 @@ export interface components {
              * @description Residual over floor, as in the map.
              */
             over_floor: (number | null)[];
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * ResidualMap
+         * @description Residual over floor in rate x temperature, one axis in one position: lists of equal length.
+         */
+        ResidualMap: {
+            /** Axis */
+            axis: string;
+            /** Position */
+            position: string;
+            /** Dataset */
+            dataset: number[];
+            /** Table Rate Dps */
+            table_rate_dps: number[];
+            /** Temperature C */
+            temperature_c: number[];
+            /** Rate Level Dps */
+            rate_level_dps: number[];
+            /** Temperature Level C */
+            temperature_level_c: number[];
+            /** Level Width C */
+            level_width_c: number;
+            /** Residual Dps */
+            residual_dps: number[];
+            /** Over Floor */
+            over_floor: number[];
         };
         /**
          * ResidualsResponse
@@ -2747,8 +3703,6 @@ export interface components {
             /** Recording */
             recording: number;
             columns: components["schemas"]["ResidualColumns"];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * ResumeRequest
@@ -2842,8 +3796,25 @@ export interface components {
              * @description When it began, or will if all that is left takes as expected.
              */
             forecast_s: number[];
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * SamplesResponse
+         * @description The readings of one data set.
+         */
+        SamplesResponse: {
+            /** Recording */
+            recording: number;
+            /** Dataset */
+            dataset: number;
+            /** Readings */
+            readings: number;
+            /**
+             * Columns
+             * @description Column -> one value per reading, as many as were asked for.
+             */
+            columns: {
+                [key: string]: (number | null)[] | number[] | string[] | boolean[];
+            };
         };
         /**
          * ScheduledResponse
@@ -2896,8 +3867,6 @@ export interface components {
             confirmed_by: string;
             /** @description When the next start needs a person; null: never, or not known. */
             attendance: components["schemas"]["AttendanceResponse"] | null;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * SimulatedRecordingResponse
@@ -2936,8 +3905,6 @@ export interface components {
             hidden: {
                 [key: string]: number;
             };
-        } & {
-            [key: string]: unknown;
         };
         /**
          * SimulatedRequest
@@ -2973,6 +3940,14 @@ export interface components {
             clip?: boolean;
         };
         /**
+         * StageResponse
+         * @description Of a criticism that is followed: the stage that begins.
+         */
+        StageResponse: {
+            /** Stage */
+            stage: string;
+        };
+        /**
          * StartEventResponse
          * @description What became of one start that fell due.
          */
@@ -2996,8 +3971,42 @@ export interface components {
             message: string;
             /** Campaign */
             campaign: number | null;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * StartProfile
+         * @description The mean course within data sets, deg/s, and the same per deg/s of the step in rate before it.
+         */
+        StartProfile: {
+            /** Axis */
+            axis: string;
+            /** Datasets */
+            datasets: number;
+            /** Since S */
+            since_s: (number | null)[];
+            /** Mean Dps */
+            mean_dps: (number | null)[];
+            /** Band Dps */
+            band_dps: (number | null)[];
+            /** Per Step */
+            per_step: (number | null)[];
+            /** Per Step Band */
+            per_step_band: (number | null)[];
+        };
+        /**
+         * StaticRecordJson
+         * @description One stretch at rest: its first and last data set, its temperature and duration, and the noise by axis.
+         */
+        StaticRecordJson: {
+            /** Datasets */
+            datasets: number[];
+            /** Temperature C */
+            temperature_c: number | null;
+            /** Duration S */
+            duration_s: number | null;
+            /** Axes */
+            axes: {
+                [key: string]: components["schemas"]["AllanJson"];
+            };
         };
         /**
          * Surface
@@ -3013,8 +4022,6 @@ export interface components {
              * @description Output minus true rate: a row per temperature, one per rate in it.
              */
             error_dps: number[][];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * SurfaceResponse
@@ -3035,17 +4042,130 @@ export interface components {
             };
             /**
              * Left Out
-             * @description Effects of the fit that do not leave with the calibration.
+             * @description Effects of the fit that are not exported with the calibration.
              */
-            left_out: {
-                [key: string]: unknown;
-            }[];
+            left_out: components["schemas"]["LeftOut"][];
             /** Axes */
             axes: {
                 [key: string]: components["schemas"]["Surface"];
             };
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * Suspect
+         * @description An effect that may be missing: the evidence, its size, and the error with it.
+         */
+        Suspect: {
+            /** Effect */
+            effect: string;
+            /** Probability */
+            probability: number;
+            /** P Value */
+            p_value: number;
+            /** Log Bayes Factor */
+            log_bayes_factor: number;
+            /** Share Removed */
+            share_removed: number;
+            /** Coefficients */
+            coefficients: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
+            /**
+             * Coefficients From
+             * @enum {string}
+             */
+            coefficients_from: "fit" | "comparison";
+            /** Parameters */
+            parameters: {
+                [key: string]: number;
+            };
+            /** Physical */
+            physical: boolean;
+            /** Plausible */
+            plausible: number[] | null;
+            /** Rms After Dps */
+            rms_after_dps: number | null;
+            /** Heldout Rms After Dps */
+            heldout_rms_after_dps: number | null;
+            /** Alias Group */
+            alias_group: string[];
+            /**
+             * Origin
+             * @enum {string}
+             */
+            origin: "sensor" | "package" | "fixture" | "bench" | "environment";
+            /** Explanation */
+            explanation: string;
+            /** Experiment */
+            experiment: string;
+        };
+        /**
+         * TemperatureBasisJson
+         * @description How temperature enters a model: not at all, or as a table with Lagrange interpolation between its nodes.
+         */
+        TemperatureBasisJson: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "constant" | "lagrange";
+            /** Points */
+            points: number;
+            /** Nodes C */
+            nodes_c: number[];
+        };
+        /**
+         * TermJson
+         * @description One effect of a model: its order and nonlinear parameters, and its expression where a user wrote it.
+         */
+        TermJson: {
+            /** Effect */
+            effect: string;
+            /** Order */
+            order: number | null;
+            /** Parameters */
+            parameters: {
+                [key: string]: number;
+            };
+            /** Formula */
+            formula: string;
+            /** Steady */
+            steady: boolean;
+        };
+        /**
+         * TimeLine
+         * @description The same against time, or against the order of the data sets where no time is known, with where power came.
+         *
+         *     `lag1`: correlation of neighbours; `runs_z`, `runs_p`: the runs test; both null for too few data sets.
+         */
+        TimeLine: {
+            /** T S */
+            t_s: (number | null)[];
+            /** Power On T S */
+            power_on_t_s: (number | null)[];
+            /** Order */
+            order: (number | null)[];
+            /** Power On Order */
+            power_on_order: (number | null)[];
+            /** Axis */
+            axis: string;
+            /** Mean Dps */
+            mean_dps: (number | null)[];
+            /** Low Dps */
+            low_dps: (number | null)[];
+            /** High Dps */
+            high_dps: (number | null)[];
+            /** Z */
+            z: number | null;
+            /** Lag1 */
+            lag1: number | null;
+            /** Lag1 Whitened */
+            lag1_whitened: number | null;
+            /** Runs Z */
+            runs_z: number | null;
+            /** Runs P */
+            runs_p: number | null;
         };
         /**
          * TimelineColumns
@@ -3083,8 +4203,6 @@ export interface components {
             position: (string | null)[];
             /** Dataset */
             dataset: (number | null)[];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * TraceResponse
@@ -3124,8 +4242,6 @@ export interface components {
              * @description What can be asked for.
              */
             channels: string[];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * UncertaintyGrid
@@ -3149,8 +4265,6 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisUncertainty"][][];
             };
-        } & {
-            [key: string]: unknown;
         };
         /**
          * UncertaintyResponse
@@ -3178,8 +4292,6 @@ export interface components {
             };
             /** @description Where `grid` was asked for. */
             grid: components["schemas"]["UncertaintyGrid"] | null;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * UnitResponse
@@ -3203,8 +4315,15 @@ export interface components {
              * @description In which formats a calibration of it can be had.
              */
             formats: components["schemas"]["ExportFormatResponse"][];
-        } & {
-            [key: string]: unknown;
+        };
+        /** UsualRange */
+        UsualRange: {
+            /** From */
+            from: number;
+            /** To */
+            to: number;
+            /** Inside */
+            inside: boolean;
         };
         /** ValidationError */
         ValidationError: {
@@ -3240,8 +4359,6 @@ export interface components {
                 number | null,
                 number | null
             ];
-        } & {
-            [key: string]: unknown;
         };
         /**
          * VerificationResponse
@@ -3297,25 +4414,21 @@ export interface components {
              * @description Whether the error is at most twice the expected one.
              */
             ok: boolean;
-        } & {
-            [key: string]: unknown;
         };
         /**
          * VersionResponse
-         * @description A calibration version as it was made, and whether it is in force.
+         * @description A calibration version that a fit made, as it was made, and whether it is in force.
          */
         VersionResponse: {
             /** Serial */
             serial: string;
-            /** Version */
-            version: number;
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
              * @description axis -> coefficients with value, standard uncertainty u, and unit.
              */
             axes: {
-                [key: string]: unknown;
+                [key: string]: components["schemas"]["AxisCoefficients"];
             };
             error: components["schemas"]["ErrorFigures"];
             validity: components["schemas"]["Validity"];
@@ -3324,17 +4437,46 @@ export interface components {
              * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
              */
             warnings: components["schemas"]["DataWarning"][];
-            /** Parent */
-            parent: number | null;
-            /** Recording */
+            /**
+             * Noise
+             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             */
+            noise: {
+                [key: string]: components["schemas"]["AxisNoiseJson"];
+            };
+            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            environment: components["schemas"]["FitEnvironment"];
+            /**
+             * Reference Temperature C
+             * @description Temperature terms are centred on it.
+             */
+            reference_temperature_c: number | null;
+            /**
+             * Recording
+             * @description The recording that it was fitted to.
+             */
             recording: number | null;
+            /** Version */
+            version: number;
+            /**
+             * Campaign
+             * @description The campaign of the recording; null: it was imported.
+             */
+            campaign: number | null;
+            /** Recipe */
+            recipe: string | null;
+            /** Bench */
+            bench: string | null;
+            /**
+             * Hash
+             * @description SHA-256 of the calibration file.
+             */
+            hash: string;
             /**
              * Created At
              * Format: date-time
              */
             created_at: string;
-            /** Hash */
-            hash: string;
             /** In Force */
             in_force: boolean;
             /**
@@ -3344,8 +4486,37 @@ export interface components {
             due: string | null;
             /** @description The newest act on this version; null: there was none. */
             certification: components["schemas"]["CertificationResponse"] | null;
-        } & {
-            [key: string]: unknown;
+            /** Parent */
+            parent: number | null;
+        };
+        /**
+         * Views
+         * @description All views of a criticism; empty where there was too little for a verdict.
+         */
+        Views: {
+            sets: components["schemas"]["DataSetColumns"];
+            /** Channels */
+            channels: components["schemas"]["ChannelLine"][];
+            /** Time */
+            time: components["schemas"]["TimeLine"][];
+            /** Frequency */
+            frequency: components["schemas"]["BetweenSets"][];
+            /** Legs */
+            legs: components["schemas"]["LegLine"][];
+            /** Previous Rate */
+            previous_rate: components["schemas"]["PreviousRateLine"][];
+            /** Repeats */
+            repeats: components["schemas"]["Repeats"][];
+            /** Angle */
+            angle: components["schemas"]["AngleSpectrum"][];
+            /** Frequency Within */
+            frequency_within: components["schemas"]["FrequencySpectrum"][];
+            /** Time In Set */
+            time_in_set: components["schemas"]["StartProfile"][];
+            /** Draws */
+            draws: {
+                [key: string]: string[];
+            };
         };
         /**
          * Visibility
@@ -3380,8 +4551,20 @@ export interface components {
              * @default
              */
             experiment: string;
-        } & {
-            [key: string]: unknown;
+        };
+        /**
+         * WorstDataSet
+         * @description A data set far from the model.
+         */
+        WorstDataSet: {
+            /** Axis */
+            axis: string;
+            /** Dataset */
+            dataset: number;
+            /** Residual Dps */
+            residual_dps: number;
+            /** Over Floor */
+            over_floor: number;
         };
     };
     responses: never;
@@ -3407,9 +4590,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": {
-                        [key: string]: unknown;
-                    };
+                    "application/json": components["schemas"]["HealthResponse"] | components["schemas"]["PulseResponse"];
                 };
             };
         };
@@ -3429,9 +4610,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": {
-                        [key: string]: unknown;
-                    };
+                    "application/json": components["schemas"]["HeartbeatResponse"];
                 };
             };
         };
@@ -3522,9 +4701,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": {
-                        [key: string]: unknown;
-                    }[];
+                    "application/json": components["schemas"]["BenchResponse"][];
                 };
             };
         };
@@ -3599,9 +4776,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": {
-                        [key: string]: unknown;
-                    };
+                    "application/json": components["schemas"]["CatalogueResponse"];
                 };
             };
         };
@@ -3730,7 +4905,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["FitResponse"];
+                    "application/json": components["schemas"]["ImproveResponse"];
                 };
             };
             /** @description Validation Error */
@@ -3762,7 +4937,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["VersionResponse"];
+                    "application/json": components["schemas"]["VersionResponse"] | components["schemas"]["ImprovedVersionResponse"];
                 };
             };
             /** @description Validation Error */
@@ -3934,12 +5109,14 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
+            /** @description Stages, then the criticism. */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
-                content?: never;
+                content: {
+                    "text/event-stream": string | components["schemas"]["StageResponse"] | components["schemas"]["CriticismResponse"];
+                };
             };
             /** @description Validation Error */
             422: {
@@ -4605,12 +5782,14 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
+            /** @description Of `progress` a campaign, else an event. */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
-                content?: never;
+                content: {
+                    "text/event-stream": string | components["schemas"]["EventResponse"] | components["schemas"]["CampaignResponse"];
+                };
             };
             /** @description Validation Error */
             422: {
@@ -4856,9 +6035,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": {
-                        [key: string]: unknown;
-                    };
+                    "application/json": components["schemas"]["RecordingAlone"] | components["schemas"]["RecordingWithPoints"];
                 };
             };
             /** @description Validation Error */
@@ -5031,9 +6208,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": {
-                        [key: string]: unknown;
-                    };
+                    "application/json": components["schemas"]["SamplesResponse"];
                 };
             };
             /** @description Validation Error */

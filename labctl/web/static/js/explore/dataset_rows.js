@@ -111,9 +111,10 @@ const NAMES = {
 /**
  * A channel's values in the unit that its title names: hours for times.
  * @param {string} name
- * @param {readonly number[]} values
+ * @param {readonly (number | null)[]} values
  */
-export const scaled = (name, values) => (UNITS[name] === "h" ? values.map((value) => value / 3600) : values);
+export const scaled = (name, values) =>
+  UNITS[name] === "h" ? values.map((value) => (value === null ? null : value / 3600)) : values;
 /** @param {string} name */
 export const channelName = (name) => NAMES[name] ?? name.replaceAll("_", " ");
 /** @param {string} name */

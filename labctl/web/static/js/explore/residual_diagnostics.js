@@ -166,8 +166,8 @@ function pickedDatasets(state) {
   const chosen = rows.dataset
     .map((_, k) => k)
     .filter((k) => state.pick.has(rows.dataset[k]))
-    .sort((a, b) => Math.abs(rows.score[b]) - Math.abs(rows.score[a]));
-  const rms = Math.sqrt(chosen.reduce((sum, k) => sum + rows.residual[k] ** 2, 0) / Math.max(chosen.length, 1));
+    .sort((a, b) => Math.abs(rows.score[b] ?? 0) - Math.abs(rows.score[a] ?? 0));
+  const rms = Math.sqrt(chosen.reduce((sum, k) => sum + (rows.residual[k] ?? 0) ** 2, 0) / Math.max(chosen.length, 1));
   return [
     h(
       "div",

@@ -26,7 +26,7 @@ export function verdictCard(state) {
   const [title, kind] = VERDICTS[criticism.verdict];
   const [first, ...others] = criticism.text;
   const { error, noise } = criticism;
-  const ratio = error.rms_dps / error.noise_floor_dps;
+  const ratio = (error.rms_dps ?? NaN) / (error.noise_floor_dps ?? NaN);
   return h(
     "section",
     { class: `card stack verdict ${kind}`, "aria-label": "Verdict" },

@@ -238,7 +238,7 @@ function versionView({ unit, version, versions, recording, asked, signal }) {
         const after = inDatasetOrder(state, found.residuals, "residual_dps");
         return selectedRows(state).residual.map((before, k) => {
           const left = after[k];
-          return left === null ? null : before - left;
+          return left === null || before === null ? null : before - left;
         });
       };
       const parts = [

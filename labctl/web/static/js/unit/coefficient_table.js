@@ -1,37 +1,42 @@
 // Coefficients of a version that are columns over temperature.
 
-/** @import { CoefficientAxis, Version } from "../../../types/api.js" */
+/** @import { Coefficient, CoefficientAxis, CoefficientTable, Version } from "../../../types/api.js" */
 /**
  * @typedef {object} CoefficientColumn a coefficient of an axis over temperature
  * @property {string} axis
  * @property {string} name
  * @property {number[]} temperature_c
- * @property {(number | null)[]} value
- * @property {number[] | null} [u]
+ * @property {number[]} value
+ * @property {(number | null)[]} u
  * @property {string} unit
  */
 
 /**
- * The columns of an axis, which are its own or those of its `coefficients`; none where it has one value each.
+ * The columns of an axis; none where its coefficients have one value each.
  * @param {string} axis
  * @param {CoefficientAxis} values
  * @returns {CoefficientColumn[]}
  */
 function columnsOf(axis, values) {
-  const own = values.coefficients?.temperature_c ? values.coefficients : values;
-  const { temperature_c } = own;
-  if (!temperature_c) return [];
-  return Object.entries(own).flatMap(([name, found]) =>
-    isColumn(found) ? [{ axis, name, temperature_c, ...found }] : [],
+  const { temperature_c } = values.coefficients;
+  if (!Array.isArray(temperature_c)) return [];
+  return Object.entries(values.coefficients).flatMap(([name, found]) =>
+    isTable(found) ? [{ axis, name, temperature_c, value: found.value, u: found.u, unit: found.unit }] : [],
   );
 }
 
+/** @typedef {Coefficient | CoefficientTable | number[]} Found */
+
 /**
- * @param {unknown} found
- * @returns {found is { value: (number | null)[], u?: number[] | null, unit: string }}
+ * @param {Found} found
+ * @returns {found is CoefficientTable}
  */
-const isColumn = (found) =>
-  typeof found === "object" && found !== null && "value" in found && Array.isArray(found.value);
+const isTable = (found) => !Array.isArray(found) && Array.isArray(found.value);
+/**
+ * @param {Found | undefined} found
+ * @returns {found is Coefficient}
+ */
+export const isSingle = (found) => found !== undefined && !Array.isArray(found) && !Array.isArray(found.value);
 
 /** @param {Pick<Version, "axes">} version */
 export const coefficientColumns = (version) =>

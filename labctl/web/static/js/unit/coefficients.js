@@ -4,7 +4,7 @@ import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number, resultTexts, unitText, idText, withUncertainty } from "../core/format.js";
 import { factList, table } from "../core/components.js";
-import { coefficientColumns } from "./coefficient_table.js";
+import { coefficientColumns, isSingle } from "./coefficient_table.js";
 
 /** @import { Coefficient, Version } from "../../../types/api.js" */
 /** @import { CoefficientColumn } from "./coefficient_table.js" */
@@ -59,13 +59,13 @@ export function coefficients(first, second) {
 
 /**
  * Factor and unit to display values in: plain numbers as shares in %, in ppm below 1 %.
- * @param {readonly (number | null)[]} values
+ * @param {readonly number[]} values
  * @param {string} unit
  * @returns {[factor: number, unit: string]}
  */
 function scaleOf(values, unit) {
   if (unit !== "1") return [1, unitText(unit)];
-  return Math.max(...values.map((value) => Math.abs(value ?? 0))) < 0.01 ? [1e6, "ppm"] : [100, "%"];
+  return Math.max(...values.map(Math.abs)) < 0.01 ? [1e6, "ppm"] : [100, "%"];
 }
 
 /**
@@ -113,9 +113,10 @@ function columnsFigure(name, columns, front) {
       mode: "lines+markers",
       name: `axis ${axis}${several ? `, v${version}` : ""}`,
       x: temperature_c,
-      y: value.map((each) => (each === null ? null : factor * each)),
-      error_y:
-        faint || !u ? undefined : { type: "data", array: u.map((each) => K * factor * each), thickness: 1, width: 2 },
+      y: value.map((each) => factor * each),
+      error_y: faint
+        ? undefined
+        : { type: "data", array: u.map((each) => K * factor * (each ?? 0)), thickness: 1, width: 2 },
       line: { color: axisColour(axis), dash: faint ? "dot" : "solid", width: faint ? 1.2 : 2 },
       marker: { size: faint ? 4 : 6 },
       opacity: faint ? 0.7 : 1,
@@ -133,7 +134,7 @@ function columnsFigure(name, columns, front) {
   const csv = () => [
     ["version", "axis", "temperature_c", name, "u", "unit"],
     ...columns.flatMap(({ version, axis, temperature_c, value, u }) =>
-      value.map((each, k) => [version, axis, temperature_c[k], each, u?.[k], unit]),
+      value.map((each, k) => [version, axis, temperature_c[k], each, u[k], unit]),
     ),
   ];
   return h(
@@ -163,13 +164,11 @@ function shownResult({ value, u, unit }) {
  */
 function list(first, second) {
   const rows = Object.entries(first.axes).flatMap(([axis, { coefficients: own }]) =>
-    Object.entries(own ?? {}).map(([name, found]) => ({
-      axis,
-      name,
-      ...found,
-      shown: shownResult(found),
-      beside: second?.axes[axis]?.coefficients?.[name],
-    })),
+    Object.entries(own).flatMap(([name, found]) => {
+      const other = second?.axes[axis]?.coefficients[name];
+      if (!isSingle(found)) return [];
+      return [{ axis, name, ...found, shown: shownResult(found), beside: isSingle(other) ? other : null }];
+    }),
   );
   return table(
     [
