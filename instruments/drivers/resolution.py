@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, LiteralString, cast
+from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
@@ -57,7 +57,7 @@ def _section(
     try:
         found: DeviceSettings = driver.settings.model_validate(section.model_dump(exclude_unset=True))
     except ValidationError as error:
-        wrong += [_detail(cast(LiteralString, each["type"]), each["msg"], (*place, *each["loc"]), each["input"]) for each in error.errors()]
+        wrong += [_detail(each["type"], each["msg"], (*place, *each["loc"]), each["input"]) for each in error.errors()]
         return section
     for name, value in (found.model_extra or {}).items():
         text = f"driver {section.driver} has no such setting (there are {_settings_of(driver)})"
@@ -83,5 +83,7 @@ def _settings_of(driver: Driver) -> str:
     return ", ".join(driver.settings.model_fields)
 
 
-def _detail(kind: LiteralString, text: str, place: Place, given: Any) -> InitErrorDetails:
-    return {"type": PydanticCustomError(kind, "{text}", {"text": text}), "loc": place, "input": given}
+def _detail(kind: str, text: str, place: Place, given: Any) -> InitErrorDetails:
+    # pydantic asks for a literal, and repeats here a kind that it has given itself
+    error = PydanticCustomError(kind, "{text}", {"text": text})  # pyright: ignore[reportArgumentType]
+    return {"type": error, "loc": place, "input": given}

@@ -1495,7 +1495,7 @@ export interface components {
             confirmed_at: string | null;
             /**
              * Left
-             * @description Campaigns that no process runs any more and nobody has ended.
+             * @description Campaigns that no process runs any more and that have not been ended.
              */
             left: string[];
         };
@@ -1617,7 +1617,7 @@ export interface components {
             cron?: string | null;
             /**
              * Time Zone
-             * @description Of `at` and `cron`, such as Europe/Berlin; default: the local one.
+             * @description Time zone of `at` and `cron`, such as Europe/Berlin; default: that of the service's computer.
              */
             time_zone?: string | null;
             /**
@@ -1735,6 +1735,13 @@ export interface components {
                 [key: string]: number;
             };
             /**
+             * Drivers
+             * @description table, chamber or gyro name -> its driver when the campaign began.
+             */
+            drivers: {
+                [key: string]: components["schemas"]["DriverResponse"];
+            };
+            /**
              * Unrecorded
              * @description Of a request that was carried out: what could not be written.
              * @default
@@ -1742,7 +1749,7 @@ export interface components {
             unrecorded: string;
             /**
              * Simulated Time
-             * @description Its times are those of a simulated bench, which may run faster than the wall's.
+             * @description Its times are those of a simulated bench, which may run faster than real time.
              * @default false
              */
             simulated_time: boolean;
@@ -1938,7 +1945,7 @@ export interface components {
             /** Channel */
             channel: string;
             /** Position */
-            position: string;
+            position?: string;
             /** At */
             at: (number | null)[];
             /** Mean Dps */
@@ -1975,9 +1982,9 @@ export interface components {
             /** U */
             u: number | null;
             /** Identified */
-            identified: boolean;
+            identified?: boolean;
             /** At Most */
-            at_most: number | null;
+            at_most?: number | null;
             /** Unit */
             unit: string;
         };
@@ -1991,9 +1998,9 @@ export interface components {
             /** U */
             u: (number | null)[];
             /** Identified */
-            identified: boolean[];
+            identified?: boolean[];
             /** At Most */
-            at_most: (number | null)[];
+            at_most?: (number | null)[];
             /** Unit */
             unit: string;
         };
@@ -2271,25 +2278,25 @@ export interface components {
          */
         DataSetColumns: {
             /** Of */
-            of: number;
+            of?: number;
             /** Timed */
-            timed: boolean;
+            timed?: boolean;
             /** Dataset */
-            dataset: number[];
+            dataset?: number[];
             /** Position */
-            position: string[];
+            position?: string[];
             /** Run */
-            run: number[];
+            run?: number[];
             /** Channels */
-            channels: {
+            channels?: {
                 [key: string]: (number | null)[];
             };
             /** Residual Dps */
-            residual_dps: {
+            residual_dps?: {
                 [key: string]: (number | null)[];
             };
             /** Over Floor */
-            over_floor: {
+            over_floor?: {
                 [key: string]: (number | null)[];
             };
         };
@@ -2370,6 +2377,18 @@ export interface components {
              * @description All of it as one sentence.
              */
             text: string;
+        };
+        /**
+         * DriverResponse
+         * @description The driver of an instrument, and the distribution that it came from.
+         */
+        DriverResponse: {
+            /** Driver */
+            driver: string;
+            /** Distribution */
+            distribution: string;
+            /** Version */
+            version: string;
         };
         /**
          * ErrorFigures
@@ -2516,19 +2535,19 @@ export interface components {
          */
         FitEnvironment: {
             /** Temperature */
-            temperature: string;
+            temperature?: string;
             /** Earth Rate */
-            earth_rate: string;
+            earth_rate?: string;
             /** Latitude Deg */
-            latitude_deg: number;
+            latitude_deg?: number;
             /** Along Table Axis Dps */
-            along_table_axis_dps: number;
+            along_table_axis_dps?: number;
             /** Once Per Turn Dps */
-            once_per_turn_dps: {
+            once_per_turn_dps?: {
                 [key: string]: number[];
             };
             /** Once Per Turn Expected Dps */
-            once_per_turn_expected_dps: number;
+            once_per_turn_expected_dps?: number;
         };
         /**
          * FitRequest
@@ -3133,7 +3152,7 @@ export interface components {
             /** Needs */
             needs: string[];
             /** Visible */
-            visible: number;
+            visible?: number;
         };
         /**
          * Objection
@@ -3609,7 +3628,7 @@ export interface components {
             /** Apart Sets */
             apart_sets: number[];
             /** Apart S */
-            apart_s: (number | null)[];
+            apart_s?: (number | null)[];
             /** Difference Dps */
             difference_dps: (number | null)[];
         };
@@ -3988,9 +4007,9 @@ export interface components {
             /** Band Dps */
             band_dps: (number | null)[];
             /** Per Step */
-            per_step: (number | null)[];
+            per_step?: (number | null)[];
             /** Per Step Band */
-            per_step_band: (number | null)[];
+            per_step_band?: (number | null)[];
         };
         /**
          * StaticRecordJson
@@ -4111,9 +4130,9 @@ export interface components {
              */
             kind: "constant" | "lagrange";
             /** Points */
-            points: number;
+            points?: number;
             /** Nodes C */
-            nodes_c: number[];
+            nodes_c?: number[];
         };
         /**
          * TermJson
@@ -4129,9 +4148,9 @@ export interface components {
                 [key: string]: number;
             };
             /** Formula */
-            formula: string;
+            formula?: string;
             /** Steady */
-            steady: boolean;
+            steady?: boolean;
         };
         /**
          * TimeLine
@@ -4141,13 +4160,13 @@ export interface components {
          */
         TimeLine: {
             /** T S */
-            t_s: (number | null)[];
+            t_s?: (number | null)[];
             /** Power On T S */
-            power_on_t_s: (number | null)[];
+            power_on_t_s?: (number | null)[];
             /** Order */
-            order: (number | null)[];
+            order?: (number | null)[];
             /** Power On Order */
-            power_on_order: (number | null)[];
+            power_on_order?: (number | null)[];
             /** Axis */
             axis: string;
             /** Mean Dps */
@@ -4494,27 +4513,27 @@ export interface components {
          * @description All views of a criticism; empty where there was too little for a verdict.
          */
         Views: {
-            sets: components["schemas"]["DataSetColumns"];
+            sets?: components["schemas"]["DataSetColumns"];
             /** Channels */
-            channels: components["schemas"]["ChannelLine"][];
+            channels?: components["schemas"]["ChannelLine"][];
             /** Time */
-            time: components["schemas"]["TimeLine"][];
+            time?: components["schemas"]["TimeLine"][];
             /** Frequency */
-            frequency: components["schemas"]["BetweenSets"][];
+            frequency?: components["schemas"]["BetweenSets"][];
             /** Legs */
-            legs: components["schemas"]["LegLine"][];
+            legs?: components["schemas"]["LegLine"][];
             /** Previous Rate */
-            previous_rate: components["schemas"]["PreviousRateLine"][];
+            previous_rate?: components["schemas"]["PreviousRateLine"][];
             /** Repeats */
-            repeats: components["schemas"]["Repeats"][];
+            repeats?: components["schemas"]["Repeats"][];
             /** Angle */
-            angle: components["schemas"]["AngleSpectrum"][];
+            angle?: components["schemas"]["AngleSpectrum"][];
             /** Frequency Within */
-            frequency_within: components["schemas"]["FrequencySpectrum"][];
+            frequency_within?: components["schemas"]["FrequencySpectrum"][];
             /** Time In Set */
-            time_in_set: components["schemas"]["StartProfile"][];
+            time_in_set?: components["schemas"]["StartProfile"][];
             /** Draws */
-            draws: {
+            draws?: {
                 [key: string]: string[];
             };
         };
