@@ -126,11 +126,19 @@ def test_over_http_the_refusal_is_a_conflict_and_the_assessment_says_it_before(t
 
 def criticism(verdict: str, share_removed: float) -> CriticismResponse:
     named = ["saturation"] if verdict in {"missing", "ambiguous"} else []
-    suspects: list[dict[str, Any]] = [{"effect": "saturation", "share_removed": share_removed}]
+    suspect: dict[str, Any] = {
+        "effect": "saturation", "probability": 0.5, "p_value": 0.5, "log_bayes_factor": 1.0,
+        "share_removed": share_removed, "coefficients": {}, "coefficients_from": "comparison", "parameters": {},
+        "physical": True, "plausible": None, "rms_after_dps": None, "heldout_rms_after_dps": None,
+        "alias_group": ["saturation"], "origin": "sensor", "explanation": "", "experiment": "",
+    }  # fmt: skip
+    error = {"rms_dps": 0.05, "heldout_rms_dps": None, "noise_floor_dps": 0.01, "noise_floor_source": "none"}
+    noise = dict.fromkeys(("white_dps", "drift_dps", "drift_tau_s", "vs_datasheet", "static"))
     return CriticismResponse.model_validate({
         "serial": FOG, "version": 1, "recording": 1, "verdict": verdict, "text": ["So it is."],
-        "error": {"rms_dps": 0.05, "heldout_rms_dps": None, "noise_floor_dps": 0.01}, "noise": {}, "lack_of_fit": {},
-        "where": [], "suspects": suspects, "named": named, "depends_on": [], "not_testable": [], "experiments": [],
+        "error": {**error, "explained": None, "direct_form_rms_dps": None}, "noise": noise,
+        "lack_of_fit": {"statistic": None, "p_value": None}, "where": [], "suspects": [suspect], "named": named,
+        "depends_on": [], "not_testable": [], "experiments": [],
     })  # fmt: skip
 
 
