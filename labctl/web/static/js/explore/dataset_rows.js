@@ -6,12 +6,18 @@ import { count, plainNumber } from "../core/format.js";
 /** @typedef {Pick<Criticism, "views">} Viewed */
 
 /**
+ * The columns of the data sets; a criticism that is shown has them, only one of a table of coefficients has none.
+ * @param {Viewed} criticism
+ */
+const columnsOf = (criticism) => /** @type {Required<NonNullable<Viewed["views"]["sets"]>>} */ (criticism.views.sets);
+
+/**
  * Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length.
  * @param {Viewed} criticism
  * @param {string} axis
  */
 export function datasetRows(criticism, axis) {
-  const sets = criticism.views.sets;
+  const sets = columnsOf(criticism);
   return {
     n: sets.dataset.length,
     dataset: sets.dataset,
@@ -30,7 +36,7 @@ export const axisNames = (criticism) => Object.keys(criticism.views.sets?.residu
  * @param {Viewed} criticism
  */
 export function shownText(criticism) {
-  const { of, dataset } = criticism.views.sets;
+  const { of, dataset } = columnsOf(criticism);
   return dataset.length < of ? `${count(dataset.length)} of ${count(of)} data sets` : null;
 }
 
