@@ -26,8 +26,13 @@ def is_reconnectable(context: ExecutionContext, step: Step, error: LinkError) ->
 
 
 def reconnect(context: ExecutionContext, error: LinkError) -> None:
-    """Wait until an instrument answers again. Raises the error when it stays silent, and GuardTripped."""
+    """Wait, with the table at rest, until an instrument answers again.
+
+    Raises the error when it stays silent, GuardTripped, and InstrumentError for a table that cannot be stopped.
+    """
     device = error.device
+    if device != context.bench.table.name:
+        context.bench.table.stop()  # an earlier move may still run, and a controller refuses another one meanwhile
     context.monitor.links.change(device, "degraded", f"{error}; it is tried again, {len(PAUSES_S)} times")
     for attempt, pause_s in enumerate(PAUSES_S, start=1):
         pass_time(context, pause_s, pausing=False)
