@@ -15,7 +15,7 @@ from typing import Any, TextIO
 
 import tomli_w
 
-from instruments.bench_config import BenchFile, SimulationSettings, is_simulated_address
+from instruments.bench_config import BenchFile, is_simulated_address
 from instruments.clock import Clock, ScaledClock
 from instruments.protocols.simulator_control import MOUNT, OK, POWER
 from instruments.simulators.links.device import SimulatedDevice
@@ -35,13 +35,13 @@ class SimulationServer:
 
     def start(self) -> BenchFile:
         """Open every port; returns the bench file with the real addresses. Raises OSError, LinkError."""
-        record = self._bench.model_dump()
+        record = self._bench.model_dump(exclude_none=True)  # a bench file has no null, nor have a driver's own settings
         devices = {"table": record["table"], "chamber": record["chamber"]}
         devices |= {gyro["name"]: gyro for gyro in record["gyros"]}
         for name, settings in devices.items():
             self._serve_device(name, settings)
         self.addresses["control"] = f"{LOCALHOST}:{self._ports.open_line_server(self._control)}"
-        simulation = record["simulation"] or SimulationSettings().model_dump()
+        simulation = record.get("simulation", {})
         speed = self._clock.speed if isinstance(self._clock, ScaledClock) else 1.0
         record["simulation"] = {**simulation, "control": self.addresses["control"], "speed": speed}
         return BenchFile.model_validate(record)

@@ -10,6 +10,7 @@ import pytest
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import Clock, ScaledClock, VirtualClock
 from instruments.drivers.gyrostar import Gyrostar
+from instruments.drivers.resolution import checked_settings
 from instruments.drivers.watlow_f4 import WatlowF4
 from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.errors import InstrumentError, LinkError, NoReply
@@ -29,7 +30,7 @@ def serve() -> Iterator[Callable[[str], tuple[BenchFile, Clock, SimulationServer
     def start(name: str) -> tuple[BenchFile, Clock, SimulationServer]:
         clock = ScaledClock(SPEED)
         servers.append(SimulationServer(read_bench(name), clock))
-        return servers[-1].start(), clock, servers[-1]
+        return checked_settings(servers[-1].start()), clock, servers[-1]
 
     yield start
     for server in servers:

@@ -65,6 +65,7 @@ class BenchRunner:
         self._job: CampaignJob | None = None
         self._recovery = CampaignRecovery(store, bench, make_clock)
         self._stops = False
+        self._told_to_stop: int | None = None  #: the campaign that was told last
         self.used = False  #: whether anything was asked of the bench here
         self._listeners = ChangeListeners()
         #: Tries the safe state again while it is in doubt; whoever serves the bench starts it.
@@ -98,10 +99,13 @@ class BenchRunner:
     def _is_idle(self) -> bool:
         return self._job is None and self._may_drive
 
+    def runs_or_was_stopped(self, campaign: int) -> bool:
+        """Return whether a campaign runs, or ended after a stop whose abort has yet to come."""
+        return campaign == self._told_to_stop or self.runs(campaign)
+
     def runs(self, campaign: int) -> bool:
         """Whether this campaign runs here now."""
-        job = self._job
-        return job is not None and job.row.id == campaign
+        return self.running == campaign
 
     def start(self, request: CampaignRequest) -> CampaignResponse:
         """Plan, write down and begin a campaign.
@@ -244,6 +248,7 @@ class BenchRunner:
         if job is None or campaign not in {None, job.row.id}:
             return False
         job.control.abort(reason)
+        self._told_to_stop = job.row.id
         log.warning("campaign.stop", campaign=job.row.id, bench=self._bench.name, reason=reason)
         threading.Thread(target=job.stop_if_stuck, name="stop", daemon=True).start()
         return True
@@ -253,17 +258,17 @@ class BenchRunner:
         job = self._job
         if job is not None and self.stop_now(campaign, reason) and job.thread is not None:
             job.thread.join(self.safe_within_s)
+        self._told_to_stop = None
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     def describe(self) -> BenchDescription:
         """Return the bench and what it is doing."""
-        job = self._job
         return BenchDescription(
             name=self._bench.name,
             simulated=self._bench.is_simulated,
             latitude_deg=self._bench.latitude_deg,
             units=[BenchUnit(name=g.name, serial=g.serial, driver=g.driver) for g in self._bench.gyros],
-            campaign=job.row.id if job is not None else None,
+            campaign=self.running,
             unconfirmed=self._store.benches.unconfirmed(self._bench.name),
         )
 

@@ -66,10 +66,11 @@ class ServiceControl:
         It is written down after it is done: neither a full disk nor a slow writer is a reason to go on.
         """
         reason = asked.body.text
-        if self._runner is None or not self._runner.runs(asked.campaign):
+        runner = self._runner
+        if runner is None or not runner.runs_or_was_stopped(asked.campaign):
             return abort_abandoned(context.store, asked.campaign, reason, context.now())
-        answer = self._runner.abort(asked.campaign, reason)
-        if missing := self._recorded(context, asked.campaign, reason, self._runner.safe_within_s):
+        answer = runner.abort(asked.campaign, reason)
+        if missing := self._recorded(context, asked.campaign, reason, runner.safe_within_s):
             text = f"it was aborted, but who did it and why is not in the audit trail{missing}"
             return answer.model_copy(update={"unrecorded": text})
         return answer

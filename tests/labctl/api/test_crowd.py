@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from labctl.services.lab_service import LabService
 from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import open_store
 
+Loop = Callable[[Coroutine[Any, Any, Any]], Any]
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
 
@@ -80,7 +81,7 @@ ABORT = "/api/campaigns/1/abort"
     ],
 )
 def test_the_reserve_is_for_operators_who_act(
-    service: LabService, role: Role | None, method: str, path: str, status: int
+    service: LabService, in_a_loop: Loop, role: Role | None, method: str, path: str, status: int
 ) -> None:
     key = create_key(service.store, KeyRequest(name="k", role=role), AT).key if role else ""
 
@@ -89,9 +90,9 @@ def test_the_reserve_is_for_operators_who_act(
         app.go.set()
         return await answer(AccessMiddleware(app, service, AccessPolicy(keys=True)), method, path, key, reserved)
 
-    found, headers = asyncio.run(ask(True))
+    found, headers = in_a_loop(ask(True))
     assert (found, headers.get(b"retry-after")) == (status, b"5" if status == 503 else None)
-    assert asyncio.run(ask(False))[0] == (200 if status == 503 else status)
+    assert in_a_loop(ask(False))[0] == (200 if status == 503 else status)
 
 
 class ReadingApp(WaitingApp):
@@ -102,7 +103,7 @@ class ReadingApp(WaitingApp):
         await super().__call__(scope, receive, send)
 
 
-def test_bodies_are_bounded_in_all(service: LabService) -> None:
+def test_bodies_are_bounded_in_all(service: LabService, in_a_loop: Loop) -> None:
     async def ask() -> None:
         app = ReadingApp()
         middleware = AccessMiddleware(app, service, AccessPolicy(held_bytes=1000))
@@ -116,10 +117,10 @@ def test_bodies_are_bounded_in_all(service: LabService) -> None:
         for _ in range(5):
             assert (await answer(middleware, "POST", "/api/plans", body=500))[0] == 200
 
-    asyncio.run(ask())
+    in_a_loop(ask())
 
 
-def test_few_recordings_come_at_once(service: LabService) -> None:
+def test_few_recordings_come_at_once(service: LabService, in_a_loop: Loop) -> None:
     async def ask() -> None:
         app = WaitingApp()
         middleware = AccessMiddleware(app, service, AccessPolicy())
@@ -130,4 +131,4 @@ def test_few_recordings_come_at_once(service: LabService) -> None:
         assert {status for status, _ in await asyncio.gather(*first)} == {200}
         assert (await answer(middleware, "POST", UPLOAD))[0] == 200
 
-    asyncio.run(ask())
+    in_a_loop(ask())

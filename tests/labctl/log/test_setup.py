@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -145,7 +146,7 @@ def test_an_error_that_nobody_caught_in_a_thread_is_a_record(tmp_path: Path) -> 
     assert "in fail" in found["exception"]
 
 
-def test_an_error_in_a_task_that_nobody_awaits_is_a_record(tmp_path: Path) -> None:
+def test_an_error_in_a_task_that_nobody_awaits_is_a_record(tmp_path: Path, in_a_loop: Callable[[Any], Any]) -> None:
     async def fail() -> None:
         raise ValueError("the task's own")
 
@@ -155,7 +156,7 @@ def test_an_error_in_a_task_that_nobody_awaits_is_a_record(tmp_path: Path) -> No
         del task
 
     with logged(tmp_path) as records:
-        asyncio.run(main())
+        in_a_loop(main())
     (found,) = records.all()
     assert (found["logger"], found["level"]) == ("asyncio", "error")
     assert "the task's own" in found["exception"]

@@ -46,8 +46,8 @@ export function fullTurn(comparison, state) {
     };
     return {
       data: [
-        ...turnTraces(rows, turn.before, "before", "scene", colours),
-        ...turnTraces(rows, turn.after, "after", "scene2", colours),
+        ...turnTraces(rows, turn.before, "turn_before_deg", "scene", colours),
+        ...turnTraces(rows, turn.after, "turn_after_deg", "scene2", colours),
       ],
       layout: { ...sceneLayout(titles, axes), coloraxis: colours.axis, showlegend: false },
     };
