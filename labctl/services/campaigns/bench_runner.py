@@ -240,10 +240,7 @@ class BenchRunner:
         return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.request)
 
     def stop_now(self, campaign: int | None, reason: str) -> bool:
-        """Ask for the end of what runs, or of this campaign if it runs; returns whether it was asked.
-
-        Waits for no lock and for no database.
-        """
+        """Ask for the end of what runs, or of this campaign; returns whether it was asked, and waits for no lock."""
         job = self._job
         if job is None or campaign not in {None, job.row.id}:
             return False
