@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from instruments.bench import checked_settings
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import Clock, ScaledClock, VirtualClock
 from instruments.drivers.gyrostar import Gyrostar
-from instruments.drivers.resolution import checked_settings
 from instruments.drivers.watlow_f4 import WatlowF4
 from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.errors import InstrumentError, LinkError, NoReply
