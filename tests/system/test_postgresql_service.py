@@ -58,7 +58,6 @@ def test_commands_about_a_bench_go_to_the_service_that_drives_it(service: Servic
 def test_another_process_closes_no_campaign_that_a_terminal_runs(service: ServiceProcess) -> None:
     campaign = begin(service)
     with open_store(service.database, write=True) as store:
-        store.note_address(store.leases.address)
         found = store.leases.holder("single-axis-sim")
         assert found is not None
         store.leases.note_address(found.machine, found.pid)  # a driver without a service, as a terminal is

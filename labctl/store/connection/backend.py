@@ -55,6 +55,14 @@ class Backend(Protocol):
         """Return whether an error says that the database cannot be reached, and nothing of the statement."""
         ...
 
+    def is_disk_full(self, error: exc.DatabaseError) -> bool:
+        """Return whether an error says that there is no room."""
+        ...
+
+    def words_for(self, error: exc.DatabaseError) -> str:
+        """Return an error in words of its own; empty for one that the database's own words say."""
+        ...
+
     def was_committed(self, number: int) -> bool:
         """Return whether a transaction was committed whose commit was not answered. Raises DatabaseError."""
         ...

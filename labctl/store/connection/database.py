@@ -23,8 +23,6 @@ from labctl.store.connection.writer_turn import WriterTurn
 
 ResultT = TypeVar("ResultT")
 
-#: What SQLite and PostgreSQL call a full disk, and PostgreSQL a lock that it gave nobody in time.
-SQLITE_FULL, POSTGRESQL_DISK_FULL, LOCK_NOT_AVAILABLE = 13, "53100", "55P03"
 #: A server that does not answer is asked again after so long, s.
 RETRY_S = 0.5
 
@@ -64,13 +62,13 @@ class Database:
         self._clock = clock or WallClock()
         self._turn = WriterTurn(self._shown)
         self._backend = self._open_backend(address, as_it_is=as_it_is)
+        self._engine, self._reader = self._backend.engines()
         try:
-            self._engine, self._reader = self._backend.engines()
             if not as_it_is:
                 self._migrate()
             self._backend.opened(self._engine)
         except BaseException:
-            self._backend.close()
+            self._dispose()
             raise
 
     def _open_backend(self, address: ServiceAddress, *, as_it_is: bool) -> Backend:
@@ -97,8 +95,9 @@ class Database:
                 self._backend.before_migration(connection)
                 migrate.upgrade(connection)
         except DatabaseError as error:
-            if (full := self._trouble(error)) and isinstance(full, DiskFull):
-                raise full from error
+            trouble = self._trouble(error)
+            if isinstance(trouble, DiskFull | DatabaseUnreachable):
+                raise trouble from error
             raise StoreError(
                 f"{self._shown}: not a labctl database, or damaged ({error.orig}); "
                 "restore a backup, or name another file with --database"
@@ -166,17 +165,14 @@ class Database:
             raise self._trouble(error) from error
 
     def _trouble(self, error: exc.DatabaseError) -> StoreError:
-        state = getattr(error.orig, "sqlstate", None)
-        if getattr(error.orig, "sqlite_errorcode", None) == SQLITE_FULL or state == POSTGRESQL_DISK_FULL:
+        if self._backend.is_disk_full(error):
             cause = f"{self._shown}: the disk is full"
             return DiskFull(f"{cause}; nothing of this act was kept. Make room, then go on", cause=cause)
         said = " ".join(str(error.orig).split())
         if self._backend.is_unreachable(error):
             cause = f"{self._shown}: the database server does not answer ({said})"
             return DatabaseUnreachable(f"{cause}; nothing of this act was kept. Try again once it runs", cause=cause)
-        cause = f"{self._shown}: {said}"
-        if state == LOCK_NOT_AVAILABLE:
-            cause = f"{self._shown}: no turn to write within 20 s: another process has it ({said})"
+        cause = f"{self._shown}: {self._backend.words_for(error) or said}"
         return StoreError(f"{cause}; nothing of this act was kept", cause=cause)
 
     @contextmanager
@@ -208,6 +204,9 @@ class Database:
 
     def close(self) -> None:
         """Close the database and let the next writer in."""
+        self._dispose()
+
+    def _dispose(self) -> None:
         self._reader.dispose()
         self._engine.dispose()
         self._backend.close()

@@ -21,6 +21,8 @@ WRITER_KEY = int.from_bytes(b"labctl", "big")
 LOCK_TIMEOUT_S = IDLE_TIMEOUT_S = 20
 #: A server that is restarted within 30 s ends no campaign; who only reads is told soon that it does not answer, s.
 WRITER_PATIENCE_S, READER_PATIENCE_S = 45.0, 2.0
+#: A disk without room, and a lock that was given to no one in time.
+DISK_FULL, LOCK_NOT_AVAILABLE = "53100", "55P03"
 #: The classes of errors that are about the connection and not about the statement, and what a server says that is
 #: shut down, was killed, starts, or drops its database. The codes are SQLSTATEs.
 CONNECTION_CLASS = "08"
@@ -78,6 +80,16 @@ class PostgresqlServer:
         if state is None:  # said by the client library: refused, lost, timed out
             return isinstance(error, exc.OperationalError)
         return state in SERVER_AWAY or state.startswith(CONNECTION_CLASS)
+
+    def is_disk_full(self, error: exc.DatabaseError) -> bool:
+        """Return whether the server says `disk_full`."""
+        return getattr(error.orig, "sqlstate", None) == DISK_FULL
+
+    def words_for(self, error: exc.DatabaseError) -> str:
+        """Return what a lock means that the server gave to no one in time."""
+        if getattr(error.orig, "sqlstate", None) != LOCK_NOT_AVAILABLE:
+            return ""
+        return f"no turn to write within {LOCK_TIMEOUT_S:g} s: another process has it; look at what writes there"
 
     def was_committed(self, number: int) -> bool:
         """Ask the server what became of a transaction, once it is over: it had the turn until then."""

@@ -6,6 +6,7 @@ process writes; `writer_lock` enforces it.
 
 from __future__ import annotations
 
+import sqlite3
 from contextlib import suppress
 from pathlib import Path
 
@@ -116,6 +117,14 @@ class SqliteFile:
     def is_unreachable(self, error: exc.DatabaseError) -> bool:  # noqa: ARG002
         """Return that every error is about the file itself."""
         return False
+
+    def is_disk_full(self, error: exc.DatabaseError) -> bool:
+        """Return whether SQLite says SQLITE_FULL."""
+        return getattr(error.orig, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
+
+    def words_for(self, error: exc.DatabaseError) -> str:  # noqa: ARG002
+        """Return that SQLite's own words do."""
+        return ""
 
     def was_committed(self, number: int) -> bool:  # noqa: ARG002
         """Return that a commit that failed was not made."""
