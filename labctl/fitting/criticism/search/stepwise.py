@@ -283,7 +283,8 @@ def _pair(first: Comparison, initial: Comparison, catalogue: Mapping[str, Effect
     for leader in [c for c in initial.candidates if not c.smooth and c.physical and c.log_bf >= ENOUGH][:LEADERS]:
         if leader.term is None or is_of_another_law(initial, leader):
             continue
-        one = Finding((leader.id,), refined_term(initial, leader), leader.log_bf)
+        group, axes = alias_group(initial, leader), axes_of(initial, leader)
+        one = Finding(group, refined_term(initial, leader), leader.log_bf, axes=axes)
         other = _finding_beside(first, [one], catalogue)
         if other is not None and leader.id not in other.group:
             pairs.append([one, other])
