@@ -27,7 +27,8 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     for name in needed(info):
         if name not in columns:
             raise BadRecording(
-                f"{path}: column {name!r} is missing (needed for kind = {info.kind!r}: {BY_NAME[name].meaning})"
+                f"{path}: column {name!r} is missing (needed for kind = {info.kind!r}, motion = {info.motion!r}: "
+                f"{BY_NAME[name].meaning})"
             )
         _finite(path, name, columns[name], columns.get("valid"))
     for name, (low, high) in POSSIBLE.items():
@@ -42,7 +43,7 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     if "t_s" in columns:
         _time(path, np.asarray(columns["t_s"], dtype=np.float64), strict=info.kind == "samples")
     _datasets(path, np.asarray(columns["dataset"], dtype=np.int64), points=info.kind == "points")
-    if info.kind == "samples":
+    if info.kind == "samples" and info.motion == "rates":
         _one_rate(path, columns)
     return _defaults(path, info, columns)
 
@@ -143,6 +144,8 @@ def _one_rate(path: Path, columns: dict[str, Column]) -> None:
 
 def _defaults(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict[str, Column]:
     n = len(columns["dataset"])
+    if info.motion == "rest":
+        columns.setdefault("table_rate_dps", np.zeros(n))
     if "position" not in columns:
         columns["position"] = np.full(n, info.axes[0])
     _positions(path, columns["position"])

@@ -5,23 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from labctl.recording.info import RecordingInfo
+from labctl.recording.info import Motion, RecordingInfo
 
 Kind = Literal["integer", "number", "text"]
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column of the format. `needed_for` names the kinds of recording that cannot do without it."""
+    """One column of the format. `needed_for` names the kinds of recording that cannot do without it.
+
+    `motions` names the motions for which it is needed by those kinds; empty: all of them.
+    """
 
     name: str
     kind: Kind
     unit: str
     meaning: str
     needed_for: frozenset[str] = frozenset()
+    motions: frozenset[Motion] = frozenset()
 
 
 _BOTH = frozenset({"samples", "points"})
+_ON_TABLE: frozenset[Motion] = frozenset({"rates", "profile"})
+_IN_POSES: frozenset[Motion] = frozenset({"poses"})
 
 COLUMNS = (
     Column("dataset", "integer", "", "number of the data set", _BOTH),
@@ -30,7 +36,9 @@ COLUMNS = (
     Column("run", "integer", "", "powered session"),
     Column("mounting", "integer", "", "counts the re-mountings of the unit"),
     Column("power_s", "number", "s", "time since the unit was last switched on"),
-    Column("table_rate_dps", "number", "deg/s", "rate of the table that was really run", _BOTH),
+    Column("table_rate_dps", "number", "deg/s", "rate of the table that was really run", _BOTH, _ON_TABLE),
+    Column("turn_deg", "number", "deg", "angle that the unit turned by in a data set", _BOTH, frozenset({"turns"})),
+    Column("turn_u_deg", "number", "deg", "standard uncertainty of turn_deg"),
     Column("table_angle_deg", "number", "deg", "table angle, unwrapped within a data set"),
     Column(
         "temperature_c",
@@ -38,12 +46,13 @@ COLUMNS = (
         "deg C",
         "the gyro's own thermometer",
         frozenset({"samples", "points", "coefficients"}),
+        frozenset({"rates"}),
     ),
     *(Column(f"temperature_{a}_c", "number", "deg C", f"thermometer of axis {a}") for a in "xyz"),
     Column("chamber_c", "number", "deg C", "chamber air"),
     Column("chamber_setpoint_c", "number", "deg C", "set point of the chamber"),
     Column("supply_v", "number", "V", "supply voltage of the gyro"),
-    *(Column(f"accel_{a}_g", "number", "g", f"specific force along body axis {a}") for a in "xyz"),
+    *(Column(f"accel_{a}_g", "number", "g", f"specific force along body axis {a}", _BOTH, _IN_POSES) for a in "xyz"),
     *(Column(f"field_{a}_ut", "number", "microtesla", f"magnetic field along body axis {a}") for a in "xyz"),
     Column("valid", "integer", "", "0: the instrument marked this reading as bad"),
     *(Column(f"gyro_{a}", "number", "as [output]", f"output of axis {a}") for a in "xyz"),
@@ -63,14 +72,20 @@ COLUMNS = (
 )
 
 BY_NAME = {column.name: column for column in COLUMNS}
+#: The motions in which a position says about which axis the unit turned.
+POSITIONED: frozenset[Motion] = frozenset({"rates", "turns", "profile"})
 
 
 def needed(info: RecordingInfo) -> list[str]:
-    """Return the names of the columns that a recording of this kind and these axes must have."""
-    names = [column.name for column in COLUMNS if info.kind in column.needed_for]
+    """Return the names of the columns that a recording of this kind, motion and these axes must have."""
     if info.kind == "coefficients":
-        return names
-    if len(info.axes) > 1:
+        return [column.name for column in COLUMNS if info.kind in column.needed_for]
+    names = [
+        column.name
+        for column in COLUMNS
+        if info.kind in column.needed_for and (not column.motions or info.motion in column.motions)
+    ]
+    if len(info.axes) > 1 and info.motion in POSITIONED:
         names.append("position")
     return names + [f"gyro_{axis}" for axis in info.axes]
 

@@ -8,6 +8,10 @@ from typing import Any, Literal
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 
 Axis = Literal["x", "y", "z"]
+#: What moves the unit, and so what its true rate is known from: `rates` a table, at one rate in each data set; `rest`
+#: nothing; `turns` a hand or a table, by a known angle in each data set; `profile` a table whose rate changes and is
+#: known reading by reading; `poses` a hand, between rests that gravity tells apart.
+Motion = Literal["rates", "rest", "turns", "profile", "poses"]
 
 #: Units that are rates already: what one deg/s is in them.
 RATE_UNITS = {"deg/s": 1.0, "rad/s": math.pi / 180.0, "deg/h": 3600.0}
@@ -52,6 +56,7 @@ class RecordingInfo(BaseModel):
     model: str = ""
     axes: tuple[Axis, ...] = Field(min_length=1, max_length=3)
     kind: Literal["samples", "points", "coefficients"]
+    motion: Motion = "rates"
     started_at: AwareDatetime
     power_on_s: float | None = None
     latitude_deg: float | None = Field(default=None, ge=-90, le=90)
