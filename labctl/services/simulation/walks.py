@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+from typing import Any
 
 import numpy as np
 
@@ -36,10 +37,11 @@ def _walk(plan: Plan, bench: BenchFile) -> Recording:
 
 def _encoded(walk: Recording) -> bytes:
     packed = io.BytesIO()
-    readings = {READINGS + name: values for name, values in walk.columns.items()}
-    environment = {ENVIRONMENT + name: values for name, values in (walk.environment or {}).items()}
+    # NumPy's keyword `allow_pickle` has another type than the arrays
+    arrays: dict[str, Any] = {READINGS + name: values for name, values in walk.columns.items()}
+    arrays |= {ENVIRONMENT + name: values for name, values in (walk.environment or {}).items()}
     info = np.frombuffer(walk.info.model_dump_json().encode(), dtype=np.uint8)
-    np.savez_compressed(packed, info=info, **readings, **environment)
+    np.savez_compressed(packed, info=info, **arrays)
     return packed.getvalue()
 
 
