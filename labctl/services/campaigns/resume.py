@@ -118,7 +118,7 @@ def prepare_resume(
 def _take_up(store: Store, row: CampaignRow, standing: ResumePoint, how: TakeUp) -> None:
     store.resume_points.take_up(row.id, standing, how)
     log.info(
-        "campaign.taken_up", campaign=row.id, bench=row.bench_name, step=standing.start_at + 1, reason=how.reason,
+        "campaign.resumed", campaign=row.id, bench=row.bench_name, step=standing.start_at + 1, reason=how.reason,
         was=row.state, units=sorted(row.recordings),
     )  # fmt: skip
 

@@ -115,7 +115,7 @@ def test_a_campaign_that_is_interrupted_and_taken_up(tmp_path: Path) -> None:
         resume_here(location, 1, None, None, ResumeRequest(by="Ada"))
     assert [state for state, _ in states(records)] == ["running", "aborted", "running", "done"]
     assert states(records)[1] == ("aborted", "aborted: tea")
-    (up,) = records.named("campaign.taken_up")
+    (up,) = records.named("campaign.resumed")
     assert (up["campaign"], up["was"], up["units"]) == (1, "aborted", ["FOG-0001"])
     assert up["reason"].startswith("taken up by Ada")
 
