@@ -26,7 +26,7 @@ def error_per_turn(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]
     if np.any(slow):
         raise BadInput(
             f"rate {float(np.asarray(rate_dps)[slow][0]):g} deg/s: the error per turn is given from {LEAST_RATE_DPS:g} "
-            "deg/s on; look at the error in deg/s instead"
+            "deg/s on; use the error in deg/s instead"
         )
     return error_dps * 360.0 / np.abs(rate_dps)
 

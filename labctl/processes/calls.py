@@ -118,7 +118,7 @@ def _packed(answer: Answer) -> bytes:
         return pickle.dumps(answer)
     except Exception as error:  # noqa: BLE001  whatever cannot travel is told in words
         text = str(answer.raised or error)
-        return pickle.dumps(Answer(raised=LabctlError(f"an answer that cannot be sent: {text}")))
+        return pickle.dumps(Answer(raised=LabctlError(f"an answer cannot be sent between processes: {text}")))
 
 
 class Caller:
@@ -143,7 +143,7 @@ class Caller:
             answer: Answer = connection.recv()
         except (EOFError, OSError) as error:
             connection.close()
-            raise BenchSilent(f"the bench process has gone ({error or type(error).__name__})") from error
+            raise BenchSilent(f"the bench process has ended ({error or type(error).__name__})") from error
         except BaseException:
             connection.close()  # an answer that comes later must not be taken for that of the next call
             raise

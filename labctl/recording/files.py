@@ -69,9 +69,11 @@ def _read_head(path: Path) -> RecordingInfo:
 def _data_file(folder: Path, kind: str) -> Path:
     found = [folder / f"{kind}.{suffix}" for suffix in FORMATS if (folder / f"{kind}.{suffix}").exists()]
     if not found:
-        raise BadRecording(f"{folder}: kind = {kind!r} needs a file {kind}.parquet or {kind}.csv; there is none")
+        raise BadRecording(
+            f"{folder}: kind = {kind!r} needs a file {kind}.parquet or {kind}.csv; there is none; add it"
+        )
     if len(found) > 1:
-        raise BadRecording(f"{folder}: both {found[0].name} and {found[1].name} are there; keep the one that is meant")
+        raise BadRecording(f"{folder}: both {found[0].name} and {found[1].name} exist; remove one of them")
     return found[0]
 
 

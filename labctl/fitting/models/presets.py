@@ -40,7 +40,8 @@ def _centre(data: FitData) -> Reference:
 def _nodes(data: FitData, points: int, name: str) -> tuple[float, ...]:
     if data.levels is None:
         raise NotEnoughData(
-            f"{data.info.serial}: model {name} needs discrete temperature levels; these temperatures run on from "
+            f"{data.info.serial}: model {name} needs discrete temperature levels; these temperatures are continuous "
+            "from "
             f"{data.temperature_c.min():.1f} to {data.temperature_c.max():.1f} deg C without gaps"
         )
     means = level_means(data.temperature_c, data.levels)
@@ -118,7 +119,7 @@ def preset_for(model: str | None, effects: list[str]) -> Preset:
     """
     terms = tuple(parse_term(text) for text in effects)
     if model is None and not terms:
-        raise BadInput(f"say which model to fit: --model {'|'.join(PRESETS)} or --effects A,B,C")
+        raise BadInput(f"give the model to fit: --model {'|'.join(PRESETS)} or --effects A,B,C")
     if model is None:
         return Preset("custom", lambda data: (_custom(terms, data), _all(data)))
     if model not in PRESETS:

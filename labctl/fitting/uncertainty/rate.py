@@ -21,8 +21,8 @@ LARGEST = 1e5
 #: Why a part is unknown.
 PUBLISHED = "published coefficients state none"
 NO_DATA_SETS = "published coefficients have no data sets that could show it"
-NOT_KEPT = "the version was made before this was kept with it: fit it again"
-NO_POWER_ON = "one power-on was recorded, and neither a data sheet nor a static record tells how far the next is off"
+NOT_KEPT = "the version was made by an older labctl, which did not store it: fit it again"
+NO_POWER_ON = "one power-on was recorded, and neither a data sheet nor a static record states the repeatability"
 #: Step of the numerical derivative of the error along the rate, deg/s.
 STEP_DPS = 0.01
 
@@ -66,7 +66,8 @@ def rate_uncertainty(
         )
     if any(np.isnan(fit.covariance).any() for fit in fitted.axes.values()):
         raise NotEnoughData(
-            f"{name} has as many coefficients as data sets: nothing is left to be uncertain by; measure more data sets"
+            f"{name} has as many coefficients as data sets: no residual is left to estimate the uncertainty from; "
+            "measure more data sets"
         )
     return {axis: _of_axis(fitted, axis, rate_dps, temperature_c, evidence.get(axis)) for axis in fitted.axes}
 

@@ -29,7 +29,7 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
         raise BadInput(f"{source}: no such file")
     columns = read_table(source)
     if target.suffix not in {".csv", ".parquet"} or target.resolve() == source.resolve():
-        raise BadInput(f"{target}: the result needs a file of its own, ending in .csv or .parquet")
+        raise BadInput(f"{target}: name a result file other than the input, ending in .csv or .parquet")
     for name in (*(f"gyro_{axis}" for axis in compensator.axes), "temperature_c", *compensator.needs):
         if name not in columns:
             raise BadInput(f"{source}: column {name!r} is missing (the calibration is of axes {compensator.axes})")

@@ -116,7 +116,7 @@ class InWorkers(Pool):
             if not ready:
                 raise ComputationEnded(
                     f"the computation was ended after {self.limits.deadline_s:g} s, which is all that one may take; "
-                    "ask for less at a time: a recording of fewer data sets, or fewer effects that compete"
+                    "request less at a time: a recording of fewer data sets, or fewer effects that compete"
                 )
             try:
                 message = receiving.recv() if receiving.poll() else None
@@ -138,8 +138,9 @@ class InWorkers(Pool):
             worker.join(END_S)
             code = worker.exitcode
         return ComputationEnded(
-            f"the computation was ended: its process {_end_in_words(code)} before it had a result. Ask again; if it "
-            f"happens again, take a recording of fewer data sets (memory limit {self.limits.memory_mib} MiB)"
+            f"the computation was ended: its process {_end_in_words(code)} before it had a result. Try again; if it "
+            "happens again,"
+            f" take a recording of fewer data sets (memory limit {self.limits.memory_mib} MiB)"
         )
 
     @staticmethod

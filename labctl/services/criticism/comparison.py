@@ -67,7 +67,7 @@ def comparison_json(store: Store, serial: str, version: int, recording: int) -> 
 
 def _source(calibration: Calibration, fitted_to: int | None, recording: int) -> str:
     own = "which it was fitted to" if fitted_to == recording else "which it was not fitted to"
-    return f"version {calibration.version} as it is, nothing refitted, beside recording {recording}, {own}"
+    return f"version {calibration.version} without refitting, on recording {recording}, {own}"
 
 
 def _columns(data: FitData, errors: Mapping[str, Array]) -> ComparisonColumns:

@@ -71,7 +71,7 @@ def surest(path: Path) -> str:
             )
         return INTERCHANGE
     if len(names) > 1:
-        raise BadInput(f"{path}: {' and '.join(names)} are equally sure that it is theirs; name one with --format")
+        raise BadInput(f"{path}: {' and '.join(names)} recognise the file equally well; name one with --format")
     return names[0]
 
 

@@ -89,7 +89,9 @@ class PostgresqlServer:
         """Return what a lock means that the server gave to no one in time."""
         if getattr(error.orig, "sqlstate", None) != LOCK_NOT_AVAILABLE:
             return ""
-        return f"no turn to write within {LOCK_TIMEOUT_S:g} s: another process has it; look at what writes there"
+        return (
+            f"no write access within {LOCK_TIMEOUT_S:g} s: another process has it; find out which process writes there"
+        )
 
     def was_committed(self, number: int) -> bool:
         """Ask the server what became of a transaction, once it is over: it had the turn until then."""

@@ -112,7 +112,7 @@ class Calibrations:
             "serial": serial, "version": version, "parent": new.parent, "recording_id": new.recording,
             "model": new.model, "created_at": at, "hash": new.hash, "document": new.document, "answer": new.answer,
         }  # fmt: skip
-        taken = VersionTaken(f"{serial} version {version} was made by another fit meanwhile; fit again")
+        taken = VersionTaken(f"{serial} version {version} was made by another fit in the meantime; fit again")
         try:
             with self._database.writing() as connection:
                 if _next_version(connection, serial) != version:
@@ -154,8 +154,9 @@ class Calibrations:
         if act is None or act.act != "certify":
             raise NotCertified(
                 f"unit {serial!r} has no certified calibration; "
-                f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts one in force, "
-                "`--version N` names one that is not"
+                f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts one in force, `--version N` takes "
+                "one that is not in force"
+                ""
             )
         return act.version
 
@@ -214,7 +215,7 @@ class Calibrations:
         with self._database.reading() as connection:
             known = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN))
         if known is None:
-            raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign brings one in")
+            raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
         if version is None:
             self.certified_version(serial)  # says why there is none
         raise NotFound(f"unit {serial!r} has no calibration version {version}")

@@ -74,7 +74,7 @@ def test_padding_counts_by_what_it_unpacks_to(tmp_path: Path, monkeypatch: pytes
     words = pa.array([f"{n}" + "x" * 5000 for n in range(100)])
     pq.write_table(pa.table({"note": words}), file, compression="zstd", use_dictionary=False)
     monkeypatch.setattr(limits, "MOST_UNPACKED_BYTES", 400_000)
-    with pytest.raises(BadRecording, match=r"unpacks to 0\.5\d* MB; at most 0\.4 MB are read"):
+    with pytest.raises(BadRecording, match=r"has an unpacked size of 0\.5\d* MB; at most 0\.4 MB are read"):
         read_table(file)
 
 
