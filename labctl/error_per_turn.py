@@ -79,6 +79,8 @@ def static_bias(at_rest_dps: NDArray[np.float64], instability_dps: float = 0.0) 
     """
     n = len(at_rest_dps)
     if n < LEAST_READINGS or not np.all(np.isfinite(at_rest_dps)):
-        raise NotEnoughData(f"a static bias needs at least {LEAST_READINGS} finite readings at rest; {n} were given")
+        raise NotEnoughData(
+            f"a static bias needs at least {LEAST_READINGS} finite readings at rest; {n} were given, record more"
+        )
     white = float(np.std(at_rest_dps, ddof=1)) / np.sqrt(n)
     return StaticBias(float(np.mean(at_rest_dps)), float(np.hypot(white, instability_dps)), n)

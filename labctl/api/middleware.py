@@ -110,7 +110,8 @@ class AccessMiddleware:
         host = headers.get("host", "")
         if _name_of(host) not in self._access.hosts:
             raise NotAllowed(
-                f"host {host!r}: without keys this service accepts only the host names "
+                f"host {host!r} is not accepted; use an address of this list, or start the service with "
+                "--require-keys: "
                 f"{', '.join(sorted(self._access.hosts))}"
             )
         if "forwarded" in headers or "x-forwarded-for" in headers:

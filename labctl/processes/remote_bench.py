@@ -89,7 +89,7 @@ class RemoteControl:
             if not stopped:
                 raise
             raise BenchSilent(
-                f"campaign {asked.campaign} was asked to stop; its progress is not known: {silent}"
+                f"campaign {asked.campaign} was asked to stop; its progress is not known: {silent}; inspect the bench"
             ) from silent
 
     def confirm(self, _: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:

@@ -27,7 +27,8 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     for name in needed(info):
         if name not in columns:
             raise BadRecording(
-                f"{path}: column {name!r} is missing (needed for kind = {info.kind!r}, motion = {info.motion!r}: "
+                f"{path}: column {name!r} is missing; add it (needed for kind = {info.kind!r}, motion = "
+                f"{info.motion!r}: "
                 f"{BY_NAME[name].meaning})"
             )
         _finite(path, name, columns[name], columns.get("valid"))
@@ -83,7 +84,7 @@ def checked_environment(path: Path, columns: dict[str, Column]) -> dict[str, Col
     """Return the environment's columns; raises BadRecording when time or temperature is missing or not in order."""
     for name in ENVIRONMENT_NEEDED:
         if name not in columns:
-            raise BadRecording(f"{path}: column {name!r} is missing")
+            raise BadRecording(f"{path}: column {name!r} is missing; add it")
         _finite(path, name, columns[name], None)
     for name, values in columns.items():
         _squarable(path, name, values, None)
@@ -128,7 +129,6 @@ def _datasets(path: Path, dataset: NDArray[np.int64], *, points: bool) -> None:
         raise BadRecording(
             f"{path}: column 'dataset', row {rows[again] + 1}: number {numbers[again]} is repeated; give each data "
             "set one number and consecutive rows"
-            ""
         )
 
 

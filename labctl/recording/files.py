@@ -53,11 +53,11 @@ def read_recording(folder: Path) -> Recording:
 
 def _read_head(path: Path) -> RecordingInfo:
     if not path.is_file():
-        raise BadRecording(f"{path}: not found; a recording is a folder with {HEAD} and a data file")
+        raise BadRecording(f"{path}: not found; name a folder with {HEAD} and a data file")
     try:
         return RecordingInfo.model_validate(read_toml(path))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadRecording(f"{path}: not TOML: {error}") from error
+        raise BadRecording(f"{path}: not TOML: {error}; correct it") from error
     except ValidationError as error:
         # a misspelt key is both unknown and missing: the unknown one is what a person looks for
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")

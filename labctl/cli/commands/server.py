@@ -22,8 +22,7 @@ def serve(
         typer.Option(
             "--speed",
             metavar="X",
-            help="Speed of a simulated bench: X times real time; 0: as fast as possible. Readings are lost "
-            "if the computer is too slow.",
+            help="Speed of a simulated bench: X times real time; 0: as fast as this computer keeps up.",
         ),
     ] = 1.0,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",

@@ -58,11 +58,11 @@ def rate_uncertainty(
     """
     for what, value, unit in (("rate_dps", rate_dps, "deg/s"), ("temperature_c", temperature_c, "deg C")):
         if not abs(value) <= LARGEST:  # also false for NaN
-            raise BadInput(f"{what} = {value} {unit}: must be a number between {-LARGEST:g} and {LARGEST:g} {unit}")
+            raise BadInput(f"{what} = {value} {unit}: give a number between {-LARGEST:g} and {LARGEST:g} {unit}")
     if fitted.model.needs:
         raise BadInput(
             f"{name}: its model also needs {', '.join(fitted.model.needs)};"
-            " an uncertainty at a rate and a temperature alone is not defined"
+            " an uncertainty at a rate and a temperature alone is not defined; use a version without these"
         )
     if any(np.isnan(fit.covariance).any() for fit in fitted.axes.values()):
         raise NotEnoughData(

@@ -35,7 +35,7 @@ def read_parquet(path: Path) -> dict[str, NDArray[np.generic]]:
         raise BadRecording(f"{path}: needs more memory than this computer has free; divide the recording") from error
     except (pa.ArrowException, OSError, EOFError, ValueError, OverflowError) as error:
         first = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise BadRecording(f"{path}: not a whole Parquet file (truncated?): {first[:300]}") from error
+        raise BadRecording(f"{path}: not a complete Parquet file; write or copy it again: {first[:300]}") from error
 
 
 def _read(path: Path) -> dict[str, NDArray[np.generic]]:

@@ -59,7 +59,7 @@ def identify(store: Store, authorization: str) -> Caller:
 def require_role(caller: Caller, needed: Role) -> None:
     """Raise NotAllowed when a caller's role does not reach as far as an act needs."""
     if not caller.role.may(needed):
-        raise NotAllowed(f"{caller.name} is {caller.role.value}; this needs the role {needed.value}")
+        raise NotAllowed(f"{caller.name} is {caller.role.value}; use a key of the role {needed.value}")
 
 
 def require_an_api_key(store: Store, why: str) -> None:

@@ -125,7 +125,7 @@ class BenchRunner:
 
     def _refuse_unless_free(self) -> None:
         if self._stops:
-            raise BenchBusy(f"bench {self._bench.name}: {STOPS}; no campaign is started any more")
+            raise BenchBusy(f"bench {self._bench.name}: {STOPS} and starts no campaign any more; start it again first")
         if self._job is not None:
             raise BenchBusy(
                 f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
@@ -154,7 +154,7 @@ class BenchRunner:
             job = self._job
             if job is not None and job.row.id == campaign:
                 if not job.control.request.pause:
-                    raise Conflict(f"campaign {campaign} runs and is not paused")
+                    raise Conflict(f"campaign {campaign} runs and is not paused; pause it first, or let it run")
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:
                 self._refuse_unless_free()
@@ -196,8 +196,7 @@ class BenchRunner:
         operator = self._running(campaign).prepared.operator
         if not isinstance(operator, HumanOperator):
             raise StalePrompt(
-                f"question {request.prompt!r} is not asked: this bench turns and switches its units automatically; "
-                "no answer is needed"
+                f"question {request.prompt!r} is not asked: this bench turns its units itself; send no answer"
             )
         if request.confirmed:
             operator.confirm(request.prompt, request.by)
@@ -210,7 +209,9 @@ class BenchRunner:
         over = job is not None and job.progress is not None and job.progress.state in ENDED
         if job is None or job.row.id != campaign or over:
             state = self._store.campaigns.get(campaign).state
-            raise Conflict(f"campaign {campaign} does not run on bench {self._bench.name} now; it is {state}")
+            raise Conflict(
+                f"campaign {campaign} does not run on bench {self._bench.name} now, it is {state}; check its number"
+            )
         return job
 
     def _run(self, job: CampaignJob, prepared: Prepared) -> None:

@@ -115,8 +115,9 @@ class InWorkers(Pool):
             ready = wait([receiving, worker.sentinel], max(deadline_s - self._clock.now_s(), 0.0))
             if not ready:
                 raise ComputationEnded(
-                    f"the computation was ended after {self.limits.deadline_s:g} s, which is all that one may take; "
-                    "request less at a time: a recording of fewer data sets, or fewer effects that compete"
+                    f"the computation was ended after {self.limits.deadline_s:g} s, the limit of one computation; "
+                    "send less at a time:"
+                    " a recording of fewer data sets, or fewer effects that compete"
                 )
             try:
                 message = receiving.recv() if receiving.poll() else None

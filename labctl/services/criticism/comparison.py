@@ -40,7 +40,8 @@ def compare_version(
     data, (errors, _) = fit_data_of(points), applied_errors(calibration, points)
     if lacking := data.channels.missing(calibration.fitted.model.needs):
         raise BadInput(
-            f"{serial} version {version} needs {', '.join(lacking)}, which recording {measured.id} does not have"
+            f"{serial} version {version} needs {', '.join(lacking)}, which recording {measured.id} does not have; "
+            "name another recording"
         )
     held = {
         name: float(np.mean(np.asarray(data.channels[name], dtype=np.float64)))

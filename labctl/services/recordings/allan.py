@@ -51,9 +51,7 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(n, dtype=bool)
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]
     if len(t_s) < LEAST_READINGS:
-        raise NotEnoughData(
-            f"data set {dataset} has {len(t_s)} valid readings; an Allan deviation needs {LEAST_READINGS} or more"
-        )
+        raise NotEnoughData(f"data set {dataset} has {len(t_s)} valid readings; name one with {LEAST_READINGS} or more")
     period_s = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
     found = {str(axis): allan(recording.gyro_dps(axis)[valid], period_s) for axis in recording.info.axes}
     axes = {axis: noise for axis, noise in found.items() if noise is not None}

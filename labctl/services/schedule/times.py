@@ -83,11 +83,11 @@ def check_cron(line: str, zone: ZoneInfo, now: datetime) -> datetime:
     """Return when a cron line is due for the first time. Raises BadInput naming what is wrong with it."""
     shape = "minute hour day-of-month month day-of-week, such as '30 2 * * MON'"
     if len(line.split()) != FIELDS:
-        raise BadInput(f"cron line {line!r} has {len(line.split())} fields, not {FIELDS}: {shape}")
+        raise BadInput(f"cron line {line!r} has {len(line.split())} fields; write {FIELDS}: {shape}")
     try:
         due = next_due(line, zone, now)
     except CronSimError as error:
-        raise BadInput(f"cron line {line!r}: {str(error).lower()}; a line is {shape}") from error
+        raise BadInput(f"cron line {line!r}: {str(error).lower()}; write {shape}") from error
     if due is None:
         raise BadInput(f"cron line {line!r} matches no time within 50 years; correct its days and months")
     return due

@@ -137,7 +137,7 @@ class Database:
         """
         if self.writer is not None:
             raise StoreError(
-                f"{self._shown}: another process writes to it; only a marked transaction can be sent there"
+                f"{self._shown}: another process writes to it; send a marked transaction, or wait until it ends"
             )
         number, ended = 0, False
         with self._turn.take():
@@ -173,7 +173,7 @@ class Database:
             cause = f"{self._shown}: the database server does not answer ({said})"
             return DatabaseUnreachable(f"{cause}; nothing was stored. Try again once it runs", cause=cause)
         cause = f"{self._shown}: {self._backend.words_for(error) or said}"
-        return StoreError(f"{cause}; nothing was stored", cause=cause)
+        return StoreError(f"{cause}; nothing was stored, try again", cause=cause)
 
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:

@@ -88,7 +88,7 @@ class SqliteFile:
     def refuse_other(self) -> None:
         """Raise StoreError when the database was deleted or replaced since it was opened."""
         if self._identity is not None and (text := self._identity.changed()):
-            raise StoreError(f"{text}. Nothing was stored", cause=text)
+            raise StoreError(f"{text}. Nothing was stored; try again", cause=text)
 
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
         """Let the next commits reach the disk before they are answered, or with a later one: a log is in order."""

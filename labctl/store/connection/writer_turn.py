@@ -66,7 +66,7 @@ class WriterTurn:
         cause = (
             f"{self._location}: no write access within {waited_s:.3g} s; the one writing connection is held by {who}"
         )
-        return StoreError(f"{cause}; nothing was stored", cause=cause)
+        return StoreError(f"{cause}; nothing was stored, try again", cause=cause)
 
 
 def _caller() -> str:

@@ -98,7 +98,7 @@ class _Check:
         except exc.DatabaseError as error:
             self.find(part, f"cannot be read: {error.orig}")
         except (ValueError, TypeError) as error:  # the row is there, its content is of another kind
-            self.find(part, f"cannot be read: {error}")
+            self.find(part, f"cannot be read: {error}; check path and permissions")
         return part != "schema"
 
     def _check_file(self, connection: sa.Connection) -> bool:

@@ -93,7 +93,7 @@ class Benches:
         if found is None:
             raise NotFound(f"bench {name!r} was never used with this database; `labctl bench status` lists them")
         if not found.unconfirmed:
-            raise Conflict(f"bench {name}: nothing is unconfirmed")
+            raise Conflict(f"bench {name}: its safe state is confirmed already; start a campaign")
         b = tables.benches
         with self._database.writing() as connection:
             connection.execute(sa.update(b).where(b.c.name == name).values({**_UNTRIED, "unconfirmed_at": None}))

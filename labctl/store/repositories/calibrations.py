@@ -133,7 +133,9 @@ class Calibrations:
         """Return one version; raises NotFound."""
         rows = self._rows(tables.calibrations.c.serial == serial, tables.calibrations.c.version == version)
         if not rows:
-            raise NotFound(f"unit {serial!r} has no calibration version {version}")
+            raise NotFound(
+                f"unit {serial!r} has no calibration version {version}; `labctl ladder {serial}` lists the versions"
+            )
         return rows[0]
 
     def of_unit(self, serial: str) -> list[CalibrationRecord]:
@@ -156,7 +158,6 @@ class Calibrations:
                 f"unit {serial!r} has no certified calibration; "
                 f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts one in force, `--version N` takes "
                 "one that is not in force"
-                ""
             )
         return act.version
 
@@ -188,7 +189,10 @@ class Calibrations:
         last = self._last_act(serial)
         in_force = last.version if last is not None and last.act == "certify" else None
         if act == "revoke" and in_force != version:
-            raise Conflict(f"{serial} version {version} is not in force (in force: {in_force or 'none'})")
+            raise Conflict(
+                f"{serial} version {version} is not in force (in force: {in_force or 'none'}); give the version in "
+                "force"
+            )
         row = CertificationRow(serial, version, act, by, reason, at, due_at, judgement)
         with self._database.writing() as connection:
             connection.execute(
@@ -218,7 +222,9 @@ class Calibrations:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
         if version is None:
             self.certified_version(serial)  # says why there is none
-        raise NotFound(f"unit {serial!r} has no calibration version {version}")
+        raise NotFound(
+            f"unit {serial!r} has no calibration version {version}; `labctl ladder {serial}` lists the versions"
+        )
 
     def history(self, serial: str) -> list[CertificationRow]:
         """Return every act of certifying and revoking, newest first."""

@@ -47,7 +47,9 @@ class Keys:
             if row is None:
                 raise NotFound(f"there is no key {name!r}; `labctl key list` shows them")
             if row.revoked_at is not None:
-                raise Conflict(f"key {name!r} was already revoked at {row.revoked_at.isoformat()}")
+                raise Conflict(
+                    f"key {name!r} was already revoked at {row.revoked_at.isoformat()}; no further action is needed"
+                )
             connection.execute(sa.update(tables.api_keys).where(_k.name == name).values(revoked_at=at))
             append(connection, at, "key revoke", f"key {name}", {"role": row.role, "reason": reason})
         return KeyRow(row.name, row.role, row.digest, row.created_at, at)
