@@ -110,5 +110,9 @@ class Ports:
         if not is_simulated_address(address):
             return self._hardware
         if self._simulated is None:
-            raise LinkError(device, f"{address} is a simulated instrument, but this bench has no simulation")
+            raise LinkError(
+                device,
+                f"{address} is a simulated instrument, but this bench has no simulation; correct the address in the "
+                "bench file",
+            )
         return self._simulated

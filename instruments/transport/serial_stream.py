@@ -78,7 +78,7 @@ class SerialStream:
 
     def _opened(self) -> SerialPort:
         if self._port is None:
-            raise LinkError(self._device, f"the stream on {self._url} was not started")
+            raise LinkError(self._device, f"the stream on {self._url} was not started; start it first")
         return self._port
 
     def _fail(self, error: Exception) -> NoReturn:

@@ -35,7 +35,7 @@ TROUBLE: Mapping[str, str] = {
     "campaign.event": "campaign {campaign} on {bench}: {message}",
     "step.ended": "campaign {campaign} on {bench}: step {step} of {steps} ({kind}) {outcome}: {reason}",
     "dataset.closed": "campaign {campaign} on {bench}: data set {dataset} {state}: {reason}",
-    "unit.dropped": "campaign {campaign} on {bench}: unit {unit} takes no further part: {reason}",
+    "unit.dropped": "campaign {campaign} on {bench}: unit {unit} is excluded from the rest of the campaign: {reason}",
     "request.ended": "{method} {path} failed with status {status}; X-Request-ID {request_id} names it in the log",
 }
 SERIOUS = frozenset({"warning", "error", "critical"})

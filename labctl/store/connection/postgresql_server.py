@@ -95,7 +95,9 @@ class PostgresqlServer:
             return f"the database server refuses the connection ({said}); check user, password and database in the URL"
         if state != LOCK_NOT_AVAILABLE:
             return ""
-        return f"no turn to write within {LOCK_TIMEOUT_S:g} s: another process has it; look at what writes there"
+        return (
+            f"no write access within {LOCK_TIMEOUT_S:g} s: another process has it; find out which process writes there"
+        )
 
     def was_committed(self, number: int) -> bool:
         """Ask the server what became of a transaction, once it is over: it had the turn until then."""

@@ -188,7 +188,7 @@ def test_a_server_that_stays_away_is_told(cluster: Cluster, url: str, monkeypatc
     with open_store(url, write=True) as store:
         cluster.stop()
         try:
-            with pytest.raises(DatabaseUnreachable, match=r"does not answer .*nothing of this act was kept"):
+            with pytest.raises(DatabaseUnreachable, match=r"does not answer .*nothing was stored"):
                 note(store, 1)
             with pytest.raises(DatabaseUnreachable):
                 subjects(store)
@@ -223,7 +223,7 @@ def test_a_writer_that_hangs_is_told_and_then_ended_by_the_server(url: str, monk
 
     def hang() -> None:
         with hanging.audit._database.writing():
-            with pytest.raises(StoreError, match=r"no turn to write within .*another process has it"):
+            with pytest.raises(StoreError, match=r"no write access within .*another process has it"):
                 note(hasty, 1)
             note(patient, 2)
 
