@@ -31,9 +31,9 @@ def chromium() -> Iterator[str]:
         words = [shutil.which("chromium") or "chromium", *ARGUMENTS, f"--user-data-dir={folder}", "about:blank"]
         with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
             try:
-                told = Path(folder) / "DevToolsActivePort"
-                _until(lambda: told.exists() and bool(told.read_text().strip()))
-                yield f"http://127.0.0.1:{told.read_text().split()[0]}"
+                reported = Path(folder) / "DevToolsActivePort"
+                _until(lambda: reported.exists() and bool(reported.read_text().strip()))
+                yield f"http://127.0.0.1:{reported.read_text().split()[0]}"
             finally:
                 browser.terminate()
 

@@ -74,7 +74,7 @@ async def _campaign(service: Served, watchers: int) -> dict[str, float]:
 
 
 async def _look(port: int, path: str) -> int:
-    """Read an event stream to its end; returns how often it told where the campaign is."""
+    """Read an event stream to its end; returns how often it sent the status of the campaign."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     writer.write(f"GET {path}/events HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
     heard = 0

@@ -16,7 +16,7 @@ class Actor:
     via: str = ""
 
 
-#: Who does what nobody asked for, as a campaign's changes of state in a thread of its own.
+#: Actor of what no user requested, such as a campaign's changes of state in its own thread.
 ITSELF = Actor("labctl")
 
 _actor: ContextVar[Actor] = ContextVar("actor")

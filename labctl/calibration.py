@@ -156,7 +156,7 @@ def _unit_json(unit: OutputUnit) -> OutputUnitJson:
 def read_calibration(source: Path | bytes) -> Calibration:
     """Read a calibration file; raises BadCalibrationFile when it is not whole, not ours, or was edited.
 
-    A file that another parser could read otherwise, such as one with a key that stands twice, is refused.
+    A file that another parser could read otherwise, such as one with a repeated key, is refused.
     """
     name = "calibration" if isinstance(source, bytes) else str(source)
     try:

@@ -188,10 +188,10 @@ class Client:
         pauses = iter(RECONNECT_AFTER_S)
         while True:
             try:
-                for told in self._events(campaign, after):
-                    after = told.id if isinstance(told, EventResponse) else after
+                for update in self._events(campaign, after):
+                    after = update.id if isinstance(update, EventResponse) else after
                     pauses = iter(RECONNECT_AFTER_S)
-                    yield told
+                    yield update
                 return
             except httpx.HTTPError as error:
                 pause_s = next(pauses, None)
@@ -234,10 +234,10 @@ class Client:
             if source.response.is_error:
                 source.response.read()
                 raise refusal(source.response)
-            yield from map(_told, source.iter_sse())
+            yield from map(_update, source.iter_sse())
 
 
-def _told(event: ServerSentEvent) -> EventResponse | CampaignResponse:
+def _update(event: ServerSentEvent) -> EventResponse | CampaignResponse:
     kind = CampaignResponse if event.event == "progress" else EventResponse
     return kind.model_validate_json(event.data)
 

@@ -12,7 +12,7 @@ LabctlError              exit 2, HTTP 400
 │   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
 ├── Conflict             another process holds it, or it is already so             HTTP 409
-│   ├── CertificationRefused   something speaks against a version; it can be overridden      HTTP 409
+│   ├── CertificationRefused   there are objections to a version; they can be overridden      HTTP 409
 │   ├── VersionTaken     another calibration of the unit got this number meanwhile    HTTP 409
 │   └── BenchBusy        another campaign or process drives the bench now             HTTP 409
 ├── NotAllowed           the key's role may not do this, or the request came a way it may not    HTTP 403
@@ -35,7 +35,7 @@ from labctl.json_types import JsonObject
 
 
 class LabctlError(Exception):
-    """Anything that a person can be told in one line."""
+    """Any failure that one line explains to a user."""
 
     status = 400  #: HTTP
     exit_status = 2  #: command line; 1 where the answer to a fair question is no
@@ -164,7 +164,7 @@ class VersionTaken(Conflict):
 
 
 class CertificationRefused(Conflict):
-    """Something speaks against certifying a version; it can be overridden with a reason."""
+    """There are objections to certifying a version; they can be overridden with a reason."""
 
     slug = "certification-refused"
 

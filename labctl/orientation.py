@@ -40,7 +40,8 @@ class Orientation:
     """Follows the angle of one axis, positive counter-clockwise and never wrapped.
 
     `update` takes readings as they come, compensated or not. The angle is 64-bit and keeps whole turns. A slow, steady
-    turn below `near_dps` cannot be told from an offset by the gyro alone: tell `update` with `still=False` where the
+    turn below `near_dps` cannot be distinguished from an offset by the gyro alone: tell `update` with
+    `still=False` where the
     wheels know better.
     """
 
@@ -134,12 +135,12 @@ class Orientation:
             self._angle_at_stretch_deg = self._angle_deg
         self._stretch.append((t_s, rate_dps))
         if t_s - self._stretch[0][0] >= self._rule.settle_s:
-            self._close_stretch(told=bool(still))
+            self._close_stretch(declared=bool(still))
 
-    def _close_stretch(self, *, told: bool) -> None:
+    def _close_stretch(self, *, declared: bool) -> None:
         rates = np.array([rate for _, rate in self._stretch])
         mean = float(rates.mean())
-        if not told and float(rates.std(ddof=1)) > self._rule.quiet_dps:
+        if not declared and float(rates.std(ddof=1)) > self._rule.quiet_dps:
             self._stretch.pop()
             self._moving()
             return

@@ -31,8 +31,8 @@ class Target:
         words = ["serve", "--bench", "single-axis-sim", "--port", "0", "--json", "--database", str(self.database)]
         self._process = subprocess.Popen([sys.executable, "-m", "labctl", *words], stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None
-        told = json.loads(self._process.stdout.readline())
-        self.url, self.pids = told["url"], {"bench": told["bench_pid"], "web": told["web_pid"]}
+        reported = json.loads(self._process.stdout.readline())
+        self.url, self.pids = reported["url"], {"bench": reported["bench_pid"], "web": reported["web_pid"]}
         host, _, port = self.url.partition("://")[2].rpartition(":")
         self.address = (host, int(port))
         self.http = httpx.Client(base_url=self.url, timeout=WITHIN_S)

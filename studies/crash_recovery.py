@@ -58,7 +58,7 @@ Fitted = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Kill:
-    """When a campaign is ended, by what, and for how long nobody is there."""
+    """When a campaign is ended, by what, and for how long no process runs."""
 
     at: int
     power_cut: bool

@@ -154,7 +154,7 @@ def complete_data_sets(database: Database) -> Counter[int]:
 
 
 class World:
-    """The bench that outlives every process: one simulation in one time, and what it was told to do."""
+    """The bench that outlives every process: one simulation in one time, and the commands it received."""
 
     def __init__(self, bench: BenchFile) -> None:
         self.bench_file = bench
@@ -206,7 +206,7 @@ class World:
 
     @property
     def within_limits(self) -> bool:
-        """Whether table and chamber were never told to go beyond their limits."""
+        """Whether table and chamber were never commanded beyond their limits."""
         table, chamber = self.bench_file.table, self.bench_file.chamber
         fast = all(rate <= table.max_rate_dps * (1 + 1e-6) for rate in self.rates_dps)
         return fast and all(chamber.min_c <= set_c <= chamber.max_c for set_c in self.setpoints_c)

@@ -82,9 +82,9 @@ class Service:
     def _start(self) -> None:
         self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None
-        told = json.loads(self._process.stdout.readline())
-        self.pids = {"supervisor": self._process.pid, "bench": told["bench_pid"], "web": told["web_pid"]}
-        self.http = httpx.Client(base_url=told["url"], timeout=10.0)
+        reported = json.loads(self._process.stdout.readline())
+        self.pids = {"supervisor": self._process.pid, "bench": reported["bench_pid"], "web": reported["web_pid"]}
+        self.http = httpx.Client(base_url=reported["url"], timeout=10.0)
 
     def suffer(self, fault: Fault) -> None:
         """Let a fault happen."""
@@ -132,10 +132,10 @@ def suffer(folder: Path, bench: Path, faults: tuple[Fault, ...]) -> Outcome:
         before = _readings(service.database)
         begun_s = time.monotonic()
         service.manage(next((fault.number for fault in faults if fault.process == "supervisor"), None))
-        service.asked("/health", lambda told: told["bench"]["heard_s"] < 3.0, WITHIN_S)
+        service.asked("/health", lambda reported: reported["bench"]["heard_s"] < 3.0, WITHIN_S)
         answers_after_s = time.monotonic() - begun_s
         over = {"done", "failed", "aborted"}
-        answer = service.asked(f"/api/campaigns/{campaign}", lambda told: told["state"] in over, WITHIN_S)
+        answer = service.asked(f"/api/campaigns/{campaign}", lambda reported: reported["state"] in over, WITHIN_S)
         unconfirmed = service.http.get("/health").json()["bench"]["unconfirmed"]
     finally:
         service.close()

@@ -2,7 +2,7 @@
 
 Simulated units, each with its own laws of temperature and rate, are calibrated in three powered runs, or in one with a
 data sheet, by models that are adequate and by models that are not; on a later day, after another power-on and with
-another drift, the corrected rate is held against the truth in the middle, at the edges and at a corner of the range.
+another drift, the corrected rate is compared with the truth in the middle, at the edges and at a corner of the range.
 """
 
 from __future__ import annotations

@@ -111,7 +111,7 @@ def test_files_have_the_names_of_their_field() -> None:
 
 
 def test_tests_take_what_they_share_from_helpers() -> None:
-    """A test module or a conftest is nobody's library: what two of them need is in tests/helpers."""
+    """A test module or a conftest is not imported by others: what two of them need is in tests/helpers."""
     offenders = [
         f"{file.name}: {name}"
         for file in sources()

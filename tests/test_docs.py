@@ -35,7 +35,7 @@ ROOT_PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})(?:/[\w*.-]+)+/?")
 SOURCE_FILE = re.compile(r"^[\w./*-]+\.(?:py|js|css)$")
 DOTTED = re.compile(r"\b(?:labctl|instruments|procedures|benchmarks|studies|tests)(?:\.[A-Za-z_]\w*)+")
 IMPORT = re.compile(r"^from ((?:labctl|instruments|procedures)[\w.]*) import ([\w, ]+)", re.MULTILINE)
-#: A class is told from an acronym or a product by at least two capitals with small letters behind them.
+#: A class is distinguished from an acronym or a product by at least two capitals with small letters behind them.
 CLASS = re.compile(r"^(?:[A-Z][a-z0-9]+){2,}$")
 BROWSER_CLASSES = {"EventSource"}
 MAKE = re.compile(r"(?:^|`)make ([a-z]+)", re.MULTILINE)

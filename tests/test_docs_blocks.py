@@ -76,9 +76,9 @@ def test_no_command_hides_in_a_block_of_text() -> None:
 
 def test_blocks_that_are_not_executed_are_few_and_say_why() -> None:
     marks = [(page, found["reason"] or "") for page in PAGES for found in SKIP.finditer(text_of(page))]
-    told = "\n".join(f"{page.relative_to(ROOT)}: {reason}" for page, reason in marks)
-    assert len(marks) <= MOST_SKIPPED, told
-    assert all(len(reason.split()) >= LEAST_REASON_WORDS for _, reason in marks), told
+    reported = "\n".join(f"{page.relative_to(ROOT)}: {reason}" for page, reason in marks)
+    assert len(marks) <= MOST_SKIPPED, reported
+    assert all(len(reason.split()) >= LEAST_REASON_WORDS for _, reason in marks), reported
     directives = sum(len(re.findall(r"<!--+\s*(?:;\s*)?skip", text_of(page))) for page in PAGES)
     assert directives == len(marks), 'the only form is <!-- skip: next "reason" -->'
 

@@ -17,8 +17,8 @@ WRITE = "typer labctl.cli.app utils docs --name labctl --output docs/reference/c
 
 def test_the_reference_of_the_command_line_is_that_of_the_program() -> None:
     command = [sys.executable, "-m", "typer", "labctl.cli.app", "utils", "docs", "--name", "labctl"]
-    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    assert told.strip() == PAGE.read_text(encoding="utf-8").strip(), f"write it again: python -m {WRITE}"
+    reported = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert reported.strip() == PAGE.read_text(encoding="utf-8").strip(), f"write it again: python -m {WRITE}"
 
 
 def build(docs: Path, out: Path) -> str:

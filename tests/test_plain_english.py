@@ -37,10 +37,30 @@ BANNED = {
     r"(?:came|come|comes) of it": "result, campaign that began",
     r"let(?:s|ting)? go of": "release",
     r"for ever": "without end, permanently",
+    r"told": "reported, shown, commanded, distinguished",
+    r"t(?:ake|akes|aken|aking|ook) (?:it )?up": "resume",
+    r"in doubt": "unconfirmed",
+    r"look(?:s|ed|ing)? at": "inspect, check, read, compare",
+    r"(?:is|was|not|been|last|nothing|something) heard(?: of)?": "answers, last answer, sign of life",
+    r"held against|h(?:old|olds|olding) \w+ against": "compared with",
+    r"speaks? (?:for itself|against|of)": "objection, evidence",
+    r"cut short": "interrupted, truncated",
+    r"all the same": "nevertheless",
+    r"mend(?:s|ed|ing)?": "correct, repair",
+    r"tell(?:s|ing)? (?:them |it )?apart": "distinguish",
+    r"nothing of (?:this|the) act": "nothing was stored",
+    r"version as it is|applied as it is": "without refitting",
+    r"climb(?:s|ing)?|lets? go|comes? true|stands? twice": "name what happens",
 }
 WORDS = {phrase: re.compile(rf"\b(?:{phrase})\b", re.IGNORECASE) for phrase in BANNED}
 #: Data of the database and of requests that stay as they are.
-KEPT = {("labctl/api/middleware.py", "nobody")}
+KEPT = {
+    ("labctl/api/middleware.py", "nobody"),
+    ("labctl/services/lab_service.py", "look at the bench"),
+    ("labctl/services/schemas/service.py", "look at the bench"),
+}
+#: Recognises reasons that older versions wrote into the database.
+OLD_REASONS = "labctl/services/campaigns/advice.py"
 
 
 def hits(texts: list[Written]) -> list[str]:
@@ -51,6 +71,7 @@ def hits(texts: list[Written]) -> list[str]:
         for phrase, pattern in WORDS.items()
         for found in pattern.finditer(text)
         if (where.partition(":")[0], text) not in KEPT
+        and not (OLD_REASONS in where and any(old in text for old in ("taken up|", "nothing heard|")))
     ]
 
 
@@ -71,6 +92,10 @@ def test_no_banned_word_is_read(written: Callable[[], Iterator[Written]]) -> Non
         "Nobody has made the bench safe",
         "Ask whoever is at the terminal.",
         "the rooms people enter",
+        "The campaign is taken up again",
+        "Look at the bench",
+        "Service last heard 3 s ago",
+        "a model held against a recording",
     ],
 )
 def test_a_banned_word_is_found(text: str) -> None:

@@ -38,7 +38,7 @@ class ServiceCollector(Collector):
             "labctl_campaign_running", "1 while a campaign runs on this service's bench, else 0", value=figures.running
         )
         yield GaugeMetricFamily(
-            "labctl_bench_heard_seconds", "Time since the bench process was last heard of", value=figures.heard_s
+            "labctl_bench_heard_seconds", "Time since the last answer of the bench process", value=figures.heard_s
         )
         yield from self._of_requests()
         yield from _of_the_log(self._requests.held_back)

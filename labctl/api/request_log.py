@@ -71,7 +71,7 @@ class RequestLogMiddleware:
             raise
         self._ended(scope, status, begun_s)
 
-    def _ended(self, scope: Scope, status: int, begun_s: float, **told: Any) -> None:
+    def _ended(self, scope: Scope, status: int, begun_s: float, **fields: Any) -> None:
         method = scope["method"] if scope["method"] in METHODS else "other"
         self._figures.ended[method, f"{status // 100}xx" if status else "none"] += 1
         level, limit = self._level_of(scope, status)
@@ -80,14 +80,14 @@ class RequestLogMiddleware:
             self._figures.held_back += 1
             return
         if limit is not None and (before := limit.take_count(key)):
-            told["held_back"] = before
+            fields["held_back"] = before
         caller = scope.get("state", {}).get("caller")
         if caller is not None:
-            told = {"by": caller.name, "via": caller.via, **told}
+            fields = {"by": caller.name, "via": caller.via, **fields}
         client = scope.get("client")
         log.log(
             level, "request.ended", method=method, path=scope["path"][:LONGEST_PATH], status=status,
-            took_s=round(self._clock.now_s() - begun_s, 3), client=client[0] if client else None, **told,
+            took_s=round(self._clock.now_s() - begun_s, 3), client=client[0] if client else None, **fields,
         )  # fmt: skip
 
     def _level_of(self, scope: Scope, status: int) -> tuple[int, RepetitionLimit | None]:

@@ -25,7 +25,7 @@ def log_of_command(process: str, *, default: str = "", location: str = "") -> It
     level = level_asked()
     level = LEVELS[default] if level is None else level
     if process_ends():
-        begin_log(process, level, locations=(location,))  # what nobody catches is a record too
+        begin_log(process, level, locations=(location,))  # an uncaught error is a record too
         yield
         return
     with running_log(process, level, locations=(location,)):

@@ -31,7 +31,8 @@ def print_verification(answer: VerificationResponse) -> None:
 
 
 def print_criticism(answer: CriticismResponse) -> None:
-    """Print a criticism: the version as it is, the verdict on its model refitted, the errors, a small map, a table."""
+    """Print a criticism: the version without refitting, the verdict on its model refitted, the errors, a small
+    map, a table."""
     from labctl.services.criticism.verification_text import verification_sentence
 
     whole = not console.is_terminal  # a program that reads lines gets each sentence on one

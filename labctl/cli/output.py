@@ -14,7 +14,7 @@ from rich.table import Table
 if TYPE_CHECKING:
     from labctl.services.schemas.warnings import DataWarning
 
-#: Where nobody looks at a terminal, lines are not cut to its width.
+#: Without a terminal, lines are not cut to its width.
 console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
 stderr = Console(stderr=True, highlight=False, soft_wrap=True)
 

@@ -28,12 +28,12 @@ class TerminalOperator:
         self._closed = threading.Event()
 
     def answer_prompts(self, operator: Operator, note: Callable[[str], None]) -> None:
-        """Answer for an operator from now on, in the background; `note` is told of each answer.
+        """Answer for an operator from now on, in the background; `note` is called with each answer.
 
         A bench with a unit handler asks no questions.
         """
         if isinstance(operator, HumanOperator):
-            here = copy_context()  # in the name of whoever gave the command
+            here = copy_context()  # in the name of the user who gave the command
             threading.Thread(target=here.run, args=(self._serve, operator, note), daemon=True).start()
 
     def _serve(self, operator: HumanOperator, note: Callable[[str], None]) -> None:
@@ -54,7 +54,7 @@ class TerminalOperator:
             termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
         stderr.print(f"{prompt.text}. Press Enter when it is done, or type why it cannot be done.", markup=False)
         line = sys.stdin.readline()
-        if not line:  # nobody sits there
+        if not line:  # end of input: no person is at the terminal
             return
         try:
             if why := line.strip():

@@ -77,7 +77,7 @@ class ComparisonColumnsJson(TypedDict):
 
 
 class ComparisonJson(TypedDict):
-    """A version as it is, beside a recording."""
+    """A version without refitting, beside a recording."""
 
     columns: ComparisonColumnsJson
     over_rate: list[ModelLinesJson]

@@ -78,7 +78,7 @@ class CalibrationJson(TypedDict):
 
 
 class ObjectionJson(TypedDict):
-    """One thing that speaks against certifying a version."""
+    """One objection to certifying a version."""
 
     what: str
     text: str

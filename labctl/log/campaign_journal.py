@@ -1,4 +1,4 @@
-"""The journal of a campaign, told to the log as well: every change of state, of step and of data set, every event.
+"""The journal of a campaign, written to the log as well: every change of state, of step and of data set, every event.
 
 The engine knows no log. What it hands to its journal is all that happens, so the log is written there; readings and
 the environment, which come every second, stay in the database.
@@ -45,8 +45,8 @@ class LoggedJournal:
     def _entry(self, event: str, level: str = "info", **fields: Any) -> Iterator[None]:
         with self._refusals(event, **fields):
             yield
-        told = {name: value for name, value in fields.items() if value is not None and value != ""}
-        getattr(self._log, level)(event, **told)
+        entered = {name: value for name, value in fields.items() if value is not None and value != ""}
+        getattr(self._log, level)(event, **entered)
 
     @contextmanager
     def _refusals(self, event: str, **fields: Any) -> Iterator[None]:
@@ -124,8 +124,8 @@ class LoggedJournal:
     def event(self, event: Event, t_s: float, at: datetime) -> None:
         """Record and log something worth telling a person."""
         measured = {"value": event.value, "limit": event.limit, "in": event.unit}
-        told = {"kind": event.kind, "message": event.message, **self._unit(event.device), **measured}
-        with self._entry("campaign.event", event.level, **told, t_s=_seconds(t_s), at=at):
+        entered = {"kind": event.kind, "message": event.message, **self._unit(event.device), **measured}
+        with self._entry("campaign.event", event.level, **entered, t_s=_seconds(t_s), at=at):
             self._journal.event(event, t_s, at)
 
     def _unit(self, device: str | None) -> dict[str, str | None]:

@@ -20,7 +20,7 @@ NOTES_EVERY_S = 60.0
 #: How long the end of a process waits for what has not been written, s.
 END_WITHIN_S = 2.0
 
-_Item = str | threading.Event | None  #: a line, somebody who waits, the end
+_Item = str | threading.Event | None  #: a line, a waiting thread, the end
 
 
 class LogWriter:
@@ -42,7 +42,7 @@ class LogWriter:
         self._descriptor, self._notes, self._capacity, self._notes_every_s = descriptor, notes, capacity, notes_every_s
         #: Not `queue.Queue`: its lock could be held by the very thread that an interrupt ends.
         self._queue: SimpleQueue[_Item] = SimpleQueue()
-        self._told = 0
+        self._reported = 0
         self.lost = 0  #: lines that were not written
         self._thread = threading.Thread(target=self._write_all, name="log", daemon=True)
         self._thread.start()
@@ -71,7 +71,7 @@ class LogWriter:
                 self._write_notes()
                 item.set()
                 continue
-            if self.lost > self._told:
+            if self.lost > self._reported:
                 self._write_notes()
             self._write(item)
         self._write_notes()
@@ -88,9 +88,9 @@ class LogWriter:
 
     def _write_notes(self) -> None:
         lost = self.lost
-        written = [self._write(line) for line in self._notes(lost - self._told)]
+        written = [self._write(line) for line in self._notes(lost - self._reported)]
         if all(written):
-            self._told = lost
+            self._reported = lost
 
     def _write(self, line: str) -> bool:
         rest = line.encode("utf-8", "backslashreplace") + b"\n"

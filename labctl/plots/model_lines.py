@@ -1,4 +1,4 @@
-"""A version as it is beside a recording: the model as lines over rate, and the error after a full turn."""
+"""A version without refitting beside a recording: the model as lines over rate, and the error after a full turn."""
 
 from __future__ import annotations
 

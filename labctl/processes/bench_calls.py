@@ -17,7 +17,7 @@ from labctl.services.commands.context import CommandContext
 from labctl.services.local_bench import LocalBench
 from labctl.store import Store
 
-#: A watcher is told that the process lives this often, s,
+#: A watcher gets a sign of life this often, s,
 BEAT_S = 1.0
 #: and of changes at most this often, s.
 LEAST_BEAT_S = 0.1

@@ -55,7 +55,7 @@ class BenchLine:
 
     @property
     def heard_s(self) -> float:
-        """How long ago it was last heard of, s."""
+        """Time since its last answer, s."""
         return self._heard.s
 
     def tell(self, what: str) -> None:

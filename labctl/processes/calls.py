@@ -109,14 +109,14 @@ def answer_with(work: Callable[[], object]) -> Answer:
     """Return what `work` returns, or what it raises."""
     try:
         return Answer(work())
-    except Exception as error:  # noqa: BLE001  the caller is told; this end goes on
+    except Exception as error:  # noqa: BLE001  the caller gets the error; this end continues
         return Answer(raised=error)
 
 
 def _packed(answer: Answer) -> bytes:
     try:
         return pickle.dumps(answer)
-    except Exception as error:  # noqa: BLE001  whatever cannot travel is told in words
+    except Exception as error:  # noqa: BLE001  what cannot be pickled is sent as text
         text = str(answer.raised or error)
         return pickle.dumps(
             Answer(

@@ -35,5 +35,5 @@ def listening(host: str, port: int) -> Iterator[Listening]:
                 f"--port {port} on {host}: {error.strerror}; give another port, or 0 for a free one"
             ) from error
         name = f"[{host}]" if ":" in host else host
-        listener.listen(BACKLOG)  # whoever reads the address may connect at once
+        listener.listen(BACKLOG)  # a client that reads the address may connect at once
         yield Listening(listener, name, f"http://{name}:{listener.getsockname()[1]}")

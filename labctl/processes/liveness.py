@@ -1,4 +1,4 @@
-"""How long ago something was heard of, and whether the engine still moves."""
+"""Time since the last sign of life, and whether the engine still moves."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ TRANSACTION_S = 30.0
 OPENING_S = 180.0
 #: A stop is passed on without waiting for anything.
 STOP_S = 1.0
-#: A bench process that was not heard of for so long is asked nothing but to stop.
+#: A bench process without an answer for so long gets no request but to stop.
 SILENT_S = 3.0
 RECONNECT_S = 0.5
 
@@ -128,7 +128,7 @@ class RemoteBench:
 
     @property
     def running(self) -> int | None:
-        """The campaign that ran when the bench process was last heard of."""
+        """The campaign that ran when the bench process last answered."""
         return self._beat.running
 
     @property
@@ -138,7 +138,7 @@ class RemoteBench:
 
     @property
     def heard_s(self) -> float:
-        """How long ago the bench process was last heard of, s."""
+        """Time since the last answer of the bench process, s."""
         return self._heard.s
 
     @property
@@ -151,14 +151,15 @@ class RemoteBench:
         return self._caller.call(name, *args)
 
     def runs(self, campaign: int) -> bool:
-        """Whether this campaign runs now, or did when the bench process was last heard of."""
+        """Whether this campaign runs now, or did when the bench process last answered."""
         try:
             return bool(self._ask("bench.live", campaign)[0])
         except BenchSilent:
             return self._last_live is not None and self._last_live.id == campaign
 
     def status(self, campaign: int) -> CampaignResponse | None:
-        """Return the live picture of a campaign that runs; the last one, and that it is old, while nothing is heard."""
+        """Return the live picture of a campaign that runs; the last one, and that it is old, while it does not
+        answer."""
         try:
             running, live = self._ask("bench.live", campaign)
         except BenchSilent:
@@ -178,7 +179,7 @@ class RemoteBench:
         return self._listeners.add(listener)
 
     def describe(self) -> BenchDescription | None:
-        """Return the bench and what it is doing; while nothing is heard what was last known, as unconfirmed."""
+        """Return the bench and what it is doing; while it does not answer what was last known, as unconfirmed."""
         if self.bench is None:
             return None
         with contextlib.suppress(BenchSilent):
@@ -210,7 +211,7 @@ class RemoteBench:
             while not self._over.is_set():
                 if not connection.poll(SILENT_S):
                     self._note(silent=True)
-                    self._listeners.notify()  # that nothing is heard is news too
+                    self._listeners.notify()  # silence is a change too
                     continue
                 self._beat = connection.recv()
                 self._heard.restart()

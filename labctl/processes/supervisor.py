@@ -1,7 +1,8 @@
 """The supervisor: what `labctl serve` runs. It starts the bench process and the web process, and watches both.
 
 It computes nothing and has no database open, so that little can stop it. A process that has ended, or has not been
-heard of for `SILENT_S`, is started again; a bench process starts with the safe state. An end of the supervisor itself
+sign of life for `SILENT_S`, is started again; a bench process starts with the safe state. An end of the supervisor
+itself
 ends the web process, not the bench process: the next supervisor on the same database takes charge of it.
 """
 
@@ -32,7 +33,7 @@ from procedures.execution.signals import ENDING, restore
 log = get_logger()
 
 LOOK_S = 0.5
-#: A process that was not heard of for so long is ended and started again, s.
+#: A process that gave no sign of life for so long is ended and started again, s.
 SILENT_S = 15.0
 #: Processes that end so often within a quarter of an hour are not started again.
 MOST_RESTARTS, RESTARTS_WITHIN_S = 5, 900.0
@@ -203,13 +204,13 @@ class Supervisor:
             raise
 
     def _watch(self) -> None:
-        told = Elapsed()
+        notified = Elapsed()
         while not self._waker.ending:
             self._waker.wait(LOOK_S)
             self._look_after_bench()
             self._look_after_web()
-            if told.s > systemd.period_s():
-                told.restart()
+            if notified.s > systemd.period_s():
+                notified.restart()
                 systemd.alive()
 
     def _look_after_bench(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import socket
 
-#: Leaving the bench safe may take longer than the loop may stand still; systemd is told so when stopping begins.
+#: Leaving the bench safe may take longer than the loop may stand still; systemd is notified when stopping begins.
 STOPPING_US = 600_000_000
 
 

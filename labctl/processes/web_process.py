@@ -82,7 +82,7 @@ def _end_with(line: Connection) -> None:
 
 
 def serve(line: Connection, settings: WebSettings) -> None:
-    """Serve until told to end. Raises BadInput without a key where one is needed."""
+    """Serve until the supervisor ends it. Raises BadInput without a key where one is needed."""
     service = create_service(settings)
     access = access_for(settings.request, service.store, settings.at)
     app = create_app(service, access)

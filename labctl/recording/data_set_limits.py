@@ -22,7 +22,7 @@ NUMBERS = ("dataset", "run", "mounting", "n")
 
 
 def refuse_too_many_data_sets(where: Path | str, info: RecordingInfo, columns: Columns) -> None:
-    """Raise BadRecording for a recording of more data sets than are taken in at once."""
+    """Raise BadRecording for a recording of more data sets than are imported at once."""
     if info.kind == "coefficients":
         return
     numbers = np.asarray(columns["dataset"], dtype=np.int64)

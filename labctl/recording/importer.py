@@ -25,8 +25,8 @@ OptionsT = TypeVar("OptionsT", bound=BaseModel)
 class Importer(Generic[OptionsT]):
     """Reads one format.
 
-    `probe` says how sure it is, 0 to 1 or a truth value, that a file or folder is of its format; it looks at the
-    beginning only, and at files that are not of its format too. `read` returns the recording, and raises BadRecording
+    `probe` says how sure it is, 0 to 1 or a truth value, that a file or folder is of its format; it reads the
+    beginning only, also of files that are not of its format. `read` returns the recording, and raises BadRecording
     naming file, row and what was expected; labctl then checks the recording by the rules of the interchange format.
     """
 

@@ -10,7 +10,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validato
 Axis = Literal["x", "y", "z"]
 #: What moves the unit, and so what its true rate is known from: `rates` a table, at one rate in each data set; `rest`
 #: nothing; `turns` a hand or a table, by a known angle in each data set; `profile` a table whose rate changes and is
-#: known reading by reading; `poses` a hand, between rests that gravity tells apart.
+#: known reading by reading; `poses` a hand, between rests that gravity distinguishes.
 Motion = Literal["rates", "rest", "turns", "profile", "poses"]
 
 #: Units that are rates already: what one deg/s is in them.

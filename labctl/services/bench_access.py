@@ -42,7 +42,7 @@ class BenchAccess(Protocol):
 
     @property
     def heard_s(self) -> float:
-        """How long ago the process that drives the bench was last heard of, s; 0 for this process."""
+        """Time since the last answer of the process that drives the bench, s; 0 for this process."""
         ...
 
     def runs(self, campaign: int) -> bool:

@@ -33,7 +33,7 @@ LIBRARIES = ("numpy", "scipy")
 DAMAGED = (OSError, EOFError, ValueError, KeyError, BadZipFile)
 
 
-#: The question of what takes long and is cached by nobody: only the same request has the same one.
+#: The question of a long computation without a cache: only an identical request has the same one.
 UNNAMED = ""
 
 

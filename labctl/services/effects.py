@@ -13,7 +13,7 @@ from labctl.fitting.models.error_model import is_exported
 from labctl.json_types.effects import CataloguedEffect
 from labctl.services.schemas.calibrations import CatalogueResponse
 
-#: Sizes that are not told as a coefficient: how far the thermometer is off.
+#: Sizes that are not given as a coefficient: how far the thermometer is off.
 OTHER_UNITS = {"thermometer_error": "K"}
 
 

@@ -43,7 +43,7 @@ class ServiceFigures:
     units: int
     campaigns: Mapping[str, int]  #: by state
     running: bool  #: whether a campaign runs on the bench of this service
-    heard_s: float  #: how long ago the bench was heard of, s
+    heard_s: float  #: time since the last answer of the bench, s
 
 
 class LabService:
@@ -76,7 +76,7 @@ class LabService:
         return self.bench_access.bench
 
     def start(self) -> None:
-        """Take up what an earlier process left on the bench, and start the schedule.
+        """Resume what an earlier process left on the bench, and start the schedule.
 
         A signal to end is handled here first: an HTTP server waits for its requests before it closes the service, and
         a client may follow a campaign for hours.

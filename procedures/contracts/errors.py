@@ -7,7 +7,7 @@ ProcedureError
 │   ├── SoakFailed       a temperature was not reached or did not settle in time
 │   ├── BadData          a unit's readings are missing, damaged or too few
 │   ├── GuardTripped     a limit that is watched was passed
-│   ├── TableStopped     the table does not move as it was told to, in the middle of a data set
+│   ├── TableStopped     the table does not move as commanded, in the middle of a data set
 │   └── Unanswered       a question was not answered in time
 ├── Aborted              a person asked for the end
 │   └── Interrupted      the bench had to be released; the campaign is to be resumed
@@ -22,7 +22,7 @@ from instruments.errors import copy_of
 
 
 class ProcedureError(Exception):
-    """Anything that a person can be told in one line."""
+    """Any failure that one line explains to a user."""
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle it whole: a subclass may take other arguments than its text."""
@@ -72,7 +72,7 @@ class GuardTripped(StepFailed):
 
 
 class TableStopped(StepFailed):
-    """The table does not move as it was told to, in the middle of a data set."""
+    """The table does not move as commanded, in the middle of a data set."""
 
 
 class Unanswered(StepFailed):

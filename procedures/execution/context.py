@@ -74,7 +74,7 @@ class ExecutionContext:
         self.recorder.event(Event("unit_dropped", text, level="error", device=gyro))
 
     def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
-        """Take in that a soaked temperature no longer holds, once the air has left its band."""
+        """Note that a soaked temperature no longer holds, once the air has left its band."""
         if self.soaked and abs(chamber_c - self.soaked.temperature_c) > self.soaked.band_c:
             text = f"{self.soaked.temperature_c:g} deg C was left: the air is at {chamber_c:.2f} deg C"
             self.recorder.event(Event("soak_owed", text))

@@ -32,7 +32,7 @@ class Engine:
 
     `run` blocks until the campaign is over; `control` and `progress` are for other threads. Journal times are
     campaign time: that of `time` for a resumed campaign, else seconds since `run` was called. Without `guards` the
-    recipe's own rules are held against the limits of the bench.
+    recipe's own rules are compared with the limits of the bench.
     """
 
     def __init__(

@@ -13,7 +13,7 @@ from procedures.contracts.steps import Soak
 class SoakCriterion:
     """Decides from the polls of the bench when the units have taken the temperature, and says why not yet.
 
-    The chamber's air is held against the band; leaving it starts the count again. What ends a soak is the unit: the
+    The chamber's air is compared with the band; leaving it starts the count again. What ends a soak is the unit: the
     change of its own thermometer over the last `drift_window_s`, as the slope of a straight line through that window
     times its length. A line instead of two readings, so that the thermometer's noise does not keep a soak open.
     A unit without a thermometer cannot be judged; for it the time inside the band has to do.

@@ -39,7 +39,7 @@ class BenchSnapshot:
     setpoint_c: float
     alarms: tuple[str, ...] = ()
     gyro_c: Mapping[str, float] = field(default_factory=dict)  #: by the units' own thermometers
-    silent_s: Mapping[str, float] = field(default_factory=dict)  #: device -> time since it was last heard
+    silent_s: Mapping[str, float] = field(default_factory=dict)  #: device -> time since its last answer
     taking_readings: bool = False  #: the air is meant to be at its set point
     asked_dps: float = 0.0
     rate_dps: float = 0.0

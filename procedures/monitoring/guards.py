@@ -25,7 +25,7 @@ class GuardViolation:
     message: str
 
     def event(self) -> Event:
-        """Return what the journal is told."""
+        """Return the event for the journal."""
         return Event(
             kind=f"guard.{self.kind}",
             message=self.message,
@@ -143,7 +143,7 @@ def _chamber_alarm(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
 def _stale(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     for device, silent_s in now.silent_s.items():
         if silent_s > guards.rules.stale_s:
-            yield Excess(device, silent_s, guards.rules.stale_s, "s", "nothing heard; check cable and power")
+            yield Excess(device, silent_s, guards.rules.stale_s, "s", "no answer; check cable and power")
 
 
 def _damaged(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:

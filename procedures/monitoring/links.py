@@ -1,4 +1,4 @@
-"""How each device of a bench can be reached: when it was last heard, and whether its link is degraded or lost."""
+"""How each device of a bench can be reached: when it last answered, and whether its link is degraded or lost."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ class LinkStates:
         self._broken: dict[str, LinkState] = {}
 
     def restart(self, device: str) -> None:
-        """Take in that this device alone is heard from now on."""
+        """Note that only this device answers from now on."""
         self._heard_s = {}
         self.heard(device)
 
     def heard(self, device: str) -> None:
-        """Take in that a device was heard just now."""
+        """Note that a device answered just now."""
         self._heard_s[device] = self._recorder.t_s()
 
     def forget(self, device: str, *, repaired: bool = False) -> None:
-        """Take in that a device is heard no more; with `repaired` a broken link is well again without an event."""
+        """Note that a device no longer answers; with `repaired` a broken link is well again without an event."""
         self._heard_s.pop(device, None)
         if repaired:
             self._broken.pop(device, None)

@@ -35,7 +35,7 @@ class LiveOutput:
             self._last[name] = (tuple(gyro.channels), readings, time.of(float(readings.t_s[-1])))
 
     def forget(self, name: str | None = None) -> None:
-        """Take in that a unit, or every unit, sends nothing any more."""
+        """Note that a unit, or every unit, sends nothing any more."""
         if name is None:
             self._last = {}
         else:

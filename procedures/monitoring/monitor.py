@@ -55,7 +55,7 @@ class BenchMonitor:
         self.links.restart(self._bench.chamber.name)
 
     def units_powered(self, run: int) -> None:
-        """Take in that the units were switched on (session number) or off (0)."""
+        """Note that the units were switched on (session number) or off (0)."""
         self.run = run
         self._gyro_c = {}
         self._recorder.tracker.live.forget()
@@ -65,7 +65,7 @@ class BenchMonitor:
                 self.links.heard(name)
 
     def forget(self, gyro: str) -> None:
-        """Take in that a unit is excluded from the rest of the campaign."""
+        """Note that a unit is excluded from the rest of the campaign."""
         self._recorder.tracker.live.forget(gyro)
         self._gyro_c.pop(gyro, None)
         self.links.forget(gyro)
@@ -112,7 +112,7 @@ class BenchMonitor:
             self._recorder.tracker.update(rate_dps=0.0)
 
     def add_readings(self, name: str, gyro: Gyro, readings: Readings) -> None:
-        """Take in that a unit sent readings."""
+        """Note that a unit sent readings."""
         self.links.heard(name)
         self._recorder.tracker.live.heard(name, gyro, readings, self._recorder.time)
         if (temperature_c := gyro_temperature_c(gyro, readings)) is not None:

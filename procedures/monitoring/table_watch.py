@@ -32,7 +32,7 @@ class TableWatch:
         return self._next_s
 
     def ask(self) -> None:
-        """Ask the table whether it does what it was told to, if a question is due.
+        """Ask the table whether it moves as commanded, if a question is due.
 
         One lost reply is no fault: the table is asked once more. Raises TableStopped for a table that stands during
         a run, or moves during a rest; NoReply or LinkError for one that does not answer.

@@ -1,4 +1,4 @@
-"""A fixed selection of the study: something is hidden at a size z, or nothing is, and nobody tells the criticism.
+"""A fixed selection of the study: something is hidden at a size z, or nothing is, and the criticism does not know it.
 
 Sizes are those of `studies/effect_sizes.json`. `make study` runs the whole of it, with rates and intervals.
 """

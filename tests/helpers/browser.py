@@ -113,12 +113,12 @@ class Service:
 class Faults(list[str]):
     """What a page complained of; a test that expects a complaint clears it."""
 
-    def hear(self, path: str, told: ConsoleMessage) -> None:
+    def hear(self, path: str, reported: ConsoleMessage) -> None:
         """Take in what the browser writes to its console."""
-        where = str(told.location.get("url", ""))
+        where = str(reported.location.get("url", ""))
         # few recordings have a static record; the page says so
-        if told.type == "error" and not where.endswith("/allan"):
-            self.append(f"{path}: {told.text} {where}")
+        if reported.type == "error" and not where.endswith("/allan"):
+            self.append(f"{path}: {reported.text} {where}")
 
     def check_request(self, url: str, service_url: str) -> None:
         """Note a request to any other server than the service."""

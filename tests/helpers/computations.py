@@ -67,8 +67,8 @@ def surroundings(_: Store) -> tuple[int, int, str | None, list[str]]:
 def hold(_: Store, pipe: str) -> None:
     """Write into a named pipe that this has begun, and go on until the process ends."""
     report_stage("held")
-    with Path(pipe).open("wb", buffering=0) as told:
-        told.write(BEGUN)
+    with Path(pipe).open("wb", buffering=0) as reported:
+        reported.write(BEGUN)
         while True:
             signal.pause()
 
@@ -82,21 +82,21 @@ class Held:
 
     def wait_for_begin(self) -> None:
         """Return when the work has begun."""
-        self._told = Path(self.pipe).open("rb", buffering=0)  # noqa: SIM115  closed at its end
-        assert self._told.read(len(BEGUN)) == BEGUN
+        self._reported = Path(self.pipe).open("rb", buffering=0)  # noqa: SIM115  closed at its end
+        assert self._reported.read(len(BEGUN)) == BEGUN
 
     def close(self) -> None:
         """Look no more."""
-        self._told.close()
+        self._reported.close()
 
     def wait_for_end(self) -> None:
         """Return when the process has ended."""
-        with self._told:
-            assert self._told.read() == b""
+        with self._reported:
+            assert self._reported.read() == b""
 
 
 class Writable(StoreAddress):
-    """An address by which a worker writes to an SQLite file that nobody holds."""
+    """An address by which a worker writes to an SQLite file that no process holds."""
 
     @property
     def can_write(self) -> bool:

@@ -1,4 +1,4 @@
-"""A preset model held against a recording."""
+"""A preset model compared with a recording."""
 
 from __future__ import annotations
 

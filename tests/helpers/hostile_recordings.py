@@ -1,4 +1,4 @@
-"""Recordings that nobody should send: what is in them, and what has to be said of each."""
+"""Recordings with wrong content, and the error that each has to cause."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
         column("position", pa.array([b"\xff"] * 4).view(pa.string())),
         _IN + r"'position', rows 1 to 4: not UTF",
     ),
-    "no position": (column("position", ["z", None, "z", "z"]), _IN + r"'position', row 2: '' is no body axis"),
+    "no position": (column("position", ["z", None, "z", "z"]), _IN + r"'position', row 2: '' is not a body axis"),
     "2^53 + 1": (
         column("dataset", [2**53, 2**53, 2**53 + 1, 2**53 + 1]),
         r"row 1: 9007199254740992 is beyond .*2\^53 - 1",
@@ -126,7 +126,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "2^31": (column("dataset", [1, 1, 2**31, 2**31]), r"'dataset', row 3: 2147483648 is beyond 2147483647"),
     "mounting 2^31": (column("mounting", [1, 1, 1, -(2**31)]), r"'mounting', row 4: -2147483648 is beyond"),
-    "300,000 data sets": (one_row_data_sets, r"300000 data sets; at most 50000 are taken in at once; divide"),
+    "300,000 data sets": (one_row_data_sets, r"300000 data sets; at most 50000 are imported at once; divide"),
     "1e24": (column("dataset", [1.0, 1.0, 1e24, 2e24]), r"row 3: 1e\+24 is beyond 9007199254740991"),
     "2^53 + 1 in CSV": (datasets("9007199254740991", "9007199254740993"), r"row 3: 9007199254740993 is beyond"),
     "1e24 in CSV": (datasets("1", "1e24"), r"column 'dataset', row 3: 1e\+24 is beyond"),

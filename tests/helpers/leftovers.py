@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from unittest.mock import patch
 
-#: How long a thread that was told to end may take to do so.
+#: How long a thread that was asked to end may take to do so.
 END_S = 10.0
 #: Threads of pools that a library keeps for the next call, by the beginning of their name.
 POOLS = (

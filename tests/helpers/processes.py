@@ -70,9 +70,9 @@ class ServiceProcess:
         limit = [] if open_files is None else ["prlimit", f"--nofile={open_files}:{open_files}"]
         before = ["/bin/sh", "-c", f'{shell}; exec "$0" "$@"'] if shell else []
         self.process = begin([*before, *limit, *labctl(database, *command)], log)
-        told = json.loads(first_line(self.process))
-        self.url = told["url"]
-        self.bench_pid, self.web_pid = told["bench_pid"], told["web_pid"]
+        reported = json.loads(first_line(self.process))
+        self.url = reported["url"]
+        self.bench_pid, self.web_pid = reported["bench_pid"], reported["web_pid"]
         self.http = httpx.Client(base_url=self.url, timeout=REQUEST_S)
 
     def run(self, *arguments: str, status: int = 0, key: str = "") -> subprocess.CompletedProcess[str]:

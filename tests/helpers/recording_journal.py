@@ -24,7 +24,7 @@ class RecordingJournal:
         self.dropped: list[tuple[str, str]] = []
         self.hooks: list[Callable[[str, Any], None]] = []
 
-    def _told(self, what: str, detail: Any) -> None:
+    def _reported(self, what: str, detail: Any) -> None:
         self.trace.append(f"journal.{what}")
         for hook in list(self.hooks):
             hook(what, detail)
@@ -32,44 +32,44 @@ class RecordingJournal:
     def campaign_state(self, state: Any, reason: str, t_s: float, at: Any) -> None:
         assert at.tzinfo is not None
         self.states.append((str(state), reason))
-        self._told("state", state)
+        self._reported("state", state)
 
     def step_started(self, index: int, t_s: float, at: Any) -> None:
         self.steps.append(("started", index, t_s))
-        self._told("step_started", index)
+        self._reported("step_started", index)
 
     def step_ended(self, index: int, result: Any, t_s: float, at: Any) -> None:
         self.steps.append(("ended", index, result))
-        self._told("step_ended", index)
+        self._reported("step_ended", index)
 
     def session_began(self, run: int, t_s: float) -> None:
         self.sessions.append(run)
-        self._told("session_began", run)
+        self._reported("session_began", run)
 
     def unit_dropped(self, gyro: str, reason: str) -> None:
         self.dropped.append((gyro, reason))
-        self._told("unit_dropped", gyro)
+        self._reported("unit_dropped", gyro)
 
     def dataset_opened(self, header: Any) -> int:
         self.headers.append(header)
-        self._told("dataset_opened", header)
+        self._reported("dataset_opened", header)
         return len(self.headers)
 
     def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
         self.blocks.append((dataset, gyro, readings, chamber_c))
-        self._told("readings", dataset)
+        self._reported("readings", dataset)
 
     def dataset_closed(self, dataset: int, state: Any, reason: str = "") -> None:
         self.closed.append((dataset, str(state), reason))
-        self._told("dataset_closed", dataset)
+        self._reported("dataset_closed", dataset)
 
     def environment(self, sample: Any) -> None:
         self.samples.append(sample)
-        self._told("environment", sample)
+        self._reported("environment", sample)
 
     def event(self, event: Any, t_s: float, at: Any) -> None:
         self.events.append(event)
-        self._told("event", event)
+        self._reported("event", event)
 
     def kinds(self) -> list[str]:
         return [event.kind for event in self.events]

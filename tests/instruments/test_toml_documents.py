@@ -1,4 +1,4 @@
-"""TOML that anybody may have written: nested, long and odd texts end in one line, in time."""
+"""TOML from an unknown source: nested, long and odd texts end in one line, in time."""
 
 from __future__ import annotations
 

@@ -71,8 +71,8 @@ def test_a_folder_without_a_recording_is_not_sent(client: Client, tmp_path: Path
 def test_a_campaign_is_started_watched_and_found(client: Client) -> None:
     begun = client.start_campaign(CampaignRequest(recipe="short"))
     assert isinstance(begun, CampaignResponse)
-    told = list(client.watch(begun.id))
-    events = [each for each in told if isinstance(each, EventResponse)]
+    reported = list(client.watch(begun.id))
+    events = [each for each in reported if isinstance(each, EventResponse)]
     assert [event.id for event in events] == sorted(event.id for event in events)
     assert any("campaign done" in event.message for event in events)
     assert client.campaign(begun.id).state == "done"
@@ -118,7 +118,7 @@ def test_a_broken_stream_goes_on_behind_the_last_event() -> None:
 
     clock = VirtualClock()
     with Client("http://bench", transport=httpx.MockTransport(answer), clock=clock) as client:
-        assert [told.id for told in client.watch(7)] == [1, 2, 3]
+        assert [update.id for update in client.watch(7)] == [1, 2, 3]
     assert (asked, clock.now_s()) == ([None, "1", "2", "3"], 3 * RECONNECT_AFTER_S[0])
 
 

@@ -62,8 +62,8 @@ def nested_tables(text: str) -> str:
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (nested, "nested deeper than any calibration is"),
-        (nested_tables, "nested deeper|edited or damaged"),
+        (nested, "nested too deeply for a calibration"),
+        (nested_tables, "nested too deeply|edited or damaged"),
         (lambda text: text.replace('"version":1', '"version":NaN'), "not JSON"),
         (lambda text: text.replace('"version":1', '"version":1e999'), "not JSON"),
         (lambda text: text.replace('"version":1', f'"version":{"1" * 5000}'), "4300 digits"),

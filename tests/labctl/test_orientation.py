@@ -41,7 +41,7 @@ def test_small_rates_are_not_truncated_away() -> None:
 def test_the_angle_is_held_at_standstill_from_its_beginning() -> None:
     o = Orientation()
     turned = o.follow(times(10), np.full(100, 20.0))[-1]
-    rates = np.full(300, 0.3)  # an offset that nobody knew: nothing of it is integrated once the rest counts
+    rates = np.full(300, 0.3)  # an unknown offset: nothing of it is integrated once the rest counts
     stood = o.follow(times(30, from_s=10), rates)
     assert o.standing
     assert stood[-1] == pytest.approx(turned + 0.5 * (20.0 + 0.3) * 0.1)
@@ -126,7 +126,7 @@ def test_bad_readings_are_refused_and_change_nothing(t_s: float, rate: float) ->
 def test_the_simulated_gyrostar_drifts_less_than_a_degree_a_minute() -> None:
     """The report's result: 10 min of warm-up, then a standstill that renews the offset every 2 min.
 
-    The table stands throughout, and the integration is told that it moves, so that all it gathers is drift.
+    The table stands throughout, and the integration gets `still=False`, so that all it gathers is drift.
     """
     clock = VirtualClock()
     bench = open_bench(load_bench("gyrostar-sim"), clock)

@@ -38,7 +38,7 @@ def test_ending_it_twice_in_a_row_still_leaves_the_bench_safe(
     assert end_of(simulator.folder / DATABASE) == ("aborted", "interrupted (Ctrl-C or a signal)")
 
 
-def test_impatience_once_the_table_is_told_to_stop_changes_nothing(
+def test_impatience_once_the_table_is_stop_requested_changes_nothing(
     campaign: subprocess.Popen[str], simulator: Simulator
 ) -> None:
     campaign.send_signal(signal.SIGINT)

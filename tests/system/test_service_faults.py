@@ -31,7 +31,7 @@ def service(tmp_path: Path) -> Iterator[ServiceProcess]:
 
 def started(service: ServiceProcess) -> int:
     campaign: int = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
-    asked_until(service, f"/api/campaigns/{campaign}", lambda told: told["state"] == "running")
+    asked_until(service, f"/api/campaigns/{campaign}", lambda reported: reported["state"] == "running")
     return campaign
 
 
@@ -56,18 +56,18 @@ def asked_until(service: ServiceProcess, path: str, holds: Callable[[Any], bool]
 def test_a_campaign_does_not_notice_that_the_web_process_is_killed(service: ServiceProcess) -> None:
     campaign = started(service)
     os.kill(service.web_pid, signal.SIGKILL)
-    answer = asked_until(service, f"/api/campaigns/{campaign}", lambda told: told["t_s"] is not None)
+    answer = asked_until(service, f"/api/campaigns/{campaign}", lambda reported: reported["t_s"] is not None)
     assert (answer["state"], answer["abandoned"], answer["last_error"]) == ("running", False, None)
     assert holder(service) == service.bench_pid
     assert service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "tea"}).status_code == 200
-    asked_until(service, f"/api/campaigns/{campaign}", lambda told: told["state"] == "aborted")
+    asked_until(service, f"/api/campaigns/{campaign}", lambda reported: reported["state"] == "aborted")
 
 
 def test_a_killed_bench_process_is_started_again_and_takes_its_campaign_up(service: ServiceProcess) -> None:
     campaign = started(service)
     os.kill(service.bench_pid, signal.SIGKILL)
     runs = {"state": "running", "abandoned": False, "last_error": None}
-    asked_until(service, f"/api/campaigns/{campaign}", lambda told: runs.items() <= told.items())
+    asked_until(service, f"/api/campaigns/{campaign}", lambda reported: runs.items() <= reported.items())
     assert holder(service) != service.bench_pid
     assert service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "tea"}).status_code == 200
 
@@ -75,13 +75,15 @@ def test_a_killed_bench_process_is_started_again_and_takes_its_campaign_up(servi
 def test_a_stopped_bench_process_is_told_of_and_replaced(service: ServiceProcess) -> None:
     campaign = started(service)
     os.kill(service.bench_pid, signal.SIGSTOP)
-    told = asked_until(service, "/health", lambda told: told["bench"]["heard_s"] > 3)
-    assert told["status"] == "look at the bench"
-    assert "the bench may move" in told["bench"]["unconfirmed"]
+    reported = asked_until(service, "/health", lambda reported: reported["bench"]["heard_s"] > 3)
+    assert reported["status"] == "look at the bench"
+    assert "the bench may move" in reported["bench"]["unconfirmed"]
     assert "the bench may move" in service.http.get(f"/api/campaigns/{campaign}").json()["last_error"]
     refused = service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "tea"})
     assert (refused.status_code, refused.json()["type"]) == (503, "urn:labctl:problem:bench-silent")
-    asked_until(service, "/health", lambda told: told["status"] == "ok" and told["bench"]["campaign"] == campaign)
+    asked_until(
+        service, "/health", lambda reported: reported["status"] == "ok" and reported["bench"]["campaign"] == campaign
+    )
 
 
 def test_a_bench_process_outlives_its_supervisor_and_the_next_service_takes_charge_of_it(
@@ -97,9 +99,9 @@ def test_a_bench_process_outlives_its_supervisor_and_the_next_service_takes_char
     assert (other.returncode, "drives bench single-axis-sim at speed 10" in other.stderr) == (2, True)
     heir = begin(labctl(service.database, *command, "single-axis-sim"))
     try:
-        told = json.loads(first_line(heir))
-        assert told["bench_pid"] == service.bench_pid
-        with httpx.Client(base_url=told["url"], timeout=WAIT_S) as http:
+        reported = json.loads(first_line(heir))
+        assert reported["bench_pid"] == service.bench_pid
+        with httpx.Client(base_url=reported["url"], timeout=WAIT_S) as http:
             assert http.get(f"/api/campaigns/{campaign}").json()["state"] == "running"
         heir.send_signal(signal.SIGTERM)
         _, said = heir.communicate(timeout=WAIT_S)

@@ -64,17 +64,17 @@ def test_a_campaign_is_followed_through_all_processes_and_no_key_is_in_it(
         fitted = service.http.post("/api/units/FOG-0001/calibrations", json={"effects": ["bias", "scale_factor"]})
         assert fitted.status_code == 201, fitted.text
         assert end(service) == 0
-    text, told = log.read_text(encoding="utf-8"), records(log)
+    text, reported = log.read_text(encoding="utf-8"), records(log)
     assert not [secret for secret in (*keys.values(), made, wrong, "Bearer") if secret in text]
     for process in ("supervisor", "bench", "web"):
-        of_it = [each["event"] for each in told if each["process"] == process]
+        of_it = [each["event"] for each in reported if each["process"] == process]
         assert "process.started" in of_it, process
         assert of_it[-1] == "process.ended", process
-    begun = [(each["process"], each["event"]) for each in told if each.get("request_id") == "begin-1"]
+    begun = [(each["process"], each["event"]) for each in reported if each.get("request_id") == "begin-1"]
     assert {("web", "request.ended"), ("bench", "campaign.planned")} <= set(begun)
-    states = [each["state"] for each in told if each["event"] == "campaign.state" and each["campaign"] == campaign]
+    states = [each["state"] for each in reported if each["event"] == "campaign.state" and each["campaign"] == campaign]
     assert states == ["running", "done"]
-    workers = [each["event"] for each in told if each["event"].startswith("worker.")]
+    workers = [each["event"] for each in reported if each["event"].startswith("worker.")]
     assert workers == ["worker.started", "worker.ended"]
 
 
@@ -99,11 +99,11 @@ def test_a_child_that_dies_is_told_with_how_it_ended(logging_service: tuple[Serv
     os.kill(service.web_pid, signal.SIGKILL)
     assert service.http.get("/health").status_code == 200  # by the next one
     assert end(service) == 0
-    told = [each for each in records(log) if each["event"].startswith("child.")]
-    assert [(each["event"], each["child"], each.get("status")) for each in told] == [
+    reported = [each for each in records(log) if each["event"].startswith("child.")]
+    assert [(each["event"], each["child"], each.get("status")) for each in reported] == [
         ("child.ended", "web", -signal.SIGKILL), ("child.restarted", "web", None),
     ]  # fmt: skip
-    assert told[0]["child_pid"] == service.web_pid != told[1]["child_pid"]
+    assert reported[0]["child_pid"] == service.web_pid != reported[1]["child_pid"]
 
 
 def test_a_command_logs_only_when_it_is_asked_to(tmp_path: Path) -> None:
@@ -118,6 +118,6 @@ def test_a_command_logs_only_when_it_is_asked_to(tmp_path: Path) -> None:
     quiet, asked, wrong = run(None, 0), run("info", 0), run("loud", 2)
     assert "{" not in quiet.stderr
     assert json.loads(quiet.stdout)["state"] == json.loads(asked.stdout)["state"] == "done"
-    told = [json.loads(line) for line in asked.stderr.splitlines() if line.startswith("{")]
-    assert [each["state"] for each in told if each["event"] == "campaign.state"] == ["running", "done"]
+    reported = [json.loads(line) for line in asked.stderr.splitlines() if line.startswith("{")]
+    assert [each["state"] for each in reported if each["event"] == "campaign.state"] == ["running", "done"]
     assert wrong.stderr == "labctl: LABCTL_LOG_LEVEL=loud: name one of debug, info, warning, error, critical\n"

@@ -36,8 +36,8 @@ def test_commands_ask_the_service_that_holds_the_database(service: ServiceProces
     assert json.loads(service.run("import", str(EXAMPLES / "osu-fog"), "--json").stdout)["datasets"] == 695
     fitted = json.loads(service.run("fit", "OSU-FOG-2024", "--model", "ojeda2000", "--json").stdout)
     assert fitted["version"] == 1
-    refused = service.run("fit", "NOBODY", status=2)
-    assert "unit 'NOBODY' is not in this database" in refused.stderr
+    refused = service.run("fit", "NO_SERVICE", status=2)
+    assert "unit 'NO_SERVICE' is not in this database" in refused.stderr
     service.run("certify", "OSU-FOG-2024", "1", "--by", "A. Person", "--reason", "first look")
     answer = service.http.get("/api/units/OSU-FOG-2024/calibration")
     assert answer.json()["version"] == 1
@@ -102,10 +102,10 @@ def test_sigterm_ends_the_campaign_in_the_safe_state(service: ServiceProcess) ->
 
 def test_a_listener_does_not_keep_a_service_from_making_its_bench_safe(service: ServiceProcess) -> None:
     campaign = service.http.post("/api/campaigns", json={"recipe": "short"}).json()["id"]
-    with service.following(campaign) as told:
-        next(told)
+    with service.following(campaign) as reported:
+        next(reported)
         service.process.send_signal(signal.SIGTERM)
-        assert "event: state" in list(told)  # the stream ends by itself, with the campaign
+        assert "event: state" in list(reported)  # the stream ends by itself, with the campaign
     assert service.process.wait(timeout=60) == 0
     with open_store(str(service.database), write=False) as store:
         row = store.campaigns.get(campaign)
@@ -122,10 +122,10 @@ def test_a_request_that_never_ends_does_not_either(service: ServiceProcess) -> N
         body = "Content-Type: multipart/form-data; boundary=x\r\nContent-Length: 1000\r\n\r\n"
         stalled.sendall(f"POST /api/recordings HTTP/1.1\r\nHost: {address}\r\n{body}".encode())
         assert service.http.get("/health").status_code == 200  # by now it waits for that body
-        with service.following(campaign) as told:
-            next(told)
+        with service.following(campaign) as reported:
+            next(reported)
             service.process.send_signal(signal.SIGTERM)
-            assert "event: state" in list(told)  # the stream ends with the campaign
+            assert "event: state" in list(reported)  # the stream ends with the campaign
         assert end_of(service.database, campaign)[0] == "aborted"
         service.process.send_signal(signal.SIGINT)
         assert service.process.wait(timeout=60) == 0
@@ -137,7 +137,7 @@ def test_a_page_that_a_browser_was_led_to_cannot_reach_the_service(service: Serv
     assert service.http.get("/api/units", headers={"Host": "evil.example"}).status_code == 403
     origin = {"Origin": "http://evil.example"}
     assert service.http.post("/api/campaigns", json={"recipe": "short"}, headers=origin).status_code == 403
-    assert service.http.head("/api/units/NOBODY/calibrations").status_code == 404
+    assert service.http.head("/api/units/NO_SERVICE/calibrations").status_code == 404
 
 
 def test_a_backup_of_a_database_that_a_service_holds(service: ServiceProcess, tmp_path: Path) -> None:
@@ -161,8 +161,8 @@ def test_a_service_with_keys_asks_the_command_line_too(tmp_path: Path) -> None:
         service.http.post("/api/keys/operator/revoke", json={"reason": "lost"}, headers=approver)
         assert "revoked" in service.run("fit", "OSU-FOG-2024", status=2, key=keys[Role.OPERATOR]).stderr
         rows = service.http.get("/api/audit", headers=approver).json()[3:]
-        told = [(row["who"], row["action"], row["detail"]["via"]) for row in rows]
-        assert told == [("operator", "import", "key"), ("approver", "key revoke", "key")]
+        reported = [(row["who"], row["action"], row["detail"]["via"]) for row in rows]
+        assert reported == [("operator", "import", "key"), ("approver", "key revoke", "key")]
         assert service.http.get("/health").json().keys() == {"status", "version"}
 
 

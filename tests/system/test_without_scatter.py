@@ -48,5 +48,5 @@ def test_it_goes_the_whole_way(tmp_path: Path, case: str) -> None:
     paths += ["/api/units/G/ladder", "/api/recordings/1", "/api/recordings/1/datasets", "/api/recordings/1/allan"]
     with open_client(lab.database) as client:
         asked = {path: client.get(path.rstrip("/")) for path in paths}
-    told = {200, 400, 422}
-    assert {path: each.text[:200] for path, each in asked.items() if each.status_code not in told} == {}
+    reported = {200, 400, 422}
+    assert {path: each.text[:200] for path, each in asked.items() if each.status_code not in reported} == {}

@@ -73,7 +73,7 @@ def visit(chromium: Browser, service: Service, faults: Faults) -> Iterator[Calla
         context.set_default_timeout(PATIENCE_MS)
         page = context.new_page()
         page.on("pageerror", lambda error: faults.append(f"{path}: {error}"))
-        page.on("console", lambda told: faults.hear(path, told))
+        page.on("console", lambda reported: faults.hear(path, reported))
         page.on("request", lambda asked: faults.check_request(asked.url, service.url))
         page.goto(service.url + path)
         return page

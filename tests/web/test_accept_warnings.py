@@ -31,7 +31,7 @@ def test_wrong_data_are_refused_in_words_and_fitted_only_when_it_is_insisted_on(
 
     page.get_by_label("Model", exact=True).select_option("ojeda2000")
     page.get_by_role("button", name="Fit", exact=True).click()
-    expect(dialog).to_contain_text("This speaks against it")
+    expect(dialog).to_contain_text("Objections")
     expect(dialog).to_contain_text("Wrong: data set 65, axis z: its rate is 60 deg/s, its output says 79.8")
     expect(dialog).not_to_contain_text("--accept-warnings")
     dialog.get_by_role("button", name="Cancel").click()
@@ -55,6 +55,6 @@ def test_wrong_data_are_refused_in_words_and_fitted_only_when_it_is_insisted_on(
     dialog.get_by_role("button", name="Make version anyway").click()
     page.wait_for_url("**version=2**")
     assert [row["version"] for row in service.get(path)] == [2, 1]
-    expect(page.get_by_role("region", name="Verdict")).to_contain_text("version 2 held against recording 1")
+    expect(page.get_by_role("region", name="Verdict")).to_contain_text("version 2 compared with recording 1")
     settled(page)
     faults.clear()  # the browser itself logs each refusal

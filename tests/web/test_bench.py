@@ -106,7 +106,7 @@ def test_says_that_it_is_stale_and_goes_on_where_it_was(
     page.context.set_offline(False)
     service.start()
     expect(page.get_by_text("Nothing new since")).not_to_be_visible()
-    # taken up by the service itself, or ended by its stopping: either is told
+    # taken up by the service itself, or ended by its stopping: either is shown
     expect(page.locator("main")).to_contain_text("campaign 1")
     faults.clear()
 
@@ -151,8 +151,8 @@ def test_a_bench_that_was_not_confirmed_safe_is_told_and_cleared_by_a_person(
     store, bench = service.lab_service.store, "single-axis-sim"
     store.benches.mark(bench, "the chamber did not answer: its set point is not known", SystemClock().utc())
     page = visit("/bench")
-    told = page.get_by_text(f"Bench {bench} was not confirmed safe")
-    expect(told).to_be_visible()
+    reported = page.get_by_text(f"Bench {bench} was not confirmed safe")
+    expect(reported).to_be_visible()
     expect(page.locator("main")).to_contain_text("the chamber did not answer")
     expect(page.get_by_role("region", name="No campaign is running")).to_contain_text("No campaign starts before")
     expect(page.get_by_role("button", name="Resume where it stopped")).to_be_disabled()
@@ -161,6 +161,6 @@ def test_a_bench_that_was_not_confirmed_safe_is_told_and_cleared_by_a_person(
     asked = page.get_by_role("dialog")
     asked.get_by_label("Your name").fill("Ann")
     asked.get_by_role("button", name="It is safe", exact=True).click()
-    expect(told).to_have_count(0)
+    expect(reported).to_have_count(0)
     assert store.benches.unconfirmed(bench) == ""
     expect(page.get_by_role("button", name="Resume where it stopped")).to_be_enabled()

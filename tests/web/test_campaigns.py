@@ -20,7 +20,7 @@ def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visi
 
     page = visit("/campaigns/new?recipe=short&hide=scale_factor_asymmetry")
     expect(page.get_by_role("region", name="Steps")).to_contain_text("15")
-    expect(page.get_by_role("region", name="What it can detect")).to_contain_text("It could find")
+    expect(page.get_by_role("region", name="What it can detect")).to_contain_text("It can detect")
     expect(page.get_by_role("spinbutton", name="Size")).not_to_have_value("")
     page.get_by_role("button", name="Start on").click()
     page.wait_for_url("**/bench")
@@ -75,5 +75,5 @@ def test_a_start_is_put_on_the_schedule_and_taken_out(service: Service, visit: C
     expect(entry).to_contain_text("20:00")
     expect(entry).to_contain_text("Europe/Berlin")
     entry.get_by_role("button", name="Cancel").click()
-    expect(page.locator(".toasts")).to_contain_text("Taken out")
+    expect(page.locator(".toasts")).to_contain_text("Removed from the schedule")
     assert service.get("/api/schedule") == []

@@ -29,7 +29,7 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     in_force = page.get_by_role("region", name="In force")
 
     certify.last.click()  # version 1
-    expect(dialog).to_contain_text("Adequate: nothing is missing")
+    expect(dialog).to_contain_text("Adequate: no effect is missing")
     expect(dialog.get_by_role("checkbox")).to_have_count(0)
     dialog.get_by_label("Who").fill("A. Person")
     dialog.get_by_label("Why").fill("fits")
@@ -38,7 +38,7 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     expect(in_force).to_contain_text("adequate")
 
     certify.first.click()  # version 2
-    expect(dialog).to_contain_text("This speaks against it")
+    expect(dialog).to_contain_text("Objections")
     expect(dialog).to_contain_text("the verdict on recording 1 is 'ambiguous'")
     expect(dialog).to_contain_text("of version 1, which is in force, on the same recording")
     dialog.get_by_label("Who").fill("A. Person")
@@ -48,7 +48,7 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     dialog.get_by_role("checkbox", name="Certify it despite the objections").check()
     dialog.get_by_role("button", name="Certify").click()
     expect(in_force).to_contain_text("version 2")
-    expect(in_force).to_contain_text("Certified against objections")
+    expect(in_force).to_contain_text("Certified despite objections")
     acts = page.get_by_role("region", name="Certifications").first
     expect(acts).to_contain_text("overridden")
     expect(acts).to_contain_text("needed on the robot today")

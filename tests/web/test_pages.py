@@ -84,9 +84,9 @@ def test_an_empty_house_leads_to_a_first_calibration_in_one_press(visit: Callabl
 def test_pages_that_do_not_exist_and_units_that_do_not(visit: Callable[..., Page], faults: Faults) -> None:
     from playwright.sync_api import expect
 
-    page = visit("/units/NOBODY")
-    expect(page.locator("main")).to_contain_text("NOBODY")
-    page.goto(page.url.replace("/units/NOBODY", "/effects/nothing/at/all"))
+    page = visit("/units/NO_SERVICE")
+    expect(page.locator("main")).to_contain_text("NO_SERVICE")
+    page.goto(page.url.replace("/units/NO_SERVICE", "/effects/nothing/at/all"))
     expect(page.get_by_role("heading", name="No such page")).to_be_visible()
     faults.clear()  # the browser itself logs each 404
 

@@ -53,7 +53,7 @@ def test_a_service_that_restarts_is_said_and_then_answers_again(
     fog.start()
     page.get_by_role("button", name="Preview").click()
     expect(page.get_by_role("button", name="Make version 2")).to_be_visible()
-    faults.clear()  # the browser itself logs that nobody answered
+    faults.clear()  # the browser itself logs that there was no answer
 
 
 def test_a_wrong_file_is_refused_with_the_place_of_the_fault(
@@ -121,7 +121,7 @@ def test_a_viewer_may_look_and_preview_and_nothing_else(guarded: tuple[Service, 
     page = context.new_page()
     page.goto(f"{service.url}/explore?unit=OSU-FOG-2024&version=1")
     asked = page.get_by_role("dialog")
-    expect(asked).to_contain_text("asks for a key")
+    expect(asked).to_contain_text("requires a key")
     asked.get_by_label("Key").fill(viewer)
     asked.get_by_role("button", name="Use it").click()
     page.get_by_role("region", name="Verdict").wait_for()

@@ -109,13 +109,13 @@ async def events(
     """
 
     async def stream() -> AsyncIterator[bytes]:
-        async for told in service.follow(campaign, after=last_event_id or 0):
-            if told is None:
+        async for update in service.follow(campaign, after=last_event_id or 0):
+            if update is None:
                 yield b": alive\n\n"
-            elif isinstance(told, CampaignResponse):  # no id: it is not resumed from
-                yield f"event: progress\ndata: {told.model_dump_json()}\n\n".encode()
+            elif isinstance(update, CampaignResponse):  # no id: it is not resumed from
+                yield f"event: progress\ndata: {update.model_dump_json()}\n\n".encode()
             else:
-                yield f"id: {told.id}\nevent: {told.kind}\ndata: {told.model_dump_json()}\n\n".encode()
+                yield f"id: {update.id}\nevent: {update.kind}\ndata: {update.model_dump_json()}\n\n".encode()
 
     service.status(campaign)
     return EventStream(stream(), headers={"Cache-Control": "no-cache"})

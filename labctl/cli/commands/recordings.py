@@ -59,7 +59,7 @@ def export_recording(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Write a recording in the interchange format: every reading, as it was measured."""
+    """Write a recording in the interchange format: every reading, unchanged."""
     from labctl.services.commands.open import open_readonly
     from labctl.services.recordings.transfer import export_recording as export
     from labctl.services.schemas.recordings import ExportedRecording

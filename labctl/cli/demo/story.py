@@ -41,7 +41,7 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
 
 
 def _certify_best(demo: DemoRunner, serial: str) -> None:
-    """Put the version with the least error in force; what speaks against it is said, and overridden."""
+    """Put the version with the least error in force; objections are printed, and overridden."""
     request = CertifyRequest(by="the demo", reason="computed and checked in this run of the demo", override=True)
     rows = sorted(demo.store.calibrations.of_unit(serial), key=lambda row: row.version)
     best = min(rows, key=lambda row: _least_known(row.answer["error"]))

@@ -1,4 +1,4 @@
-"""(a) The tri-axial campaign of Yang et al. 2018, judged on a second campaign that the fit has not seen."""
+"""(a) The tri-axial campaign of Yang et al. 2018, judged on a second campaign that the fit did not use."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Criticism: a model held against measurements. Lack of fit, where, suspects, and what cannot be tested.
+"""Criticism: a model compared with measurements. Lack of fit, where, suspects, and what cannot be tested.
 
 This is the public face: other packages import from here only, never from a submodule.
 """

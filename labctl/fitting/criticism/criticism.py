@@ -1,4 +1,4 @@
-"""Criticism: a model held against a recording. What remains, where, what may be missing, and what cannot be tested."""
+"""Criticism: a model compared with a recording. What remains, where, what may be missing, and what cannot be tested."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ NEAR_END = 0.9
 SAME = 0.02
 #: At most this many effects in a group of an ambiguous answer, beside exact aliases of the first and of the last.
 MOST = 4
-#: A channel of which another explains more than this share cannot be told from it.
+#: A channel of which another explains more than this share cannot be distinguished from it.
 CONFOUNDED = 0.9
 
 

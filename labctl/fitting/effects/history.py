@@ -108,7 +108,7 @@ class StartTransient(Effect):
     needs = ("t_s",)
     parameters = (Parameter("tau_s", "s", 0.5, 20.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.2)}
-    experiment = "a longer wait before each data set; look at the first seconds of all of them"
+    experiment = "a longer wait before each data set; compare the first seconds of all of them"
     draws = ("time_in_set", "previous_rate")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:

@@ -37,7 +37,7 @@ class VibrationRectification(Effect):
     id = "vibration_rectification"
     in_use = False
     term = "Vibration rectification"
-    sentence = "Near one table rate the steps shake something in resonance, and the shaking looks like a rate."
+    sentence = "Near one table rate the motor steps excite a mechanical resonance, and the vibration appears as a rate."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     parameters = (

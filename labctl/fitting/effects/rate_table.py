@@ -128,7 +128,7 @@ class MissedSteps(Effect):
 
     id = "missed_steps"
     term = "Missed steps (stall)"
-    sentence = "Above a certain rate the motor loses steps, so the table is slower than it is told."
+    sentence = "Above a certain rate the motor loses steps, so the table is slower than commanded."
     origin: ClassVar[Origin] = "bench"
     parameters = (Parameter("stall_dps", "deg/s", 20.0, 400.0),)
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}

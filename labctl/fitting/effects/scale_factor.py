@@ -132,7 +132,8 @@ class SineResponse(Effect):
     """Sine response of an open-loop interferometer: error = sin(K w) / K - w, with one constant K per axis.
 
     The coefficient that a fit estimates is the square of K, in which the law is smooth through 0 and its uncertainty
-    close to normal; K follows from it. The shape's parameter is where the law is looked at by what competes linearly.
+    close to normal; K follows from it. The shape's parameter is where the law is linearised for the effects that
+    compete linearly.
     """
 
     id = "sine_response"

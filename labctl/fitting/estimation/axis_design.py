@@ -19,7 +19,7 @@ from labctl.fitting.numeric.arrays import Array
 
 #: A column is a combination of others when less than this share of its length is left beside them.
 DEPENDENT_SHARE = 1e-9
-#: Different rates that an error in proportion to the rate takes to be told from one that is always there.
+#: Different rates that an error in proportion to the rate needs to be distinguished from one that is always there.
 TOLD_APART = 2
 
 

@@ -72,7 +72,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
 
 
 def _with_shapes(model: ErrorModel, fits: Mapping[str, AxisFit]) -> ErrorModel:
-    """Return the model whose effects have the shape that they were fitted with, for what looks at it linearly."""
+    """Return the model whose effects have the shape that they were fitted with, for linear computations with it."""
 
     def shaped(term: Term) -> Term:
         first = {

@@ -1,4 +1,4 @@
-"""Held-out errors: each temperature corrected by a fit that has not seen it."""
+"""Held-out errors: each temperature corrected by a fit without its data."""
 
 from __future__ import annotations
 

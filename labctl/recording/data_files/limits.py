@@ -38,7 +38,7 @@ class Space:
 
 
 def refuse_too_many(path: Path, rows: int, columns: int) -> None:
-    """Raise BadRecording where a file has more values than are taken in at once."""
+    """Raise BadRecording where a file has more values than are imported at once."""
     if rows * columns > MOST_VALUES:
         raise BadRecording(
             f"{path}: {rows} rows x {columns} columns = {rows * columns} values; at most {MOST_VALUES} are read from "

@@ -73,13 +73,13 @@ def _follower(axis: str, outputs: Mapping[str, Response]) -> str | None:
 
 
 def _crossed(crossed: Mapping[str, str], found: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
-    told: set[frozenset[str]] = set()
+    reported: set[frozenset[str]] = set()
     for position, other in crossed.items():
         axis = position.lstrip("-")
         mutual = [p for p, o in crossed.items() if {p.lstrip("-"), o} == {axis, other}]
         exchanged = {p.lstrip("-") for p in mutual} == {axis, other}
-        if exchanged and (pair := frozenset((axis, other))) not in told:
-            told.add(pair)
+        if exchanged and (pair := frozenset((axis, other))) not in reported:
+            reported.add(pair)
             where, do = (
                 f"axes {min(pair)} and {max(pair)}",
                 f"exchange columns gyro_{min(pair)} and gyro_{max(pair)}, or the positions",

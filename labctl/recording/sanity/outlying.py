@@ -23,7 +23,7 @@ SAME_RATE = 2e-3
 MOST_SHARE = 0.25
 #: The output's rate is that of the schedule when it is so many scatters, or this share of the fastest rate, from it.
 MATCH_SCATTERS, MATCH_SHARE = 4.0, 5e-3
-#: Different data sets that are told one by one.
+#: Different data sets that are reported one by one.
 MOST_TOLD = 5
 
 

@@ -1,4 +1,4 @@
-"""Summary of a recording's data sets: the few numbers of each that the checks look at.
+"""Summary of a recording's data sets: the few numbers of each that the checks use.
 
 The readings are needed once, data set by data set; what is kept has one row per data set.
 """

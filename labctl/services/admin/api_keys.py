@@ -12,7 +12,7 @@ from labctl.services.schemas.admin import Caller, KeyRequest, KeyResponse, NewKe
 from labctl.store import KeyRow, Store
 
 PREFIX = "labctl_"
-#: Of a key's random part. Nobody guesses 256 bits, so a slow hash would add nothing but time to every request.
+#: Of a key's random part. 256 bits cannot be guessed, so a slow hash would add nothing but time to every request.
 RANDOM_BYTES = 32
 SCHEME = "bearer"
 

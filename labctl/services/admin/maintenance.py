@@ -12,7 +12,7 @@ from labctl.store import Progress, check, copy_database
 
 
 def check_database(database: str | None, progress: Progress | None = None) -> CheckResponse:
-    """Look at all of a database: file, schema, readings, calibrations, audit trail. Raises StoreError without one."""
+    """Check all of a database: file, schema, readings, calibrations, audit trail. Raises StoreError without one."""
     location = database or default_database()
     found = check(location, progress=progress)
     return CheckResponse(

@@ -1,4 +1,4 @@
-"""Assessment of a version before it is certified: the verdict on it, and what speaks against certifying it."""
+"""Assessment of a version before it is certified: the verdict on it, and the objections to certifying it."""
 
 from __future__ import annotations
 

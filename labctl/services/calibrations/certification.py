@@ -49,7 +49,7 @@ def version_in_force(store: Store, serial: str) -> int | None:
 def certify(store: Store, serial: str, version: int, request: CertifyRequest, at: datetime) -> CertificationResponse:
     """Put a version in force, and keep the verdict on it.
 
-    Raises NotFound; CertificationRefused where something speaks against it and `request` does not override that;
+    Raises NotFound; CertificationRefused where there are objections and `request` does not override that;
     BadInput for an override whose reason is no sentence.
     """
     if request.override:

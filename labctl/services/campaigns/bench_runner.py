@@ -65,10 +65,10 @@ class BenchRunner:
         self._job: CampaignJob | None = None
         self._recovery = CampaignRecovery(store, bench, make_clock)
         self._stops = False
-        self._told_to_stop: int | None = None  #: the campaign that was told last
+        self._stop_requested: int | None = None  #: the campaign that was stopped last
         self.used = False  #: whether anything was asked of the bench here
         self._listeners = ChangeListeners()
-        #: Tries the safe state again while it is in doubt; whoever serves the bench starts it.
+        #: Tries the safe state again while it is unconfirmed; started by the process that serves the bench.
         self.safe_state = SafeStateRetry(store, bench, make_clock, self._guard, self._is_idle)
 
     @property
@@ -101,7 +101,7 @@ class BenchRunner:
 
     def runs_or_was_stopped(self, campaign: int) -> bool:
         """Return whether a campaign runs, or ended after a stop whose abort has yet to come."""
-        return campaign == self._told_to_stop or self.runs(campaign)
+        return campaign == self._stop_requested or self.runs(campaign)
 
     def runs(self, campaign: int) -> bool:
         """Whether this campaign runs here now."""
@@ -247,7 +247,7 @@ class BenchRunner:
         if job is None or campaign not in {None, job.row.id}:
             return False
         job.control.abort(reason)
-        self._told_to_stop = job.row.id
+        self._stop_requested = job.row.id
         log.warning("campaign.stop", campaign=job.row.id, bench=self._bench.name, reason=reason)
         threading.Thread(target=job.stop_if_stuck, name="stop", daemon=True).start()
         return True
@@ -257,7 +257,7 @@ class BenchRunner:
         job = self._job
         if job is not None and self.stop_now(campaign, reason) and job.thread is not None:
             job.thread.join(self.safe_within_s)
-        self._told_to_stop = None
+        self._stop_requested = None
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     def describe(self) -> BenchDescription:

@@ -15,7 +15,7 @@ from procedures.contracts.campaign_state import ENDED, CampaignState
 HEARTBEAT_S = 10.0
 #: What changes all the time, as a unit's output does, is read this often.
 LIVE_S = 1.0
-#: What one onlooker was told counts for the others this long, unless the bench rings.
+#: What one client received counts for the others this long, unless the bench rings.
 FRESH_S = 0.5
 
 Listen = Callable[[Callable[[], None]], Callable[[], None]]
@@ -23,7 +23,8 @@ T = TypeVar("T")
 
 
 class StatusCache:
-    """What many ask at the same moment is looked up once. A moment ends when the bench rings, and after FRESH_S."""
+    """What many clients request at the same moment is queried once. A moment ends when the bench rings, and after
+    FRESH_S."""
 
     def __init__(self) -> None:
         self._rung = 0
@@ -31,7 +32,7 @@ class StatusCache:
         self._found: dict[Hashable, asyncio.Future[Any]] = {}
 
     def ring(self) -> None:
-        """Take in that something has changed; called by the bench's thread."""
+        """Note that something has changed; called by the bench's thread."""
         self._rung += 1
 
     async def at(self, what: Hashable, look: Callable[[], T]) -> T:
@@ -77,8 +78,8 @@ class CampaignEventStream:
         try:
             while True:
                 bell.clear()
-                state, told = await self._told(campaign, after)
-                for event in told:
+                state, updates = await self._updates(campaign, after)
+                for event in updates:
                     after = event.id
                     yield event
                 now = await self._now(campaign)
@@ -95,7 +96,7 @@ class CampaignEventStream:
             if stop is not None:
                 stop()
 
-    async def _told(self, campaign: int, after: int) -> tuple[CampaignState, list[EventResponse]]:
+    async def _updates(self, campaign: int, after: int) -> tuple[CampaignState, list[EventResponse]]:
         """Return the state in the database, not that of the live picture, and the events that came before it.
 
         The last event is written before the state there ends, so that a client that sees the end has seen every event.
@@ -105,7 +106,7 @@ class CampaignEventStream:
             state = self._store.campaigns.state(campaign)
             return state, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
 
-        return await self._status_cache.at(("told", campaign, after), look)
+        return await self._status_cache.at(("updates", campaign, after), look)
 
     async def _now(self, campaign: int) -> CampaignResponse:
         return await self._status_cache.at(("now", campaign), lambda: self._status(campaign))

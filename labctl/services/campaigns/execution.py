@@ -79,10 +79,10 @@ def _engine(
 def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse:
     """Run the engine and close the bench; once it ends, further signals take nothing from what is to be said."""
     bench = store.campaigns.get(prepared.id).bench_name
-    with ExitStack() as until_told:
-        until_told.enter_context(for_campaign(prepared.id, bench))
+    with ExitStack() as until_reported:
+        until_reported.enter_context(for_campaign(prepared.id, bench))
         try:
-            engine.run(prepared.start_at, prepared.restart, lambda: until_told.enter_context(ignore_signals()))
+            engine.run(prepared.start_at, prepared.restart, lambda: until_reported.enter_context(ignore_signals()))
         except KeyboardInterrupt as interrupt:
             raise Stopped(_stopped(store, prepared, engine)) from interrupt
         finally:
@@ -137,7 +137,8 @@ def run_here(
 ) -> CampaignResponse:
     """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks.
 
-    `say` is told of a campaign that was left on a simulated bench. `ask_clear` is given the questions about a real
+    `say` is called with the text about a campaign that was left on a simulated bench. `ask_clear` is given the
+    questions about a real
     bench that is not confirmed yet, and returns who has. Raises Conflict for a campaign that was left on a real
     bench, StartNotConfirmed where no person has confirmed that it is clear.
     """

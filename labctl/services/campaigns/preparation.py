@@ -63,7 +63,8 @@ def refuse_unconfirmed(store: Store, bench: str) -> None:
         raise Conflict(describe_bench(row))
     tried = f" (tried again {row.attempts} times)" if row.attempts else ""
     raise Conflict(
-        f"bench {bench} was not confirmed safe{tried}: {row.unconfirmed}. Look at it, then `labctl bench clear {bench} "
+        f"bench {bench} was not confirmed safe{tried}: {row.unconfirmed}. Inspect it, then `labctl bench clear  "
+        f"{bench} "
         "--by NAME`"
     )
 
@@ -121,7 +122,7 @@ def prepare(
     try:
         bench.table.identify()
         bench.chamber.identify()
-        if bench.table.is_moving():  # whoever drove it before was killed: a move goes on without him
+        if bench.table.is_moving():  # the process that drove it was killed, and a move continues
             _rest(bench, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
         units = tuple(_unit(gyro, bench_file, clock) for gyro in bench.gyros.values())

@@ -9,7 +9,7 @@ from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import ResumePoint, Store
 from procedures.contracts.campaign_state import CampaignState
 
-#: A campaign that was taken up so often without finishing a step needs a person.
+#: A campaign that was resumed so often without finishing a step needs a person.
 MAX_RESUMES = 5
 NO_BENCH = "this service has no bench; a service on the campaign's bench or `labctl campaign resume` resumes it"
 

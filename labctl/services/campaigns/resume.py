@@ -1,4 +1,4 @@
-"""Taking up an interrupted campaign: by itself after a crash or a power cut, by a person's word after a fault."""
+"""Resuming an interrupted campaign: by itself after a crash or a power cut, by a person's word after a fault."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def resume_here(
     observe: Observe | None = None,
     attend: Attend | None = None,
 ) -> CampaignResponse:
-    """Take up a campaign in this process and run it to its end; without a number the newest that is not over."""
+    """Resume a campaign in this process and run it to its end; without a number the newest that is not over."""
     location = database or default_database()
     with open_store(location, write=False) as store:
         row = store.campaigns.get(campaign) if campaign is not None else _newest_unfinished(store)

@@ -65,7 +65,7 @@ class ForegroundControl:
                 )
         bench = load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
         answer = queue.add_start(context.store, asked.body, bench, context.now())
-        note = "; ".join(filter(None, (queue.NOBODY.format(bench=bench.name), answer.note)))
+        note = "; ".join(filter(None, (queue.NO_SERVICE.format(bench=bench.name), answer.note)))
         return answer.model_copy(update={"note": note})
 
     def resume(self, _: CommandContext, asked: CampaignResume) -> CampaignResponse:

@@ -37,7 +37,7 @@ class Computation(Protocol):
         key: str = "",
         writes: bool = False,
     ) -> Pending[T]:
-        """Begin some work, or let it wait for its turn; returns at once. `progress` is told its stages.
+        """Begin some work, or let it wait for its turn; returns at once. `progress` is called with its stages.
 
         Work with the `key` of what is under way already is not begun: the caller waits for that. Raises TooBusy.
         """

@@ -34,7 +34,7 @@ log = get_logger()
 _processes = threading.Lock()
 #: How long a worker that has sent its result may take to end, s.
 END_S = 5.0
-#: A service that has just started has other work than to load libraries that nobody may ask for, s.
+#: A service that has just started has other work than to load libraries that may never be needed, s.
 PRELOAD_AFTER_S = 15.0
 
 
@@ -100,8 +100,8 @@ class InWorkers(Pool):
             log.info("worker.ended", **about, took_s=round(self._clock.now_s() - begun_s, 2), outcome="cancelled")
             raise
         except LabctlError as error:
-            told = error_fields(error)
-            log.warning("worker.ended", **about, took_s=round(self._clock.now_s() - begun_s, 2), **told)
+            failure = error_fields(error)
+            log.warning("worker.ended", **about, took_s=round(self._clock.now_s() - begun_s, 2), **failure)
             raise
         except Exception as error:
             log.error("worker.failed", **about, took_s=round(self._clock.now_s() - begun_s, 2), exc_info=error)

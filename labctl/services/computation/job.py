@@ -34,7 +34,7 @@ class Client(Protocol):
 
     @property
     def progress(self) -> Progress:
-        """What is told of a stage; raises Cancelled once no caller waits for the result."""
+        """Report a stage; raises Cancelled once no caller waits for the result."""
         ...
 
 
@@ -45,7 +45,7 @@ class Job:
         self.call, self.key, self.writes = call, key, writes
         self.actor, self.request_id = actor(), request_id()
         self.future: Future[Any] = Future()
-        self.future.set_running_or_notify_cancel()  # nobody who waits for it can cancel it for all
+        self.future.set_running_or_notify_cancel()  # a waiting caller cannot cancel it for the others
         self._guard = threading.Lock()
         self._waiting: list[Client] = []
         self._stage = ""

@@ -123,7 +123,7 @@ class Pool(ABC):
             if self._closed:
                 raise ComputationEnded(ENDS)
             result = self._result_of(job)
-        except BaseException as raised:  # noqa: BLE001  whoever waits for it is told
+        except BaseException as raised:  # noqa: BLE001  the waiting caller gets the error
             error = raised
         with self._guard:
             if not isinstance(error, Cancelled):

@@ -1,1 +1,1 @@
-"""A calibration version held against a recording."""
+"""A calibration version compared with a recording."""

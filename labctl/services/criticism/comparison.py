@@ -1,4 +1,5 @@
-"""A calibration version as it is, beside a recording: measured and modelled error, and the model as lines on a grid.
+"""A calibration version without refitting, beside a recording: measured and modelled error, and the model as lines
+on a grid.
 
 Nothing is fitted here: points, lines, what remains and the error per turn all come from the version's own model.
 """

@@ -1,4 +1,4 @@
-"""Criticism: a calibration version held against a recording."""
+"""Criticism: a calibration version compared with a recording."""
 
 from __future__ import annotations
 

@@ -60,7 +60,8 @@ def _experiments(store: Store, campaign: int | None, found: Criticism) -> list[E
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:
-    """Return the version as it is on the recording; None where it cannot be applied there: a channel is missing."""
+    """Return the version without refitting on the recording; None where it cannot be applied there: a channel is
+    missing."""
     try:
         return verify(store, calibration, measured)
     except LabctlError:

@@ -1,4 +1,4 @@
-"""Verification: a calibration version applied as it is to a recording; nothing is fitted."""
+"""Verification: a calibration version applied without refitting to a recording; nothing is fitted."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ EFFORT = 1
 
 
 def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
-    """Take in a recording from a folder; all of it or nothing. Raises BadRecording."""
+    """Import a recording from a folder; all of it or nothing. Raises BadRecording."""
     recording = read_recording(folder)
     number = store.recordings.add_import(recording, at)
     row = store.recordings.get(number)
@@ -100,7 +100,7 @@ def zip_recording(store: Store, recording: int, file_format: Literal["parquet", 
     with staging_folder() as made:
         folder = made / name
         written = export_recording(store, recording, folder, file_format)
-        target = tempfile.TemporaryFile(prefix="labctl-export-")  # noqa: SIM115  closed by whoever sends it
+        target = tempfile.TemporaryFile(prefix="labctl-export-")  # noqa: SIM115  closed by the sender
         try:
             packing = ZIP_DEFLATED if file_format == "csv" else ZIP_STORED
             with ZipFile(target, "w", packing, compresslevel=EFFORT) as archive:

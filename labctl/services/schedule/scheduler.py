@@ -37,7 +37,7 @@ class Runs(Protocol):
         ...
 
     def resume_interrupted(self) -> None:
-        """Take up what was interrupted, once that may be."""
+        """Resume what was interrupted, as soon as that is allowed."""
         ...
 
     def start(self, request: CampaignRequest) -> CampaignResponse:
@@ -78,7 +78,7 @@ class Scheduler:
             try:
                 self.tick()
                 self._note_trouble("")
-            except Exception as error:  # noqa: BLE001  a schedule that nobody looks at any more would be worse
+            except Exception as error:  # noqa: BLE001  the thread has to survive, or no start is made any more
                 self._note_trouble(f"{type(error).__name__}: {error}", error)
 
     def _note_trouble(self, trouble: str, error: Exception | None = None) -> None:
@@ -148,7 +148,7 @@ class Scheduler:
         starts = self._store.starts
         try:
             campaign = self._runner.start(_request(row)).id
-        except BenchBusy:  # somebody was quicker: it waits its turn
+        except BenchBusy:  # another campaign began first: this one waits
             starts.put_back(claim)
         except (LabctlError, InstrumentError, ProcedureError) as error:
             starts.conclude(claim, self._clock.utc(), "refused", str(error))

@@ -89,7 +89,7 @@ class BackupNote(Request):
 
 
 class FindingResponse(ResponseModel):
-    """Something that is not as it was written."""
+    """Damage that was found."""
 
     part: str
     text: str

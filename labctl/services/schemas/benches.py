@@ -65,7 +65,7 @@ class BenchDescription(ResponseModel):
     campaign: int | None = Field(description="The campaign that runs now.")
     unconfirmed: str = Field(description="What its last safe state could not confirm; empty when all is well.")
     heard_s: float = Field(
-        default=0.0, description="How long ago the process that drives it was last heard of, s; 0: it is this one."
+        default=0.0, description="Time since the last answer of the process that drives it, s; 0: it is this one."
     )
 
 

@@ -67,7 +67,7 @@ class ErrorFigures(ResponseModel):
 
     raw_rms_dps: float | None = Field(description="Before any compensation.")
     rms_dps: float | None = Field(description="After compensation, on the data of the fit.")
-    heldout_rms_dps: float | None = Field(description="Each temperature predicted by a fit that has not seen it.")
+    heldout_rms_dps: float | None = Field(description="Each temperature predicted by a fit without its data.")
     noise_floor_dps: float | None = Field(description="Root of the mean variance of a data-set mean: white and drift.")
     noise_floor_source: str = Field(default="none", description="What the noise floor was found from.")
 
@@ -130,9 +130,9 @@ class ImproveResponse(ChangedModel):
 
 
 class PreviewResponse(ChangedModel):
-    """What a changed model would be; nothing was kept, so it has no version of its own."""
+    """What a changed model would be; nothing was stored, so it has no version of its own."""
 
-    residuals: ResidualColumns = Field(description="What the changed model leaves, data set by data set.")
+    residuals: ResidualColumns = Field(description="Residuals of the changed model, by data set.")
 
 
 class LadderRow(ResponseModel):
@@ -144,7 +144,7 @@ class LadderRow(ResponseModel):
     model: str
     effects: list[str]
     applied_rms_dps: float | None = Field(
-        default=None, description="Of a version of another recording: its error on this one, applied as it is."
+        default=None, description="Of a version of another recording: its error on this one, applied without refitting."
     )
     raw_rms_dps: float | None
     rms_dps: float | None
@@ -210,7 +210,7 @@ class Surface(ResponseModel):
 
 
 class SurfaceResponse(ResponseModel):
-    """What a calibration takes off, within what was calibrated."""
+    """The error that a calibration subtracts, within the calibrated range."""
 
     serial: str
     version: int

@@ -193,7 +193,7 @@ class CampaignResponse(ResponseModel):
         default=None, description="Whether `resume` would be accepted here now; null in lists."
     )
     resume_reason: str = Field(
-        default="", description="Why it would not be accepted, or what speaks against it although it would be."
+        default="", description="Why it would not be accepted, or the objections although it would be."
     )
 
 
@@ -208,5 +208,5 @@ class EventResponse(ResponseModel):
     message: str
     device: str | None = Field(default=None, description="The instrument or unit that it is about.")
     value: float | None = Field(default=None, description="What was measured, in `unit`.")
-    limit: float | None = Field(default=None, description="Which limit it was held against, in `unit`.")
+    limit: float | None = Field(default=None, description="Which limit it was compared with, in `unit`.")
     unit: str | None = None

@@ -30,7 +30,7 @@ class CertifyRequest(RevokeRequest):
 
 
 class Objection(ResponseModel):
-    """One thing that speaks against certifying a version."""
+    """One objection to certifying a version."""
 
     what: Literal["verdict", "worse", "data"]
     text: str = Field(description="What is the case, with figures in deg/s.")

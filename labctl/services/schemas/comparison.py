@@ -35,9 +35,9 @@ class ComparisonColumns(ResponseModel):
     rate_level_dps: list[float] = Field(default_factory=list, description="Centre of its level of the table rate.")
     measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
     modelled_error_dps: list[float] = Field(
-        default_factory=list, description="What the version takes off: output minus corrected rate."
+        default_factory=list, description="What the version subtracts: output minus corrected rate."
     )
-    residual_dps: list[float] = Field(default_factory=list, description="What it leaves: corrected minus own rate.")
+    residual_dps: list[float] = Field(default_factory=list, description="Residual: corrected rate minus own rate.")
     turn_before_deg: list[float | None] = Field(
         default_factory=list,
         description="Error after a full turn with the static bias alone taken off; null: too slow, another axis turns, "
@@ -47,7 +47,7 @@ class ComparisonColumns(ResponseModel):
 
 
 class ComparisonResponse(ResponseModel):
-    """A version applied as it is, and a recording."""
+    """A version applied without refitting, and a recording."""
 
     serial: str
     version: int

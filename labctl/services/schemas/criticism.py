@@ -32,7 +32,8 @@ class AxisVerification(ResponseModel):
 
 
 class VerificationResponse(ResponseModel):
-    """A calibration version applied as it is to a recording, nothing fitted. Errors: corrected minus true rate."""
+    """A calibration version applied without refitting to a recording, nothing fitted. Errors: corrected minus true
+    rate."""
 
     serial: str
     version: int
@@ -52,7 +53,7 @@ class VerificationResponse(ResponseModel):
 
 
 class CriticismResponse(ResponseModel):
-    """A model held against a recording: the verdict in one of five forms, and what it stands on."""
+    """A model compared with a recording: the verdict in one of five forms, and what it stands on."""
 
     serial: str
     version: int
@@ -122,7 +123,7 @@ class ResidualColumns(ResponseModel):
 
 
 class ResidualsResponse(ResponseModel):
-    """What a version leaves of a recording."""
+    """The residual of a version on a recording."""
 
     serial: str
     version: int

@@ -92,7 +92,7 @@ class RecipeResponse(ResponseModel):
     datasets: int | None = None
     expected_s: float | None = None
     refused: str | None = Field(default=None, description="Why this bench cannot do it; then there are no figures.")
-    remark: str = Field(default="", description="What speaks against it although the bench can do it.")
+    remark: str = Field(default="", description="Objections to it although the bench can do it.")
 
 
 class TimelineColumns(ResponseModel):

@@ -31,7 +31,7 @@ class SimulatedRequest(Request):
 
 
 class ExampleRequest(Request):
-    """Which of the recordings that come with labctl to take in."""
+    """Which of the recordings that come with labctl to import."""
 
     name: str = Field(
         max_length=100, description="osu-fog: a real fibre-optic gyro; weiss-gyrostar: a published table."

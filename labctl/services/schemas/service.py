@@ -33,7 +33,7 @@ class HeartbeatResponse(ResponseModel):
 
     status: Literal["ok"] = "ok"
     version: str
-    heard_s: float = Field(description="How long ago the process that drives the bench was last heard of, s.")
+    heard_s: float = Field(description="Time since the last answer of the process that drives the bench, s.")
 
 
 class ServiceReady(ResponseModel):

@@ -30,7 +30,7 @@ class FileIdentity:
         self._known = [identity_of(path) for path in self._paths]
 
     def forget_log(self) -> None:
-        """Take in that the writing connection is opened anew, and perhaps the log with it."""
+        """Note that the writing connection is opened anew, and perhaps the log with it."""
         self._known[1] = None
 
     def changed(self) -> str:

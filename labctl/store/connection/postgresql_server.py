@@ -19,7 +19,8 @@ from labctl.store.connection.writer_lock import ServiceAddress
 WRITER_KEY = int.from_bytes(b"labctl", "big")
 #: A transaction waits so long for the one before, and one that does nothing is ended by the server after it, s.
 LOCK_TIMEOUT_S = IDLE_TIMEOUT_S = 20
-#: A server that is restarted within 30 s ends no campaign; who only reads is told soon that it does not answer, s.
+#: A server that is restarted within 30 s ends no campaign; a reading request is answered soon that it does not answer,
+#: s.
 WRITER_PATIENCE_S, READER_PATIENCE_S = 45.0, 2.0
 #: A disk without room, and a lock that was given to no one in time.
 DISK_FULL, LOCK_NOT_AVAILABLE = "53100", "55P03"
@@ -61,7 +62,7 @@ class PostgresqlServer:
         """Do nothing: a connection is to one database."""
 
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
-        """Do nothing: a transaction is told by itself."""
+        """Do nothing: a transaction announces itself."""
 
     def begun(self, connection: sa.Connection, *, synced: bool) -> int:
         """Wait for the turn to write; returns the number of the transaction."""

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from instruments.clock import Clock, WallClock
 from labctl.errors import StoreError
 
-#: How long a writer waits for the one before, s of wall time. Transactions are short (some 50 ms): whoever holds the
+#: How long a writer waits for the one before, s of wall time. Transactions are short (some 50 ms): a process that
+#: holds the
 #: connection for so long is at fault, and an engine that cannot write down what it measures stops its table.
 WRITER_DEADLINE_S = 20.0
 #: How long it waits where the one before is overdue already, so that what must still be tried is tried at once.

@@ -30,7 +30,7 @@ Progress = Callable[[str, int, int], None]  #: which part, how far, of how many
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is not as it was written: in which part, and what."""
+    """Damage that was found: in which part, and what."""
 
     part: str
     text: str

@@ -55,7 +55,7 @@ class MeansCheck:
 
 
 class KeptMeans:
-    """The figures kept of one recording's data sets, held against readings."""
+    """The figures kept of one recording's data sets, compared with readings."""
 
     def __init__(self, connection: sa.Connection, recording: int) -> None:
         self.recording = recording

@@ -1,4 +1,4 @@
-"""Benches: what the last safe state could not confirm, until a person has looked and said so."""
+"""Benches: what the last safe state could not confirm, until a person has inspected the bench and confirmed it."""
 
 from __future__ import annotations
 
@@ -88,7 +88,8 @@ class Benches:
 
     @transaction
     def clear(self, name: str, by: str, reason: str, at: datetime) -> BenchRow:
-        """Take in that a person has looked. Raises NotFound, and Conflict when there is nothing to clear."""
+        """Record that a person has inspected the bench. Raises NotFound, and Conflict when there is nothing to
+        clear."""
         found = self.get(name)
         if found is None:
             raise NotFound(f"bench {name!r} was never used with this database; `labctl bench status` lists them")

@@ -26,7 +26,7 @@ from labctl.store.repositories.audit import append
 from labctl.store.repositories.units import add_missing_unit, remember_unit
 from labctl.store.schema import tables
 
-#: Where several processes write (PostgreSQL): an import that gave no sign for so long is nobody's any more.
+#: Where several processes write (PostgreSQL): an import that gave no sign for so long belongs to no process any more.
 ABANDONED_AFTER = timedelta(minutes=15)
 
 

@@ -32,7 +32,7 @@ class Recordings:
         self._database = database
 
     def add_import(self, recording: Recording, at: datetime, simulated: JsonObject | None = None) -> int:
-        """Take in a recording made elsewhere; returns its number. All of it is kept, or nothing. Raises BadRecording.
+        """Import a recording made elsewhere; returns its number. All of it is kept, or nothing. Raises BadRecording.
 
         It is no transaction, but a sequence of short ones; what takes time is done between them. `simulated` says,
         for the audit trail, what a simulated recording was made from.

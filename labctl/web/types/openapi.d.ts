@@ -1429,7 +1429,7 @@ export interface components {
             unconfirmed: string;
             /**
              * Heard S
-             * @description How long ago the process that drives it was last heard of, s; 0: it is this one.
+             * @description Time since the last answer of the process that drives it, s; 0: it is this one.
              * @default 0
              */
             heard_s: number;
@@ -1459,7 +1459,7 @@ export interface components {
             unconfirmed: string;
             /**
              * Heard S
-             * @description How long ago the process that drives it was last heard of, s; 0: it is this one.
+             * @description Time since the last answer of the process that drives it, s; 0: it is this one.
              * @default 0
              */
             heard_s: number;
@@ -1783,7 +1783,7 @@ export interface components {
             resumable: boolean | null;
             /**
              * Resume Reason
-             * @description Why it would not be accepted, or what speaks against it although it would be.
+             * @description Why it would not be accepted, or the objections although it would be.
              * @default
              */
             resume_reason: string;
@@ -2058,12 +2058,12 @@ export interface components {
             measured_error_dps: number[];
             /**
              * Modelled Error Dps
-             * @description What the version takes off: output minus corrected rate.
+             * @description What the version subtracts: output minus corrected rate.
              */
             modelled_error_dps: number[];
             /**
              * Residual Dps
-             * @description What it leaves: corrected minus own rate.
+             * @description Residual: corrected rate minus own rate.
              */
             residual_dps: number[];
             /**
@@ -2079,7 +2079,7 @@ export interface components {
         };
         /**
          * ComparisonResponse
-         * @description A version applied as it is, and a recording.
+         * @description A version applied without refitting, and a recording.
          */
         ComparisonResponse: {
             /** Serial */
@@ -2188,7 +2188,7 @@ export interface components {
         };
         /**
          * CriticismResponse
-         * @description A model held against a recording: the verdict in one of five forms, and what it stands on.
+         * @description A model compared with a recording: the verdict in one of five forms, and what it stands on.
          */
         CriticismResponse: {
             /** Serial */
@@ -2418,7 +2418,7 @@ export interface components {
             rms_dps: number | null;
             /**
              * Heldout Rms Dps
-             * @description Each temperature predicted by a fit that has not seen it.
+             * @description Each temperature predicted by a fit without its data.
              */
             heldout_rms_dps: number | null;
             /**
@@ -2468,7 +2468,7 @@ export interface components {
             value: number | null;
             /**
              * Limit
-             * @description Which limit it was held against, in `unit`.
+             * @description Which limit it was compared with, in `unit`.
              */
             limit: number | null;
             /** Unit */
@@ -2476,7 +2476,7 @@ export interface components {
         };
         /**
          * ExampleRequest
-         * @description Which of the recordings that come with labctl to take in.
+         * @description Which of the recordings that come with labctl to import.
          */
         ExampleRequest: {
             /**
@@ -2710,7 +2710,7 @@ export interface components {
             version: string;
             /**
              * Heard S
-             * @description How long ago the process that drives the bench was last heard of, s.
+             * @description Time since the last answer of the process that drives the bench, s.
              */
             heard_s: number;
         };
@@ -3011,7 +3011,7 @@ export interface components {
             effects: string[];
             /**
              * Applied Rms Dps
-             * @description Of a version of another recording: its error on this one, applied as it is.
+             * @description Of a version of another recording: its error on this one, applied without refitting.
              */
             applied_rms_dps: number | null;
             /** Raw Rms Dps */
@@ -3167,7 +3167,7 @@ export interface components {
         };
         /**
          * Objection
-         * @description One thing that speaks against certifying a version.
+         * @description One objection to certifying a version.
          */
         Objection: {
             /**
@@ -3334,7 +3334,7 @@ export interface components {
         };
         /**
          * PreviewResponse
-         * @description What a changed model would be; nothing was kept, so it has no version of its own.
+         * @description What a changed model would be; nothing was stored, so it has no version of its own.
          */
         PreviewResponse: {
             /** Serial */
@@ -3392,7 +3392,7 @@ export interface components {
              * @description Effects of the fit that are not exported with the calibration.
              */
             left_out: components["schemas"]["LeftOut"][];
-            /** @description What the changed model leaves, data set by data set. */
+            /** @description Residuals of the changed model, by data set. */
             residuals: components["schemas"]["ResidualColumns"];
         };
         /**
@@ -3483,7 +3483,7 @@ export interface components {
             refused: string | null;
             /**
              * Remark
-             * @description What speaks against it although the bench can do it.
+             * @description Objections to it although the bench can do it.
              * @default
              */
             remark: string;
@@ -3723,7 +3723,7 @@ export interface components {
         };
         /**
          * ResidualsResponse
-         * @description What a version leaves of a recording.
+         * @description The residual of a version on a recording.
          */
         ResidualsResponse: {
             /** Serial */
@@ -4055,7 +4055,7 @@ export interface components {
         };
         /**
          * SurfaceResponse
-         * @description What a calibration takes off, within what was calibrated.
+         * @description The error that a calibration subtracts, within the calibrated range.
          */
         SurfaceResponse: {
             /** Serial */
@@ -4392,7 +4392,8 @@ export interface components {
         };
         /**
          * VerificationResponse
-         * @description A calibration version applied as it is to a recording, nothing fitted. Errors: corrected minus true rate.
+         * @description A calibration version applied without refitting to a recording, nothing fitted. Errors: corrected minus true
+         *     rate.
          */
         VerificationResponse: {
             /** Serial */

@@ -1,4 +1,4 @@
-"""The F4 through its bytes: units, limits, rounding, care for its EEPROM, and nobody's profile ended."""
+"""The F4 through its bytes: units, limits, rounding, care for its EEPROM, and no running profile ended."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ def test_every_path_asks_for_its_role_and_no_more(guarded: Guarded, method: str,
         assert (answer.status_code != 403) == allowed, role
         if not allowed:
             assert answer.json()["type"] == "urn:labctl:problem:not-allowed"
-            assert f"{role.value} is {role.value}; this asks for" in answer.json()["detail"]
+            assert f"{role.value} is {role.value}; use a key of the role" in answer.json()["detail"]
 
 
 @pytest.mark.parametrize("path", ["/", "/units/FOG-0001", "/static/js/main.js"])
@@ -137,7 +137,7 @@ def test_a_key_is_shown_once_and_kept_as_a_digest(guarded: Guarded, tmp_path: Pa
         made = create_key(store, KeyRequest(name="robot", role=Role.VIEWER), CLOCK.utc())
         other = create_key(store, KeyRequest(name="other", role=Role.VIEWER), CLOCK.utc())
         assert made.key != other.key
-        with pytest.raises(Conflict, match="made before"):
+        with pytest.raises(Conflict, match="exists already"):
             create_key(store, KeyRequest(name="robot", role=Role.APPROVER), CLOCK.utc())
         with pytest.raises(NotFound, match="no key 'nobody'"):
             revoke_key(store, "nobody", "x", CLOCK.utc())
@@ -267,5 +267,5 @@ def test_who_acts_on_loopback(loopback: Ask) -> None:
 
 def test_calibrations_can_be_asked_for_by_head(loopback: Ask) -> None:
     for path in ("calibration", "calibrations", "ladder"):
-        answer = loopback("head", f"/api/units/NOBODY/{path}")
+        answer = loopback("head", f"/api/units/NO_SERVICE/{path}")
         assert answer.status_code in {400, 404}, path

@@ -145,12 +145,12 @@ def test_the_fit_is_the_command_lines(fog: TestClient) -> None:
 @pytest.mark.parametrize(
     ("method", "path", "body", "status", "slug"),
     [
-        ("get", "/api/units/NOBODY", None, 404, "not-found"),
+        ("get", "/api/units/NO_SERVICE", None, 404, "not-found"),
         ("get", "/api/recordings/9", None, 404, "not-found"),
         ("get", "/api/campaigns/9", None, 404, "not-found"),
         ("get", "/api/campaigns/9/events", None, 404, "not-found"),
         ("get", "/api/nowhere", None, 404, "http-404"),
-        ("post", "/api/units/NOBODY/calibrations", {"model": "ojeda2000"}, 404, "not-found"),
+        ("post", "/api/units/NO_SERVICE/calibrations", {"model": "ojeda2000"}, 404, "not-found"),
         ("post", "/api/units/OSU-FOG-2024/calibrations", {"model": "x"}, 400, "bad-input"),
         ("post", "/api/units/OSU-FOG-2024/calibrations", {"modell": "x"}, 422, "bad-request"),
         ("post", "/api/units/OSU-FOG-2024/calibrations/1/revoke", {"by": "A", "reason": "B"}, 409, "conflict"),
@@ -226,4 +226,4 @@ def test_a_service_that_starts_again_says_what_was_left(tmp_path: Path) -> None:
         assert "taken_up" in [event["kind"] for event in events]
         assert client.get("/api/campaigns/1").json()["state"] == "done"
         again = client.post("/api/campaigns/1/resume", json={"by": "Ada"})
-        assert (again.status_code, "cannot be finished twice" in again.json()["detail"]) == (409, True)
+        assert (again.status_code, "is done and cannot be resumed" in again.json()["detail"]) == (409, True)

@@ -1,4 +1,5 @@
-"""A version as it is beside a recording: points are the recording's, lines are the model's, nothing is refitted."""
+"""A version without refitting beside a recording: points are the recording's, lines are the model's, nothing is
+refitted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Uploads and bodies that nobody should send are refused in one line: never 500, and nothing of them is kept."""
+"""Uploads and bodies with wrong content are refused in one line: never 500, and nothing of them is kept."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def test_campaigns_are_counted_by_state(ran: TestClient) -> None:
 
 
 def test_requests_are_counted(client: TestClient) -> None:
-    client.get("/api/units/NOBODY")
+    client.get("/api/units/NO_SERVICE")
     client.request("INVENTED", "/api/units")
     found = metrics(client)["labctl_http_requests"]
     assert value(found, method="GET", status="4xx") == 1
@@ -56,14 +56,14 @@ def test_requests_are_counted(client: TestClient) -> None:
 @contextmanager
 def statements(store: Store) -> Iterator[list[str]]:
     """Yield every statement that is executed while the block runs."""
-    told: list[str] = []
+    reported: list[str] = []
 
     def note(_connection: Any, _cursor: Any, statement: str, *_: Any) -> None:
-        told.append(statement)
+        reported.append(statement)
 
     sa.event.listen(sa.Engine, "before_cursor_execute", note)
     try:
-        yield told
+        yield reported
     finally:
         sa.event.remove(sa.Engine, "before_cursor_execute", note)
 

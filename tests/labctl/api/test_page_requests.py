@@ -58,7 +58,7 @@ def test_certifications_are_listed_newest_first(fog: TestClient) -> None:
     ]  # fmt: skip
     assert history[0]["due"] is None
     assert history[1]["due"] > history[1]["at"]
-    assert fog.get("/api/units/NOBODY/certifications").status_code == 404
+    assert fog.get("/api/units/NO_SERVICE/certifications").status_code == 404
 
 
 def by_cell(columns: dict[str, list[Any]], *names: str) -> dict[tuple[str, int], tuple[Any, ...]]:

@@ -41,7 +41,7 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
 
 
 def in_pieces(size: int) -> Iterator[bytes]:
-    """A body whose length nobody was told before."""
+    """A body whose length was not declared."""
     for _ in range(0, size, 500):
         yield b" " * 500
 

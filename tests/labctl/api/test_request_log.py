@@ -23,7 +23,7 @@ def test_an_act_is_one_record_with_the_number_of_its_request(client: TestClient,
         client.get(f"/api/campaigns/{number}/events")
         client.get("/api/units?key=labctl_not_to_be_shown")
     assert answer.headers["x-request-id"] == "mine-1"
-    (ended,) = records.named("request.ended")  # what only reads is told at DEBUG
+    (ended,) = records.named("request.ended")  # what only reads is reported at DEBUG
     assert (ended["method"], ended["path"], ended["status"]) == ("POST", "/api/campaigns", 201)
     assert (ended["request_id"], ended["by"], ended["level"]) == ("mine-1", "local", "info")
     (planned,) = records.named("campaign.planned")
@@ -49,7 +49,7 @@ def test_a_number_that_is_none_is_replaced(client: TestClient, given: str) -> No
 def test_refused_requests_are_bounded_and_counted(client: TestClient, tmp_path: Path) -> None:
     with logged(tmp_path) as records:
         for _ in range(500):
-            client.get("/api/units/NOBODY")
+            client.get("/api/units/NO_SERVICE")
     assert len(records.named("request.ended")) == MOST_REFUSED
     assert f"labctl_log_records_held_back_total {500 - MOST_REFUSED}.0" in client.get("/metrics").text
 
@@ -84,7 +84,7 @@ def test_a_flood_of_requests_that_cannot_be_read_is_a_few_records(
         for _ in range(200):
             with server.connect(b"NO HTTP AT ALL\r\n\r\n") as client:
                 assert b"400" in rest_of(client)
-    told = [each for each in records.all() if each.get("logger") == "uvicorn.error"]
-    assert len(told) == MOST_FOREIGN
+    reported = [each for each in records.all() if each.get("logger") == "uvicorn.error"]
+    assert len(reported) == MOST_FOREIGN
     (held_back,) = records.named("log.held_back")
     assert held_back["records"] == 200 - MOST_FOREIGN

@@ -76,7 +76,7 @@ def test_a_published_table_becomes_a_calibration(lab: Lab) -> None:
     assert table["temperature_c"] == [16.0, 18.0, 19.5, 22.0, 23.0, 45.0]
     assert table["bias"]["value"][0] == pytest.approx((2.428 - 2.5) / 0.022)
     assert table["scale_factor"]["value"][4] == pytest.approx(22.078 / 22.0 - 1)
-    assert "only model weiss1995" in lab.run("fit", "WEISS-ENV05S", "--model", "ojeda2000", status=2).stderr
+    assert "fit it with --model weiss1995" in lab.run("fit", "WEISS-ENV05S", "--model", "ojeda2000", status=2).stderr
 
 
 def test_export_and_import_again_give_the_same_fit(fog: Lab) -> None:
@@ -209,7 +209,7 @@ MANY = [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0]
         (_bad_option, "datagram"),
         (_fit(FEW, [25, 35, 45]), "rates"),
         (_fit(MANY, [25, 25.2, 25.4]), "temperature"),
-        (lambda _: ["fit", "NOBODY", "--model", "ojeda2000"], "unit 'NOBODY' is not in this database"),
+        (lambda _: ["fit", "NO_SERVICE", "--model", "ojeda2000"], "unit 'NO_SERVICE' is not in this database"),
         (lambda _: ["fit", "OSU-FOG-2024", "--model", "nonsense"], "error model 'nonsense' is not known"),
         (lambda _: ["fit", "OSU-FOG-2024", "--effects", "saturatoin"], "did you mean saturation"),
         (lambda _: ["fit", "OSU-FOG-2024", "--model", "ojeda2000", "--recording", "77"], "recording 77 is not in"),
@@ -225,8 +225,8 @@ MANY = [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0]
             "'ghost' cannot be hidden",
         ),
         (lambda _: ["certify", "OSU-FOG-2024", "9", "--by", "A", "--reason", "B"], "no calibration version 9"),
-        (lambda _: ["serve", "--host", "0.0.0.0"], "no key to ask for"),
-        (lambda _: ["serve", "--require-keys"], "--require-keys, and there is no key to ask for"),
+        (lambda _: ["serve", "--host", "0.0.0.0"], "no key exists yet"),
+        (lambda _: ["serve", "--require-keys"], "--require-keys, and there is no key exists yet"),
         (lambda _: ["serve", "--port", "99999"], "--port 99999: 1 to 65535, or 0 for a free one"),
     ],
 )

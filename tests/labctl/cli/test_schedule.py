@@ -1,4 +1,5 @@
-"""The schedule on the command line, without a service: entries are kept, and it is said that nobody begins them."""
+"""The schedule on the command line, without a service: entries are kept, and a note says that no service begins
+them."""
 
 from __future__ import annotations
 
@@ -57,7 +58,7 @@ def test_an_entry_is_kept_and_it_is_said_that_nobody_begins_it(lab: Lab) -> None
     assert [entry["id"] for entry in lab.json("campaign", "schedule", "list")] == [2, 1]
     listed = lab.run("campaign", "schedule", "list")
     assert "30 2 * * MON" in listed.stdout
-    assert "no service holds this database" in listed.stderr
+    assert "no service uses this database" in listed.stderr
     assert lab.json("campaign", "schedule", "cancel", "1")["state"] == "cancelled"
     assert [entry["id"] for entry in lab.json("campaign", "schedule", "list")] == [2]
     assert lab.json("campaign", "schedule", "show", "1")["due_at"] is None

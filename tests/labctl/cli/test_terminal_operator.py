@@ -1,4 +1,4 @@
-"""Whoever sits at the terminal that runs a campaign: what counts as an answer, and that it is written down."""
+"""The operator at the terminal that runs a campaign: what counts as an answer, and that it is recorded."""
 
 from __future__ import annotations
 

@@ -187,8 +187,8 @@ def test_too_little_data_says_how_much_more(
         ("nonsense", [], "error model 'nonsense' is not known; there are ojeda2000"),
         (None, ["bais"], "effect 'bais' is not in the catalogue; did you mean bias"),
         (None, ["bias:2"], "has no polynomial order"),
-        (None, ["scale_factor_odd:9"], "not a whole number from 3 to 5"),
-        (None, [], "say which model to fit"),
+        (None, ["scale_factor_odd:9"], "is not a whole number; give one from 3 to 5"),
+        (None, [], "give the model to fit"),
     ],
 )
 def test_unknown_names_are_named(make_points: Make, model: str | None, effects: list[str], said: str) -> None:

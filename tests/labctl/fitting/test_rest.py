@@ -1,4 +1,5 @@
-"""A temperature loop at rest: what is an error of the bias is fitted and told apart, and no scale factor is claimed."""
+"""A temperature loop at rest: what is an error of the bias is fitted and distinguished, and no scale factor is
+claimed."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def test_a_number_that_is_none_is_refused(
     make_points: Callable[..., Recording], grid_11_by_11: Any, rate: float, warm: float
 ) -> None:
     calibration = calibrated(make_points, grid_11_by_11, "bias_scale")
-    with pytest.raises(BadInput, match="must be a number between"):
+    with pytest.raises(BadInput, match="give a number between"):
         uncertainty_of(calibration, rate, warm)
 
 

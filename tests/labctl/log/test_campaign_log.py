@@ -78,21 +78,21 @@ def silent(records: Records) -> list[Record]:
 
 
 def test_a_campaign_that_fails(tmp_path: Path) -> None:
-    """The gyro is silent from its twelfth minute on: every attempt is told, and why the campaign ended."""
+    """The gyro is silent from its twelfth minute on: every attempt is logged, and why the campaign ended."""
     with logged(tmp_path) as records:
         answer = run_with(tmp_path, fault=("sim://kvh-rd2100/fog", 720.0))
     assert answer.state == "failed"
     last = states(records)[-1]
     assert last == ("failed", answer.reason)
     assert records.named("campaign.state")[-1]["level"] == "error"
-    told = silent(records)
-    assert {each["unit"] for each in told} == {"FOG-0001"}
-    attempts = [each["message"] for each in told if each["kind"] == "link.retry"]
+    reported = silent(records)
+    assert {each["unit"] for each in reported} == {"FOG-0001"}
+    attempts = [each["message"] for each in reported if each["kind"] == "link.retry"]
     assert [text.split(" failed: ")[0] for text in attempts] == [f"attempt {n} of 5" for n in (1, 2, 3)]
-    assert [each["kind"] for each in told if each["kind"] != "link.retry"] == [
+    assert [each["kind"] for each in reported if each["kind"] != "link.retry"] == [
         "link.degraded", "link.lost", "guard.stale",
     ]  # fmt: skip
-    assert told[-1]["limit"] < told[-1]["value"]
+    assert reported[-1]["limit"] < reported[-1]["value"]
     ended = [each for each in records.named("step.ended") if each["outcome"] != "done"]
     assert [(each["step"], each["outcome"]) for each in ended] == [(14, "interrupted"), (14, "failed")]
     assert ended[-1]["reason"] == answer.reason

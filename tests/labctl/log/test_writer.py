@@ -1,4 +1,5 @@
-"""Handing a line to the log costs nobody anything: not a reader that stands still, a full disk, or no output at all."""
+"""Handing a line to the log never blocks the caller: not a reader that stands still, a full disk, or no output at
+all."""
 
 from __future__ import annotations
 
@@ -29,16 +30,16 @@ def everything(reading: int) -> list[str]:
 def test_lines_come_out_in_order_and_whole(pipe: tuple[int, int]) -> None:
     reading, writing = pipe
     writer = LogWriter(writing)
-    told = [f"line {number} {'x' * number * 10}" for number in range(60)]
-    for line in told:
+    reported = [f"line {number} {'x' * number * 10}" for number in range(60)]
+    for line in reported:
         writer.put(line)
     writer.close(SOON_S)
-    assert everything(reading) == told
+    assert everything(reading) == reported
     assert writer.lost == 0
 
 
 def test_a_reader_that_stands_still_costs_records_and_no_time(pipe: tuple[int, int]) -> None:
-    """The pipe is full, the writing thread stands in it: whoever hands a line over does not notice."""
+    """The pipe is full, the writing thread blocks in it: the caller that hands a line over does not."""
     reading, writing = pipe
     writer = LogWriter(writing, capacity=100, notes=lambda lost: [f"{lost} lost"] if lost else [])
     handed_over = threading.Event()

@@ -1,4 +1,4 @@
-"""Calls between processes: values, errors and who acts travel; an end that is silent is told of in time."""
+"""Calls between processes: values, errors and who acts travel; a silent end is reported in time."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def test_a_call_carries_its_arguments_and_who_acts(tmp_path: Path, in_turn: bool
 
 def test_what_is_raised_is_raised_here_with_all_it_says(tmp_path: Path) -> None:
     def full(*_: Any) -> Answer:
-        return Answer(raised=DiskFull("no room; nothing was kept", cause="no room"))
+        return Answer(raised=DiskFull("no room; nothing was stored", cause="no room"))
 
-    with serving(tmp_path / "calls", full) as caller, pytest.raises(DiskFull, match="nothing was kept") as caught:
+    with serving(tmp_path / "calls", full) as caller, pytest.raises(DiskFull, match="nothing was stored") as caught:
         caller.call("any")
     assert caught.value.cause == "no room"
 
@@ -75,7 +75,7 @@ def test_an_end_that_does_not_answer_is_silent_after_a_time_and_its_late_answer_
 
 def test_no_process_at_all_is_silent(tmp_path: Path) -> None:
     with pytest.raises(BenchSilent, match="cannot be reached"):
-        Caller(tmp_path / "nobody", WAIT_S).call("any")
+        Caller(tmp_path / "no_process", WAIT_S).call("any")
 
 
 def test_a_process_that_has_gone_is_noticed_by_callers_that_knew_it(tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
-"""The bench process as the web process sees it: transactions run there, campaigns are controlled, silence is told."""
+"""The bench process as the web process sees it: transactions run there, campaigns are controlled, silence is
+reported."""
 
 from __future__ import annotations
 

@@ -115,15 +115,15 @@ def test_a_service_hears_of_signals_until_it_is_closed(tmp_path: Path, monkeypat
 
 def test_a_service_that_cannot_say_where_it_is_ends_its_processes(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
-    told: list[supervisor.Ready] = []
+    reported: list[supervisor.Ready] = []
 
     def fails(service: supervisor.Ready) -> None:
-        told.append(service)
-        raise BrokenPipeError("nobody reads")
+        reported.append(service)
+        raise BrokenPipeError("no reader")
 
     with pytest.raises(BrokenPipeError):
         supervisor.serve_forever(ServeRequest(port=0, database=location), fails)
-    (service,) = told
+    (service,) = reported
     assert holder_of(location) is None
     for pid in (service.bench_pid, service.web_pid):
         with pytest.raises(ProcessLookupError):
@@ -133,14 +133,14 @@ def test_a_service_that_cannot_say_where_it_is_ends_its_processes(tmp_path: Path
 def test_a_process_that_ends_again_and_again_ends_the_service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(supervisor, "MOST_RESTARTS", 0)
     location = str(tmp_path / "lab.sqlite")
-    told: list[supervisor.Ready] = []
+    reported: list[supervisor.Ready] = []
 
     def kill(service: supervisor.Ready) -> None:
-        told.append(service)
+        reported.append(service)
         os.kill(service.web_pid, signal.SIGKILL)
 
     with pytest.raises(LabctlError, match="the web process"):
         supervisor.serve_forever(ServeRequest(port=0, database=location), kill)
     assert holder_of(location) is None
     with pytest.raises(ProcessLookupError):
-        os.kill(told[0].bench_pid, 0)
+        os.kill(reported[0].bench_pid, 0)

@@ -12,10 +12,10 @@ from labctl.processes import systemd
 
 def test_the_supervisor_tells_its_manager(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
-    systemd.ready()  # nobody listens: nothing happens
+    systemd.ready()  # no listener: nothing happens
     address = str(tmp_path / "notify")
     monkeypatch.setenv("NOTIFY_SOCKET", address)
-    systemd.ready()  # nobody listens there either
+    systemd.ready()  # no listener there either
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(address)
         manager.settimeout(5)

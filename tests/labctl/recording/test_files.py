@@ -96,13 +96,13 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path) -> None:
         (lambda r: [*r, "1,6.0,10,25.0,10.0"], r"column 'dataset', row 5: number 1 returns"),
         (lambda r: [*r[:1], "1.5" + r[1][1:], *r[2:]], r"column 'dataset', row 1: 1.5 is not a whole number"),
         (lambda r: r[:1], r"no rows below the header"),
-        (lambda r: [r[0] + ",gyro_z", *[x + ",1" for x in r[1:]]], r"column 'gyro_z' stands more than once"),
+        (lambda r: [r[0] + ",gyro_z", *[x + ",1" for x in r[1:]]], r"column 'gyro_z' is repeated in the header"),
         (lambda r: [*r[:2], "1,0.1,10,25.0", *r[3:]], r"expected 5 columns"),
         (lambda r: [r[0].replace(",", ";"), *r[1:]], r"separated by ';'"),
         (lambda r: [*r[:2], '1,0.1,10,"25,0",10.2', *r[3:]], r"row 2: '25,0' is not a number .*decimal point"),
         (
             lambda r: [r[0] + ",position", *[x + ",up" for x in r[1:]]],
-            r"column 'position', row 1: 'up' is no body axis",
+            r"column 'position', row 1: 'up' is not a body axis",
         ),
     ],
 )
@@ -117,7 +117,7 @@ def test_bad_rows_are_named(folder: Path, change: Callable[[list[str]], list[str
     [
         (HEAD.replace("serial", "seriel"), r"seriel: Extra inputs"),
         (HEAD.replace('Z"', '"'), r"started_at: .*timezone"),
-        (HEAD.replace('axes = ["z"]', 'axes = ["z", "z"]'), "an axis stands twice"),
+        (HEAD.replace('axes = ["z"]', 'axes = ["z", "z"]'), "an axis is repeated"),
         (HEAD + '[output.z]\nunit = "furlong"\n', r"output.z"),
         (HEAD + '[output.z]\nunit = "V"\n', r"needs a scale"),
         (HEAD + '[output.z]\nunit = "V"\nscale = 0.0\n', r"scale must be a finite number other than 0"),

@@ -1,4 +1,4 @@
-"""Files that nobody should send end in one line that names place, value and limit, in bounded memory and time."""
+"""Files with wrong content end in one line that names place, value and limit, in bounded memory and time."""
 
 from __future__ import annotations
 

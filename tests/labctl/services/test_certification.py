@@ -76,7 +76,7 @@ def test_a_version_worse_than_its_parent_or_than_the_one_in_force_is_refused(lab
     lab.run("improve", FOG, "--remove", "scale_factor_odd")
     said = lab.run("certify", FOG, "2", *BY, "--reason", "fits", status=2).stderr
     assert "of version 1, which it was made from, on the same recording" in said
-    assert "certify version 1, or improve this one" in said
+    assert "certify version 1, or improve this version" in said
     lab.run("fit", FOG, "--model", "ojeda2000")
     lab.run("certify", FOG, "3", *BY, "--reason", "fits")
     said = lab.run("certify", FOG, "2", *BY, "--reason", "fits", status=2).stderr

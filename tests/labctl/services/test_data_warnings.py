@@ -168,8 +168,8 @@ def test_a_fit_that_is_worse_than_none_is_refused_with_its_figures_and_not_kept(
     monkeypatch.setattr(fitting, "fit", worse_fit)
     before = lab.content()
     refused = lab.run("fit", FOG, "--model", "ojeda2000", status=2).stderr
-    assert "it leaves 109.4 deg/s RMS of its own data" in refused
-    assert "is off by 104.9 deg/s" in refused
+    assert "its residual on the data of the fit is 109.4 deg/s RMS" in refused
+    assert "the error without correction is 104.9 deg/s" in refused
     assert "--accept-warnings" in refused
     assert lab.content() == before
     accepted = lab.json("fit", FOG, "--model", "ojeda2000", "--accept-warnings")

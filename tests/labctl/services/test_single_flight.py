@@ -34,7 +34,7 @@ class Client:
 
 
 class Work:
-    """Reports two stages; between them it waits until it is told to go on."""
+    """Reports two stages; between them it waits until it is released."""
 
     def __init__(self) -> None:
         self.begun, self.go_on, self.times = threading.Event(), threading.Event(), 0

@@ -1,4 +1,4 @@
-"""The audit trail: every act is in it, and whoever changes, removes, moves or cuts rows is found out."""
+"""The audit trail: every act is in it, and changed, removed, moved or cut rows are detected."""
 
 from __future__ import annotations
 
@@ -260,7 +260,7 @@ class AlwaysThere(BenchRunner):
         return campaign_status(self._store, campaign)
 
     def start(self, request: CampaignRequest) -> CampaignResponse:
-        while self._job is not None:  # the one that was taken up before
+        while self._job is not None:  # the one that was resumed before
             self._job.thread.join()
         return super().start(request)
 
@@ -275,7 +275,7 @@ def test_every_act_over_http_leaves_its_row(location: str) -> None:
     assert acting_paths - set(ASKING) == set(ACTS)
     assert set(ASKING) <= acting_paths
     with TestClient(application, headers={"Labctl-User": "A. Person"}) as client:
-        prepare(store, "short", bench, VirtualClock(), clip=False).bench.close()  # one that nobody runs
+        prepare(store, "short", bench, VirtualClock(), clip=False).bench.close()  # one that no process runs
         store.benches.mark(bench.name, "the chamber did not answer", SystemClock().utc())
         for path, (action, act) in ACTS.items():
             before = store.audit.rows()

@@ -282,7 +282,7 @@ def test_too_many_data_sets_are_refused_before_anything_is_written(
     monkeypatch.setattr(data_set_limits, "MOST_DATA_SETS", 100)
     recording = one_row_sets(101)
     before = rows_of(store.location)
-    with pytest.raises(BadRecording, match="101 data sets; at most 100 are taken in at once; divide the recording"):
+    with pytest.raises(BadRecording, match="101 data sets; at most 100 are imported at once; divide the recording"):
         store.recordings.add_import(recording if kind == "samples" else to_points(recording), AT)
     assert rows_of(store.location) == before
     assert store.recordings.add_import(one_row_sets(100), AT) == 1

@@ -99,7 +99,7 @@ def test_a_flipped_bit_in_a_block_is_found(location: str) -> None:
     (finding,) = check(location).findings
     assert finding.part == "readings"
     assert "recording 1 data set 1 block 0" in finding.text
-    assert "checksum does not fit" in finding.text
+    assert "checksum is wrong" in finding.text
     said = labctl(location, "check", status=1)
     assert "readings: recording 1 data set 1 block 0" in said.stdout
     assert said.stdout.strip().endswith("1 finding")
@@ -123,7 +123,7 @@ def test_a_block_that_was_cut_short_under_a_new_checksum_is_found(location: str)
         ("DELETE FROM sample_blocks WHERE recording_id = 2", "readings", "recording 2 (points) has no table any more"),
         ("UPDATE sample_blocks SET n = n - 1 WHERE id = 1", "readings", "recording 1 data set 1 block 0"),
         ("UPDATE calibrations SET document = replace(document, '\"z\"', '\"y\"')", "calibrations", "edited or damaged"),
-        ("UPDATE calibrations SET hash = substr(hash, 2) || '0'", "calibrations", "its document is another one"),
+        ("UPDATE calibrations SET hash = substr(hash, 2) || '0'", "calibrations", "its document was changed"),
         ("UPDATE certifications SET version = 7", "file", "row 1 of certifications names a row of calibrations"),
         ("UPDATE audit SET actor = 'nobody' WHERE id = 3", "audit", "row 3: its content"),
         ("DELETE FROM audit WHERE id = 6", "audit", "row 6: 1 rows are missing at the end"),

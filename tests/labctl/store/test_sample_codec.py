@@ -58,7 +58,7 @@ def test_even_times_and_constants_cost_nearly_nothing() -> None:
 def test_a_damaged_block_is_noticed() -> None:
     block = pack({"v": np.arange(100) ** 2}, FINAL)
     flipped = bytes([*block.data[:-1], block.data[-1] ^ 1])
-    with pytest.raises(StoreError, match="checksum does not fit"):
+    with pytest.raises(StoreError, match="checksum is wrong"):
         unpack(replace(block, data=flipped))
 
 

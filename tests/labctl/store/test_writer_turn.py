@@ -1,4 +1,4 @@
-"""Whoever waits for the one writing connection does not wait for ever, and is told who has it."""
+"""A writer waits for the one writing connection for a limited time, and the error names its holder."""
 
 from __future__ import annotations
 

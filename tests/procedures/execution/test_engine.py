@@ -225,7 +225,7 @@ def test_a_campaign_can_be_resumed_in_the_middle(rig: Any) -> None:
     before = rig.trace[: rig.trace.index("table.spin")]
     assert "table.home" in before
     assert "chamber.set_temperature_c" in before
-    assert not any(entry.startswith("hand.") for entry in before)  # nobody turns or switches what stayed as it was
+    assert not any(entry.startswith("hand.") for entry in before)  # what is unchanged is neither turned nor switched
     soaking = [sample for sample in rig.journal.samples if sample.t_s < rig.journal.headers[0].gate_from_s]
     assert len(soaking) >= 12
     assert {sample.run for sample in soaking} == {0, 1}

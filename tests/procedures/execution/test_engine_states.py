@@ -36,7 +36,7 @@ class Campaign(RuleBasedStateMachine):
         self.legs = 0
         self.state = CampaignState.PLANNED
         self.killed = False
-        self.told = [CampaignState.PLANNED]
+        self.reported = [CampaignState.PLANNED]
 
     def leg(self, **commands: Any) -> None:
         """Run from where the campaign stands; `acts` are done at the n-th entry of the journal, counted from here."""
@@ -50,7 +50,7 @@ class Campaign(RuleBasedStateMachine):
 
         def hook(what: str, detail: Any) -> None:
             if what == "state":
-                self.told.append(detail)
+                self.reported.append(detail)
             if what == "step_ended":
                 index, result = rig.journal.steps[-1][1:]
                 self.finished |= {index} if result.outcome in {"done", "skipped"} else set()
@@ -145,7 +145,7 @@ class Campaign(RuleBasedStateMachine):
 
     @invariant()
     def states_follow_the_table(self) -> None:
-        for before, after in zip(self.told, self.told[1:], strict=False):
+        for before, after in zip(self.reported, self.reported[1:], strict=False):
             assert after in NEXT[before], f"{before} -> {after}"
 
     @invariant()

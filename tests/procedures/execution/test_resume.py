@@ -1,4 +1,4 @@
-"""Taking up an interrupted campaign: what comes first, what is done again, and what is not."""
+"""Resuming an interrupted campaign: what comes first, what is done again, and what is not."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def at(rig: Any, kind: str, number: int = 0) -> int:
 
 
 def at_temperature(rig: Any, temperature_c: float = 30.0) -> None:
-    """The chamber kept its set point while nobody was there."""
+    """The chamber kept its set point while no process ran."""
     rig.chamber.from_c = rig.chamber.setpoint_c = temperature_c
 
 

@@ -1,4 +1,4 @@
-"""The judge of a soak, told of looks at the bench by hand."""
+"""The judge of a soak, fed with readings of the bench by hand."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from procedures.execution.soak_criterion import SoakCriterion
 STEP = Soak(temperature_c=20, hold_s=600, band_c=0.5, max_drift_c=0.1, drift_window_s=300, timeout_s=5000)
 
 
-def told(chamber_c: list[float], gyro_c: list[float] | None = None, step: Soak = STEP) -> SoakCriterion:
+def reported(chamber_c: list[float], gyro_c: list[float] | None = None, step: Soak = STEP) -> SoakCriterion:
     judge = SoakCriterion(step)
     for index, air_c in enumerate(chamber_c):
         judge.add(10.0 * index, air_c, {"imu": gyro_c[index]} if gyro_c else {})
@@ -21,47 +21,47 @@ def told(chamber_c: list[float], gyro_c: list[float] | None = None, step: Soak =
 
 
 def test_it_ends_exactly_when_the_time_is_held() -> None:
-    assert not told([20.4] * 60).settled()
-    assert told([20.4] * 61).settled()
-    assert told([20.4] * 61).held_s == 600
+    assert not reported([20.4] * 60).settled()
+    assert reported([20.4] * 61).settled()
+    assert reported([20.4] * 61).held_s == 600
 
 
 def test_the_band_is_inclusive_and_has_two_sides() -> None:
-    assert told([20.5] * 61).settled()
-    assert told([19.5] * 61).settled()
-    assert not told([20.51] * 61).settled()
-    assert not told([19.49] * 61).settled()
+    assert reported([20.5] * 61).settled()
+    assert reported([19.5] * 61).settled()
+    assert not reported([20.51] * 61).settled()
+    assert not reported([19.49] * 61).settled()
 
 
 def test_time_outside_does_not_count_and_leaving_starts_again() -> None:
-    judge = told([25.0] * 10 + [20.0] * 31 + [20.6] + [20.0] * 11)
+    judge = reported([25.0] * 10 + [20.0] * 31 + [20.6] + [20.0] * 11)
     assert (judge.held_s, judge.restarts) == (100.0, 1)
     assert "for 100 s of 600 s, leaving the band 1 times" in judge.why_not()
 
 
 def test_arriving_is_not_a_restart() -> None:
-    assert told([25.0] * 5 + [20.0] * 5).restarts == 0
+    assert reported([25.0] * 5 + [20.0] * 5).restarts == 0
 
 
 def test_a_unit_that_still_follows_keeps_the_soak_open() -> None:
     lagging = [20 + 10 * math.exp(-10 * index / 720) for index in range(500)]  # 12 minutes behind the air
-    index = next(n for n in range(61, 500) if told([20.0] * n, lagging[:n]).settled())
+    index = next(n for n in range(61, 500) if reported([20.0] * n, lagging[:n]).settled())
     # the line's slope over the last window against the exponential's own: 10 K / 720 s x 300 s x exp(-t / 720 s)
     middle_s = 10 * (index - 1) - 150
     assert 300 * 10 / 720 * math.exp(-middle_s / 720) == pytest.approx(0.1, rel=0.05)
-    assert "imu still changes by -" in told([20.0] * 100, lagging[:100]).why_not()
+    assert "imu still changes by -" in reported([20.0] * 100, lagging[:100]).why_not()
 
 
 def test_the_window_has_to_be_full_before_a_drift_is_believed() -> None:
     quick = Soak(temperature_c=20, hold_s=60, band_c=0.5, max_drift_c=0.1, drift_window_s=300, timeout_s=5000)
-    assert not told([20.0] * 30, [20.0] * 30, quick).settled()
-    assert "not watched for 300 s yet" in told([20.0] * 30, [20.0] * 30, quick).why_not()
-    assert told([20.0] * 31, [20.0] * 31, quick).settled()
+    assert not reported([20.0] * 30, [20.0] * 30, quick).settled()
+    assert "not watched for 300 s yet" in reported([20.0] * 30, [20.0] * 30, quick).why_not()
+    assert reported([20.0] * 31, [20.0] * 31, quick).settled()
 
 
 def test_thermometer_noise_does_not_keep_a_soak_open() -> None:
     noise = np.random.default_rng(5).normal(0, 0.05, 200)
-    judge = told([20.0] * 200, [float(22 + each) for each in noise])
+    judge = reported([20.0] * 200, [float(22 + each) for each in noise])
     assert judge.settled()
     drift_c = judge.drift_c()["imu"]
     assert drift_c is not None
@@ -78,7 +78,7 @@ def test_every_unit_has_to_come_to_rest() -> None:
 
 
 def test_figures_are_the_result() -> None:
-    figures = told([20.0] * 61, [21.0] * 61).figures()
+    figures = reported([20.0] * 61, [21.0] * 61).figures()
     assert figures == {
         "held_s": 600.0,
         "band_c": 0.5,

@@ -12,7 +12,8 @@ WAVES = (1, 2, 4)
 #: Lines of the stepper's electrical cycle per turn, with and without the reduction gear. They are far larger than what
 #: is searched for: they are removed from every other coordinate, and not kept themselves.
 STEP_LINES = (200, 50)
-#: A line that sampling folds onto a constant by more than this share cannot be told from one, and is not removed.
+#: A line that sampling folds onto a constant by more than this share cannot be distinguished from one, and is not
+#: removed.
 STEADY = 0.3
 #: A function of which less than this share is independent of those before it is left out: slow rates turn only degrees.
 LEAST_INDEPENDENT_SHARE = 0.1

@@ -31,7 +31,7 @@ def held_out_rises(comparison: Comparison, terms: tuple[Term, ...], catalogue: M
     """Return whether leaving data sets out shows that a model predicts them worse with these terms than without.
 
     `comparison` is that of the model without them. The prior of each added coefficient is as wide as the coefficient
-    is large in the fit to all: what a fold cannot show is not held against an effect.
+    is large in the fit to all: what a fold cannot show is not compared with an effect.
     """
     report_stage(f"leaving data sets out to check {', '.join(term.effect for term in terms)}")
     axes = [_Axis.of(comparison, axis, terms, catalogue) for axis in comparison.axes]

@@ -56,7 +56,7 @@ def remainder_of(
 
 
 def is_within_noise(first: Comparison) -> bool:
-    """Return whether a model leaves clearly less than the noise that it is held against: nothing can be missing.
+    """Return whether a model leaves clearly less than the noise that it is compared with: nothing can be missing.
 
     Only asked where the noise is not known from the readings: of readings, each kind of coordinate has a scale that is
     never below white noise, and so their chi2 is too small anyway.

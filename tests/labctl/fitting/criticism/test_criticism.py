@@ -1,4 +1,4 @@
-"""A model held against recordings whose truth is known: what is named, what is not, and what must not matter."""
+"""A model compared with recordings whose truth is known: what is named, what is not, and what must not matter."""
 
 from __future__ import annotations
 
@@ -306,7 +306,7 @@ def test_too_little_data_is_a_verdict_and_an_exit_status(bring: Callable[[Record
     ("arguments", "said"),
     [
         (["criticise", "FOG-0001"], "has no calibration yet"),
-        (["criticise", "NOBODY"], "'NOBODY' is not in this database"),
+        (["criticise", "NO_SERVICE"], "'NO_SERVICE' is not in this database"),
         (["ladder", "FOG-0001"], "has no calibration yet"),
     ],
 )

@@ -53,7 +53,7 @@ def test_fifty_threads_read_formulas_at_once(hasty: None) -> None:
                 Garbage()
                 for text in texts:
                     read_formula(text)
-        except BaseException as error:  # noqa: BLE001  a thread's errors are nobody's otherwise
+        except BaseException as error:  # noqa: BLE001  errors of a thread are lost otherwise
             failed.append(error)
 
     threads = [threading.Thread(target=read) for _ in range(50)]
@@ -110,5 +110,5 @@ def test_at_most_so_many_at_once(tmp_path: Path) -> None:
 def test_more_unknowns_than_rows_are_refused_before_they_are_compared() -> None:
     rate = np.linspace(-100.0, 100.0, 30)
     recording = points(rate, np.full(30, 25.0), 1.01 * rate)
-    with pytest.raises(NotEnoughData, match="more coefficients than the recording's 30 data sets can tell"):
+    with pytest.raises(NotEnoughData, match="more coefficients than the recording's 30 data sets determine"):
         fit(recording, None, ["bias"] * 3000)

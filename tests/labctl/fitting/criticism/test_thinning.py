@@ -1,4 +1,4 @@
-"""Cells unite only what cannot be told apart, and thinning leaves some of everything."""
+"""Cells unite only what cannot be distinguished, and thinning leaves some of everything."""
 
 from __future__ import annotations
 

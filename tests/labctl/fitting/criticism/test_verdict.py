@@ -36,7 +36,7 @@ def test_a_law_of_temperature_that_is_none_of_the_catalogues_is_not_given_a_name
     assert (found.verdict.form, found.verdict.named, found.verdict.depends_on[0]) == (
         "unexplained", (), "temperature_c",
     )  # fmt: skip
-    assert "as far as one rising leg of temperatures can show" in " ".join(sentences(found))
+    assert "from temperatures that only rise" in " ".join(sentences(found))
 
 
 @pytest.mark.parametrize("seed", [2, 3, 9])
@@ -124,7 +124,7 @@ def test_a_term_that_predicts_left_out_temperatures_worse_rises() -> None:
 
 def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
     found = held(made("ojeda2000", 1))
-    told = Criticism(
+    reported = Criticism(
         Verdict("ambiguous", (("scale_factor_odd", "sine_response"),)),
         found.data,
         found.fit_data,
@@ -132,7 +132,7 @@ def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
         None,
         found.comparison,
     )
-    said = sentences(told, [{"do": "the rates in random order"}, {"do": "another"}])
+    said = sentences(reported, [{"do": "the rates in random order"}, {"do": "another"}])
     assert [line for line in said if line.startswith("To tell")] == ["To tell: the rates in random order."]
 
 

@@ -36,7 +36,7 @@ class SharedStore(Store):
 
 
 class BusyClock(VirtualClock):
-    """A virtual clock; whenever somebody sleeps, `meanwhile` happens."""
+    """A virtual clock; in each sleep `meanwhile` happens."""
 
     def __init__(self, start: datetime = AT) -> None:
         super().__init__(start)

@@ -37,5 +37,5 @@ def test_a_campaign_that_ended_by_the_stop_is_answered_and_written_down_and_the_
     answer = control.abort(context, asked)
     assert (answer.state, "tea" in answer.reason) == ("aborted", True)
     assert [row.action for row in store.audit.rows()].count("campaign abort") == 1
-    with pytest.raises(Conflict, match="over already"):
+    with pytest.raises(Conflict, match="has already ended"):
         control.abort(context, asked)

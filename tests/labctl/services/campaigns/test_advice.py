@@ -1,4 +1,4 @@
-"""A failed campaign in words, and whether it may be resumed: told by the service, the API and the command line."""
+"""A failed campaign in words, and whether it may be resumed: shown by the service, the API and the command line."""
 
 from __future__ import annotations
 
@@ -122,8 +122,8 @@ def test_api_and_command_line_tell_a_failure_in_words(
     assert answer["advice"]["happened"] == "A person said that it cannot be done."
     assert client.get("/api/campaigns").json()[0]["advice"] == answer["advice"]
     print_campaign(campaign_status(store, 1))
-    told = capsys.readouterr().out
-    assert all(sentence in told for sentence in answer["advice"].values())
+    reported = capsys.readouterr().out
+    assert all(sentence in reported for sentence in answer["advice"].values())
 
 
 def test_a_resume_that_would_be_refused_is_said_with_its_reason(client: TestClient, store: Store) -> None:

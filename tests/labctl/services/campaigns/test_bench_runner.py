@@ -284,8 +284,8 @@ def test_entries_and_what_became_of_them_are_in_the_audit_trail(lab: Lab) -> Non
         ("labctl", "schedule start", "start 1"),
         ("labctl", "schedule start", "start 3"),
     ]
-    told = [(row.detail["outcome"], row.detail["campaign"]) for row in rows if row.action == "schedule start"]
-    assert told == [("started", 1), ("missed", None)]
+    reported = [(row.detail["outcome"], row.detail["campaign"]) for row in rows if row.action == "schedule start"]
+    assert reported == [("started", 1), ("missed", None)]
     assert lab.store.audit.first_broken() is None
 
 

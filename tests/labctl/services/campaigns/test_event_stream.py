@@ -1,4 +1,4 @@
-"""Onlookers of one campaign: looked up once for all, never an old picture after the bell, each told everything."""
+"""Clients that follow one campaign: one query for all, never an old status after the bell, each receives everything."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_the_store_is_read_as_often_for_many_as_for_one(
         followers = CampaignEventStream(store, lambda campaign: (campaign, state[0]), listen)  # type: ignore[arg-type,return-value]
 
         async def one() -> list[int]:
-            return [told.id async for told in followers.follow(1, 0, lambda: False) if hasattr(told, "id")]
+            return [reported.id async for reported in followers.follow(1, 0, lambda: False) if hasattr(reported, "id")]
 
         looking = [asyncio.create_task(one()) for _ in range(onlookers)]
         while not reads and not any(onlooker.done() for onlooker in looking):
@@ -105,4 +105,4 @@ def test_the_store_is_read_as_often_for_many_as_for_one(
 
     assert in_a_loop(watched()) == [[1, 2]] * onlookers
     assert len(reads) == 2
-    assert len(bells) == 1  # that of the followers as a whole: nobody who left is still rung for
+    assert len(bells) == 1  # that of the followers as a whole: a follower that left gets no bell

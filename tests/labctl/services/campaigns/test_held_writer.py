@@ -1,4 +1,4 @@
-"""A writer that is held by another: the table stops, it is said, and an abort waits for nobody."""
+"""A writer that is held by another: the table stops, it is reported, and an abort does not wait for it."""
 
 from __future__ import annotations
 

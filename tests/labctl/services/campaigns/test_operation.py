@@ -1,4 +1,4 @@
-"""A person beside a running campaign: questions, pauses, impatience, and whoever only listens."""
+"""A person beside a running campaign: questions, pauses, impatience, and passive listeners."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def test_after_a_fault_a_person_takes_it_up_and_it_cannot_be_finished_twice(tmp_
         assert np.all(np.diff(np.asarray(points.columns["t_s"])) > 0)
         assert set(np.asarray(points.columns["run"])) == {1, 2}  # a simulated bench ends with its process
         for _ in range(2):
-            with pytest.raises(Conflict, match="cannot be finished twice"):
+            with pytest.raises(Conflict, match="is done and cannot be resumed"):
                 prepare_resume(store, prepared.id, bench, lambda _: VirtualClock(), request)
 
 

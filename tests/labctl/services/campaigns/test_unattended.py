@@ -106,7 +106,7 @@ def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, m
 
 
 def test_what_is_not_safe_is_on_the_bench_before_the_campaign_ends(store: Store) -> None:
-    """Whoever is killed between the two leaves a bench that says so."""
+    """A process that is killed between the two leaves a bench that states so."""
     prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
     prepared.bench.close()
     event = Event("safe_state", f"{NOT_SAFE}table to rest: no answer", level="error")
@@ -133,7 +133,7 @@ def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say
     rest(runner)
     assert store.campaigns.get(newer).state == "done"
     row = store.campaigns.get(older)
-    assert (row.state, f"campaign {newer} goes on here" in row.reason) == ("failed", True)
+    assert (row.state, f"campaign {newer} is resumed here first" in row.reason) == ("failed", True)
 
 
 @pytest.mark.usefixtures("real")
@@ -298,16 +298,14 @@ def test_a_campaign_that_ends_while_it_is_looked_at_was_not_left(
 def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str) -> None:
     status = labctl(left, "bench", "status")
     assert (status.exit_code, "the safe state is confirmed" in status.stdout) == (1, False)
-    what = (
-        "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` takes it up, `labctl campaign abort 1` ends it"
-    )
+    what = "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` resumes it, `labctl campaign abort 1` ends it"
     assert what in status.stdout
     assert json.loads(labctl(left, "bench", "status", "--json").stdout)[0]["left"] == [what]
     refused = labctl(left, "campaign", "start", "short", "--bench", BENCH.name)
     assert (refused.exit_code, what in refused.stderr) == (2, True)
     with open_store(left, write=True) as opened:
         assert len(opened.campaigns.all()) == 1
-        assert "labctl campaign" not in labctl(left, "bench", "status").stdout  # somebody writes: it may be running
+        assert "labctl campaign" not in labctl(left, "bench", "status").stdout  # a process writes: it may be running
     assert labctl(left, "campaign", "abort", "1").exit_code == 0
     again = json.loads(labctl(left, "bench", "status", "--json").stdout)[0]
     assert (again["left"], "before it could make the bench safe" in again["unconfirmed"]) == ([], True)
@@ -316,7 +314,7 @@ def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str
 def test_a_simulated_bench_only_says_that_a_campaign_was_left(left: str) -> None:
     assert labctl(left, "bench", "status").exit_code == 0
     started = labctl(left, "campaign", "start", "short", "--bench", BENCH.name, "--json")
-    assert "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` takes it up" in started.stderr
+    assert "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` resumes it" in started.stderr
     assert (json.loads(started.stdout)["id"], json.loads(started.stdout)["state"]) == (2, "done")
 
 
@@ -338,8 +336,8 @@ def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes
     text = str(caught.value)
     assert text.startswith("campaign 1 was interrupted: the disk is full; the data measured before are stored; ")
     assert said in text
-    assert text.endswith("`labctl campaign resume 1` goes on with it")
-    assert "nothing of this act" not in text
+    assert text.endswith("`labctl campaign resume 1` continues it")
+    assert "nothing was stored" not in text
 
 
 def test_a_service_that_starts_says_what_it_finds(left: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -355,8 +353,8 @@ def test_a_service_that_starts_says_what_it_finds(left: str, monkeypatch: pytest
     assert len(lines) == 3
     assert "is NOT confirmed safe: table to rest: no answer" in lines[1]
     assert lines[2].startswith("campaign 1 was interrupted at 0 % and is not resumed: ")
-    told = json.loads(labctl(left, "serve", "--bench", BENCH.name, "--json").stdout)
-    assert (told["url"], "no answer" in told["unconfirmed"]) == ("http://127.0.0.1:1", True)
+    received = json.loads(labctl(left, "serve", "--bench", BENCH.name, "--json").stdout)
+    assert (received["url"], "no answer" in received["unconfirmed"]) == ("http://127.0.0.1:1", True)
     other = json.loads(labctl(left, "serve", "--bench", "triaxial-sim", "--json").stdout)
     assert (other["unconfirmed"], other["cut_short"]) == ("", "")
 

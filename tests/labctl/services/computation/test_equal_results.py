@@ -29,7 +29,7 @@ WORKERS = Limits(at_once=1, niceness=0)
 
 
 def lived(service: LabService, folder: Path) -> list[str]:
-    """Take in a recording, fit it, change the fit, certify it, criticise it; returns all answers."""
+    """Import a recording, fit it, change the fit, certify it, criticise it; returns all answers."""
     answers = [
         service.execute(IMPORT_RECORDING, RecordingFolder(folder)),
         service.execute(FIT, ToUnit(UNIT, FitRequest(effects=["bias", "scale_factor"]))),

@@ -38,8 +38,8 @@ def workers(store: Store) -> Iterator[InWorkers]:
 def test_result_stages_and_actor_are_those_of_threads(store: Store, workers: InWorkers) -> None:
     for computation in (InThreads(store), workers):
         stages: list[str] = []
-        with acting(Actor("somebody")), reporting_to(stages.append):
-            assert computation.run(work.who_asks, "yes") == ("yes", "somebody")
+        with acting(Actor("another user")), reporting_to(stages.append):
+            assert computation.run(work.who_asks, "yes") == ("yes", "another user")
         assert stages == ["first", "second"]
 
 

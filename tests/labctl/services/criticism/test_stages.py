@@ -34,34 +34,34 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 
 def stages_of(store: Store, serial: str) -> list[str]:
-    told: list[str] = []
-    with reporting_to(told.append):
+    received: list[str] = []
+    with reporting_to(received.append):
         criticise_unit(store, serial, 1, None)
-    return told
+    return received
 
 
 def test_stages_are_reported_in_order_and_none_for_a_cached_answer(store: Store) -> None:
     (unit,) = store.units.all()
-    told = stages_of(store, unit.serial)
-    assert told[: len(FIRST)] == FIRST
-    assert told[len(FIRST)].startswith("comparing ")
-    assert told[len(FIRST)].endswith(" candidates, axis z")
-    assert int(told[len(FIRST)].split()[1]) > 20
-    assert told.index("listing suspects and residuals") > len(FIRST)
+    received = stages_of(store, unit.serial)
+    assert received[: len(FIRST)] == FIRST
+    assert received[len(FIRST)].startswith("comparing ")
+    assert received[len(FIRST)].endswith(" candidates, axis z")
+    assert int(received[len(FIRST)].split()[1]) > 20
+    assert received.index("listing suspects and residuals") > len(FIRST)
     assert stages_of(store, unit.serial) == []
 
 
 def test_cancelled_at_any_stage_it_leaves_no_file_and_can_be_asked_again(store: Store, cache: Path) -> None:
     (unit,) = store.units.all()
     before = sorted(cache.rglob("*"))
-    told: list[str] = []
+    received: list[str] = []
 
     def stop_at(number: int) -> None:
         met = 0
 
         def progress(stage: str) -> None:
             nonlocal met
-            told.append(stage)
+            received.append(stage)
             met += 1
             if met > number:
                 raise Cancelled(stage)
@@ -70,9 +70,9 @@ def test_cancelled_at_any_stage_it_leaves_no_file_and_can_be_asked_again(store: 
             criticise_unit(store, unit.serial, 1, None)
 
     for number in range(len(FIRST) + 1):
-        told.clear()
+        received.clear()
         stop_at(number)
-        assert told[: len(FIRST)] == FIRST[: number + 1]
+        assert received[: len(FIRST)] == FIRST[: number + 1]
         assert sorted(cache.rglob("*")) == before
     assert stages_of(store, unit.serial)[: len(FIRST)] == FIRST
     assert sorted(cache.rglob("*")) != before

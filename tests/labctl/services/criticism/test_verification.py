@@ -1,4 +1,5 @@
-"""A version applied as it is: its figures equal an independent application of its file, and a changed unit is told."""
+"""A version applied without refitting: its figures equal an independent application of its file, and a changed unit is
+detected."""
 
 from __future__ import annotations
 

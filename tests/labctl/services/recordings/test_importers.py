@@ -83,7 +83,7 @@ def test_what_no_importer_knows_is_left_to_labctls_own(tmp_path: Path, name: str
     [
         (failing, "some.log: entry point 'bad' .* cannot read it: KeyError: 'row'; mend or uninstall acme-plugins"),
         (lambda *_: None, "cannot read it: TypeError: None is not a labctl.recording.recording.Recording"),
-        (lambda *_: made(gyro_z=[1.0]), "columns need one length, at least 1 .*dataset: 2, .*gyro_z: 1"),
+        (lambda *_: made(gyro_z=[1.0]), "columns of different or no length .*dataset: 2, .*gyro_z: 1"),
         (lambda *_: made(gyro_z=[1.0, float("nan")]), "some.log: column 'gyro_z', row 2: nan where a number is needed"),
         (
             lambda *_: made(temperature_c=[25.0, -300.0]),

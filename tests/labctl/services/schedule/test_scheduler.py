@@ -220,7 +220,7 @@ def test_what_was_cancelled_does_not_begin(lab: Lab) -> None:
 
 
 class SetClock(VirtualClock):
-    """A virtual clock that somebody sets."""
+    """A virtual clock that is set."""
 
     def __init__(self) -> None:
         super().__init__(START)

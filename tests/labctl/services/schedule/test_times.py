@@ -82,7 +82,7 @@ def test_the_last_due_time_is_the_newest_of_the_next_ones(line: str, day: dateti
         ("30 25 * * *", "bad hour"),
         ("30 2 * * MOON", "bad day-of-week"),
         ("0 0 31 2 *", "bad day-of-month"),
-        ("* * */20 * 1L", "never comes true"),
+        ("* * */20 * 1L", "matches no time"),
     ],
 )
 def test_a_wrong_cron_line_is_named(line: str, words: str) -> None:
@@ -105,7 +105,7 @@ def test_of_a_time_that_comes_twice_the_first_is_meant() -> None:
     ("text", "words"),
     [
         ("2026-03-29T02:30", "does not exist in Europe/Berlin"),
-        ("2026-01-05T08:59", "is past, it is 2026-01-05 09:00"),
+        ("2026-01-05T08:59", "is in the past, it is now 2026-01-05 09:00"),
         ("tomorrow", "is not one"),
         ("", "is not one"),
         ("0001-01-01T00:00+14:00", "is not one"),

@@ -6,7 +6,7 @@ import { notice } from "../core/components.js";
 /** @import { Attendance } from "../../../types/api.js" */
 
 /**
- * `propose(attendance)` is called for the better start; without it no button is shown. Null: nobody is needed.
+ * `propose(attendance)` is called for the better start; without it no button is shown. Null: no person is needed.
  * @param {Attendance | null} attendance
  * @param {(attendance: Attendance) => unknown} [propose]
  */

@@ -1,4 +1,4 @@
-// Compare: the version as it is beside the recording. Points, lines, surfaces and turns all come from one answer.
+// Compare: the version without refitting beside the recording. Points, lines, surfaces and turns all come from one answer.
 
 import { get } from "../../core/http/api.js";
 import { h } from "../../core/elements.js";
