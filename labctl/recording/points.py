@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from labctl.recording.quantisation import steps_columns
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
+from labctl.recording.turn_means import turned_points
 
 #: Columns that one data set has one value of: its first reading's.
 FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg")
@@ -41,7 +42,10 @@ def pieces(columns: Columns) -> NDArray[np.int64]:
     if len(dataset) and "t_s" in columns and warm is not None:
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         starts = dataset_starts(dataset)
+        turned = np.asarray(columns["turn_deg"]) != 0 if "turn_deg" in columns else np.zeros(len(dataset), dtype=bool)
         for begin, end in zip(starts, np.append(starts[1:], len(dataset)), strict=True):
+            if turned[begin]:  # a part of a turn is no known angle
+                continue
             piece[begin:end] = _minutes(t_s[begin:end] - t_s[begin], warm[begin:end])
     changes = (dataset[1:] != dataset[:-1]) | (piece[1:] != piece[:-1])
     return np.concatenate([[0], np.cumsum(changes)]).astype(np.int64)
@@ -117,6 +121,8 @@ def to_points(recording: Recording) -> Recording:
                 if counts.min() >= LEAST_FOR_SPECTRUM:
                     points[f"{name}_white_std"] = np.array([white_std(readings) for readings in sets])
     points["n"] = counts.astype(np.int64)
+    if recording.info.motion == "turns":
+        points |= turned_points(rows, points, starts, counts)
     return Recording(recording.info.model_copy(update={"kind": "points"}), points, recording.environment)
 
 
