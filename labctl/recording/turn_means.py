@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.recording import Columns
+from labctl.recording.recording import Columns, Recording
 
 #: Ending of the column that holds what uncertain time stamps leave in the mean of a gyro column.
 TIME = "_time_std"
@@ -66,3 +66,19 @@ def _time_std(t_s: NDArray[np.float64], values: NDArray[np.float64]) -> float:
     u_s = _ROBUST * float(np.median(np.abs(steps - np.median(steps)))) / np.sqrt(2)
     change = (values[2:] - values[:-2]) / 2
     return float(u_s * np.sqrt(np.sum(change**2)) / (t_s[-1] - t_s[0]))
+
+
+def rates_as_turned(recording: Recording) -> NDArray[np.float64]:
+    """Return the rate of each reading about its position's axis as the output says, (n,) deg/s; 0 at rest.
+
+    It says how fast a turn went, by the nominal scale factor; a mean over the turn says less. Where the axis that was
+    turned about has no output, the mean stands for it.
+    """
+    columns = recording.columns
+    rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
+    found, position = rate.copy(), np.asarray(columns["position"]).astype(np.str_)
+    for axis in recording.info.axes:
+        output = recording.gyro_dps(axis)
+        found[position == axis] = output[position == axis]
+        found[position == f"-{axis}"] = -output[position == f"-{axis}"]
+    return np.where(rate == 0, 0.0, found)

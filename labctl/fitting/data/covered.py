@@ -12,6 +12,7 @@ from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.points import dataset_starts, temperature_of
+from labctl.recording.turn_means import rates_as_turned
 
 Range = tuple[float, float]
 
@@ -45,7 +46,8 @@ def covered_by_readings(recording: Recording, up_rate_dps: float = 0.0) -> Cover
     warm = temperature_of(columns)
     if warm is None or not valid.any():
         return None
-    rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)[valid]
+    turned = recording.info.motion == "turns"
+    rate = (rates_as_turned(recording) if turned else np.asarray(columns["table_rate_dps"], dtype=np.float64))[valid]
     starts = dataset_starts(np.asarray(columns["dataset"], dtype=np.int64)[valid])
     axis = recording.info.axes[0]
     position = np.asarray(columns["position"])[valid][starts] if "position" in columns else np.full(len(starts), axis)

@@ -51,6 +51,14 @@ class FitData:
         return [(self.take(~mask), self.take(mask)) for mask in folds(self.temperature_c)]
 
     @cached_property
+    def held_out_pairs(self) -> list[tuple[FitData, FitData]]:
+        """For each part left out: the other data sets, and the part: a temperature, or of turns a turn."""
+        if self.info.motion != "turns":
+            return self.without_each_temperature
+        turns = np.eye(len(self), dtype=bool)[self.channels.table_rate_dps() != 0]
+        return [(self.take(~mask), self.take(mask)) for mask in turns]
+
+    @cached_property
     def _rate_counts(self) -> dict[str, int]:
         return {}
 

@@ -30,6 +30,7 @@ LEAST_NEW = 1e-2
 NO_SURROUNDINGS = frozenset({
     "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
     "since_begin_s", "valid", "temperature_c", "temperature_x_c", "temperature_y_c", "temperature_z_c", "power_s",
+    "turn_deg", "turn_u_deg",
 })  # fmt: skip
 
 

@@ -18,7 +18,7 @@ def with_temperature(recording: Recording) -> Recording:
     """Return a recording that has `temperature_c`, by which fit and criticism go.
 
     Where the unit has no thermometer the chamber's temperature stands in for it (`temperature_of`), in the history too:
-    one thermometer for all. Turns are a matter of minutes and can do without either. Raises NotEnoughData where there is neither.
+    one thermometer for all. Turns take minutes and can do without either. Raises NotEnoughData where there is neither.
     """
     columns, environment = recording.columns, recording.environment
     if "temperature_c" in columns:

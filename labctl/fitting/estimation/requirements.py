@@ -7,6 +7,7 @@ import numpy as np
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import kind_of
+from labctl.fitting.effects.linearity import is_linear_in_rate
 from labctl.fitting.models.error_model import ErrorModel
 
 #: A polynomial of order q in temperature needs at least q times this span.
@@ -19,8 +20,23 @@ def require_enough_data(data: FitData, model: ErrorModel) -> None:
     for term in model.terms:
         if absent := data.channels.missing(kind_of(term).needs):
             raise NotEnoughData(f"{serial}: effect {term.effect} needs column {absent[0]!r}; the recording has none")
+    _require_mean_rates(data, model)
     _require_rates(data, model)
     _require_temperatures(data, model)
+
+
+def _require_mean_rates(data: FitData, model: ErrorModel) -> None:
+    """Refuse what turns cannot tell: their rate is known on average alone."""
+    if data.info.motion != "turns":
+        return
+    for axis in data.outputs:
+        for term in model.terms:
+            if not is_linear_in_rate(kind_of(term), term, data.channels, axis, model.reference):
+                raise NotEnoughData(
+                    f"{data.info.serial}: {term.effect} needs the rate at each instant, and of a turn only the mean is "
+                    "known; leave it out, or measure at known rates (motion = 'rates') or with a recorded rate "
+                    "(motion = 'profile')"
+                )
 
 
 def _require_rates(data: FitData, model: ErrorModel) -> None:

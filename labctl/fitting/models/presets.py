@@ -86,6 +86,22 @@ def _bias_scale(data: FitData) -> tuple[ErrorModel, Rows]:
     return ErrorModel("bias_scale", terms, "rate", reference=_centre(data)), _all(data)
 
 
+def _turns(data: FitData) -> tuple[ErrorModel, Rows]:
+    several = len(data.info.axes) > 1
+    aligned = ALIGNED if several else ALIGNED[:2]
+    gravity = (Term("g_sensitivity"), *((Term("cross_g_sensitivity"),) if several else ()))
+    terms = aligned + (gravity if _rests_both_ways(data) else ())
+    return ErrorModel("turns", terms, "rate", reference=_centre(data)), _all(data)
+
+
+def _rests_both_ways(data: FitData) -> bool:
+    """Whether every body axis that is used rested pointing up, and pointing down: gravity is then told from bias."""
+    still = data.channels.table_rate_dps() == 0
+    position = np.asarray(data.channels["position"]).astype(np.str_)
+    used = {*data.info.axes, *np.char.lstrip(position, "-").tolist()}
+    return {sign + axis for axis in used for sign in ("", "-")} <= set(position[still].tolist())
+
+
 #: name -> (preset, one sentence for a person)
 PRESETS: dict[str, tuple[Preset, str]] = {
     "ojeda2000": (
@@ -107,6 +123,10 @@ PRESETS: dict[str, tuple[Preset, str]] = {
     "bias_scale": (
         Preset("bias_scale", _bias_scale),
         "A plain start: bias and scale factor, each a parabola in temperature.",
+    ),
+    "turns": (
+        Preset("turns", _turns),
+        "For turns by a known angle: bias, scale factor, misalignment; g-sensitivity where it rested both ways up.",
     ),
 }
 
@@ -160,6 +180,8 @@ def usual_model(data: FitData) -> ErrorModel:
 
     Raises NotEnoughData where the data sets cannot determine it.
     """
+    if data.info.motion == "turns":
+        return _turns(data)[0]
     name = "yang2018" if len(data.info.axes) > 1 and data.levels is not None else "ojeda2000"
     model, _ = preset_for(name, []).build(data)
     return changed(model).build(data)[0]

@@ -49,7 +49,7 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) ->
     """
     if row.kind == "coefficients":
         raise BadInput(f"recording {row.id} is a table of coefficients: a model is held against readings or means")
-    if row.kind != "samples":
+    if row.kind != "samples" or points.info.motion == "turns":
         return points
     info = points.info.model_copy(update={"kind": "samples"})
     parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]
