@@ -10,22 +10,17 @@ from labctl.errors import NotEnoughData
 from labctl.recording import Columns, Recording
 from labctl.recording.points import temperature_of
 
-#: What stands for a temperature that was not recorded where a fit can do without: every effect of it is then constant.
-UNKNOWN_C = 25.0
-
 
 def with_temperature(recording: Recording) -> Recording:
     """Return a recording that has `temperature_c`, by which fit and criticism go.
 
     Where the unit has no thermometer the chamber's temperature stands in for it (`temperature_of`), in the history too:
-    one thermometer for all. Turns take minutes and can do without either. Raises NotEnoughData where there is neither.
+    one thermometer for all. Raises NotEnoughData where there is neither.
     """
     columns, environment = recording.columns, recording.environment
     if "temperature_c" in columns:
         return recording
     warm = temperature_of(columns)
-    if warm is None and recording.info.motion == "turns":
-        warm = np.full(len(recording), UNKNOWN_C)
     if warm is None:
         raise NotEnoughData(
             f"{recording.info.serial}: column 'temperature_c' is missing, and so is 'chamber_c', which could stand in "
