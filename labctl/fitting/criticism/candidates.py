@@ -42,7 +42,7 @@ def untestable_channels(data: ReducedRecording, catalogue: Mapping[str, Effect] 
     """Return effects whose channels are not logged, with the channels."""
     found: dict[str, list[str]] = {}
     for kind in catalogue.values():
-        absent = [name for name in kind.needs if name not in data.nodes and name != "run"]
+        absent = [name for name in data.nodes.missing(kind.channels) if name != "run"]
         if absent:
             found[kind.id] = absent
     return found

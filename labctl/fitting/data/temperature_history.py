@@ -50,6 +50,7 @@ class TemperatureHistory:
     counted: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  #: "run", "mounting" -> numbers, rising
     rate_dps: float = 1.0  #: largest table rate, deg/s, without sign
     span_c: tuple[float, float] = (0.0, 1.0)  #: lowest and highest temperature, deg C
+    thermometer: bool = True  #: whether anything says how warm the unit was
     #: What was computed of the courses, by function and its parameter: every axis asks for the same.
     _known: dict[tuple[CourseFunction, float], dict[int, Array]] = field(default_factory=dict, repr=False)
 
@@ -131,6 +132,8 @@ def history_of(recording: Recording) -> TemperatureHistory:
         if name in columns
     }
     rate = float(np.max(np.abs(np.asarray(columns["table_rate_dps"], dtype=np.float64)), initial=0.0)) or 1.0
+    if "temperature_c" not in columns:
+        return TemperatureHistory({}, counted, rate, thermometer=False)
     warm = np.asarray(columns["temperature_c"], dtype=np.float64)
     span = (float(warm.min()), float(warm.max())) if len(warm) else (0.0, 1.0)
     if "t_s" not in columns:

@@ -18,6 +18,7 @@ class TemperatureRate(Effect):
     in_use = False
     term = "Temperature rate sensitivity (Shupe effect)"
     sentence = "The bias shifts while the temperature changes, in proportion to how fast."
+    by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
@@ -48,6 +49,7 @@ class ThermalLag(Effect):
     in_use = False
     term = "Thermal lag (sensing element behind the thermometer)"
     sentence = "The part that matters follows the thermometer late, so the correction comes for another temperature."
+    by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
@@ -75,6 +77,7 @@ class ThermalHysteresis(Effect):
     in_use = False
     term = "Thermal hysteresis"
     sentence = "The bias depends on whether the temperature was reached from below or from above."
+    by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
@@ -155,6 +158,7 @@ class ThermometerError(Effect):
     id = "thermometer_error"
     term = "Thermometer error"
     sentence = "The thermometer is off; while calibrating this hides in the temperature terms, in use it does not."
+    by_temperature = True
     origin: ClassVar[Origin] = "bench"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True

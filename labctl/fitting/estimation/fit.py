@@ -16,6 +16,7 @@ from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.coefficient_tables import from_coefficients
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held_out import held_out_errors
+from labctl.fitting.estimation.held_out_legs import errors_by_leg
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.estimation.validity import valid_rates_dps
@@ -58,8 +59,9 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
     floor = data.noise_floor
     error = ErrorFigures(
-        rms(raw), rms(residual), rms(held_out_errors(data, preset, found.solutions)), floor.rms_dps, floor.source
-    )
+        rms(raw), rms(residual), rms(held_out_errors(data, preset, found.solutions)), floor.rms_dps, floor.source,
+        tuple(errors_by_leg(data, preset, found.solutions)),
+    )  # fmt: skip
     return FitResult(
         fitted,
         error,
