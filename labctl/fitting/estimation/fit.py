@@ -19,6 +19,7 @@ from labctl.fitting.estimation.held_out import held_out_errors
 from labctl.fitting.estimation.held_out_legs import errors_by_leg
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.estimation.validity import valid_rates_dps
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
@@ -41,7 +42,8 @@ def fit(
     preset = preset_for(model, effects or [])
     if recording.info.kind == "coefficients" and preset.name == "weiss1995":
         return from_coefficients(recording)
-    return fit_preset(fit_data_of(recording, covered), preset)
+    data = fit_data_of(recording, covered)
+    return fit_preset(data, with_shapes(data, preset))
 
 
 @single_threaded
