@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -100,7 +101,7 @@ def _wander_dps(rng: np.random.Generator, unit: Unit, sets: int) -> NDArray[np.f
     """Return the bias of each data set about that of the session, (sets, 3) deg/s."""
     kept = np.exp(-(REST_S + 2.0) / WANDER_TAU_S)
     found = rng.normal(0, unit.wander_dps, (sets, 3))
-    for before, now in zip(found[:-1], found[1:], strict=True):
+    for before, now in pairwise(found):
         now[:] = kept * before + np.sqrt(1 - kept**2) * now
     return np.asarray(found - found.mean(axis=0))
 

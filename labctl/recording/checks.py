@@ -149,6 +149,11 @@ def _defaults(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> di
     n = len(columns["dataset"])
     if info.motion == "rest":
         columns.setdefault("table_rate_dps", np.zeros(n))
+        if "position" not in columns and len(info.axes) > 1 and info.latitude_deg is not None:
+            raise BadRecording(
+                f"{path}: column 'position' is missing, and latitude_deg = {info.latitude_deg:g} is given: which body "
+                "axis points up says which output the Earth turns; add the column, or leave latitude_deg out"
+            )
     if info.motion == "turns":
         columns["table_rate_dps"] = mean_rate_dps(info, columns)
     if "position" not in columns:

@@ -48,7 +48,7 @@ def untestable_channels(data: ReducedRecording, catalogue: Mapping[str, Effect] 
     """
     found: dict[str, list[str]] = {}
     for kind in catalogue.values():
-        absent = [name for name in kind.needs if name not in data.nodes and name != "run"]
+        absent = [name for name in data.nodes.missing(kind.channels) if name != "run"]
         if not absent and data.info.motion == "turns" and not _takes_mean_rate(data, kind):
             absent = [RATE]
         if absent:

@@ -48,7 +48,12 @@ class FitData:
     @cached_property
     def without_each_temperature(self) -> list[tuple[FitData, FitData]]:
         """For each temperature left out (`folds`), rising: the other data sets, and those at it."""
-        return [(self.take(~mask), self.take(mask)) for mask in folds(self.temperature_c)]
+        return [(self.take(~mask), self.take(mask)) for mask in self.folds]
+
+    @property
+    def folds(self) -> list[NDArray[np.bool_]]:
+        """The data sets that are left out together, (m,) each: those of one temperature, or without it of one time."""
+        return folds(self.temperature_c, thermometer=self.channels.history.thermometer)
 
     @cached_property
     def held_out_pairs(self) -> list[tuple[FitData, FitData]]:

@@ -24,6 +24,8 @@ MOST_SHARE, MOST_SHARE_WITH_LEVELS, LEAST_FREE = 0.5, 0.7, 8
 DEGREES = (6, 4, 2, 2)
 #: Time constants of a warm-up after power-on, s.
 WARM_UP_S = (600.0, 3600.0)
+#: At rest a loop of temperatures shows what lags behind the thermometer, s, or depends on where it came from, K.
+LAGS_S, WIDTHS_K = (150.0, 400.0, 1000.0, 2500.0), (2.0, 6.0, 15.0)
 #: A column of which those before it leave less than this share says nothing new.
 LEAST_NEW = 1e-2
 #: What is logged and no cause of an error by itself, or is there in another form.
@@ -140,6 +142,10 @@ def _history(channels: Channels, warm: NDArray[np.float64], rate: Array) -> Iter
     direction[order] = leg
     if np.ptp(direction) > 0:
         yield np.column_stack([direction, direction * warm[:, 1], direction * warm[:, 2], direction * rate])
+    if not np.any(rate) and channels.history.courses:
+        lags = [channels.history.lag_k(channels.columns, tau) for tau in LAGS_S]
+        states = [channels.history.hysteresis_state(channels.columns, width) for width in WIDTHS_K]
+        yield np.column_stack([*lags, *states])
     since = np.asarray(channels["power_s"], dtype=np.float64) if "power_s" in channels else t_s - t_s.min()
     since = np.maximum(since, 0.0)
     decays = np.column_stack([np.exp(-since / tau) for tau in WARM_UP_S])

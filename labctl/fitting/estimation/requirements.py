@@ -18,7 +18,7 @@ def require_enough_data(data: FitData, model: ErrorModel) -> None:
     """Raise NotEnoughData, saying what is missing and how much, where the data sets cannot determine the model."""
     serial = data.info.serial
     for term in model.terms:
-        if absent := data.channels.missing(kind_of(term).needs):
+        if absent := data.channels.missing(kind_of(term).channels):
             raise NotEnoughData(f"{serial}: effect {term.effect} needs column {absent[0]!r}; the recording has none")
     _require_mean_rates(data, model)
     _require_rates(data, model)
