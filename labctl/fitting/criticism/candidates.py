@@ -13,8 +13,8 @@ from labctl.fitting.criticism.channel_functions import channel_options
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.earth import turning_size_dps
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
-from labctl.fitting.effects.linearity import is_linear_in_rate
 from labctl.fitting.models.error_model import ErrorModel, expand
+from labctl.fitting.models.linearity import is_linear_in_rate
 from labctl.fitting.numeric.arrays import Array
 
 #: Effects that contain several others: a model starts from them, and they are never what is missing.

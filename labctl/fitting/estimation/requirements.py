@@ -7,8 +7,8 @@ import numpy as np
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import kind_of
-from labctl.fitting.effects.linearity import is_linear_in_rate
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.linearity import is_linear_in_rate
 
 #: A polynomial of order q in temperature needs at least q times this span.
 SPAN_PER_ORDER_C = 1.0
