@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from labctl.fitting.data.channels import body_rates
@@ -43,14 +45,11 @@ def turn_var_of(points: Recording, axis: str) -> Array:
     misalignment about the others. One turn's error is independent of the next one's.
     """
     columns = points.columns
-    turn, duration_s = (np.asarray(columns[name], dtype=np.float64) for name in ("turn_deg", "duration_s"))
+    turn = np.asarray(columns["turn_deg"], dtype=np.float64)
     u_deg = np.asarray(columns.get("turn_u_deg", np.full(len(turn), USUAL_U_DEG)), dtype=np.float64)
     rates = body_rates(np.asarray(columns["table_rate_dps"], dtype=np.float64), np.asarray(columns["position"]))
-    design = np.column_stack([np.ones(len(turn)), *rates.values()])
-    gains, *_ = np.linalg.lstsq(design, points.gyro_dps(axis), rcond=None)
-    turned = np.column_stack([rate != 0 for rate in rates.values()])
-    gain = turned @ gains[1:]
-    u_dps = np.where(turn != 0, gain * u_deg / np.maximum(duration_s, 1e-12), 0.0)
+    share = u_deg / np.where(turn != 0, np.abs(turn), 1.0)
+    u_dps = np.where(turn != 0, share * response_dps(rates, points.gyro_dps(axis)), 0.0)
     time = np.asarray(columns.get(f"gyro_{axis}{TIME}", np.zeros(len(turn))), dtype=np.float64) / _scale(points, axis)
     return np.asarray(u_dps**2 + time**2)
 
@@ -61,6 +60,13 @@ def quantisation_var_of(points: Recording, axis: str) -> Array:
     if left is None:
         return np.zeros(len(points))
     return np.asarray((np.asarray(left, dtype=np.float64) / _scale(points, axis)) ** 2)
+
+
+def response_dps(rates: Mapping[str, Array], output_dps: Array) -> Array:
+    """Return the part of an output (m,) that is proportional to the rates along the body axes, (m,) each, deg/s."""
+    turned = np.column_stack(list(rates.values()))
+    gains, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(turned)), turned]), output_dps, rcond=None)
+    return np.asarray(turned @ gains[1:])
 
 
 def _scale(points: Recording, axis: str) -> float:

@@ -109,6 +109,19 @@ def test_uncertainty_of_the_turn_is_that_of_the_scale_factor(turned: Recording) 
     assert max(u) < 1.5 / 720
 
 
+def test_a_common_error_of_all_turns_is_not_averaged_out(turned: Recording) -> None:
+    """A fixture that turns too far by a share of 2 %: no gain is more certain than that."""
+    common = replace(turned, info=turned.info.model_copy(update={"turn_common_u": 0.02}))
+    alone, beside = matrix_of(turned), matrix_of(common)
+    np.testing.assert_allclose(beside[0], alone[0])
+    np.testing.assert_allclose(beside[1], np.hypot(alone[1], 0.02 * np.abs(alone[0])), rtol=0.02)
+    without: Any = fit(turned, "turns").to_json()
+    bias: Any = fit(common, "turns").to_json()
+    assert bias["axes"]["x"]["coefficients"]["bias"]["u"] == pytest.approx(
+        without["axes"]["x"]["coefficients"]["bias"]["u"], rel=1e-6
+    )
+
+
 def test_more_turns_at_once_make_the_scale_factor_more_certain() -> None:
     rng = np.random.default_rng(5)
     unit = Unit.drawn(rng)
