@@ -29,7 +29,7 @@ def check_turns(path: Path, info: RecordingInfo, columns: Columns) -> None:
         row = int(np.argmax(wrong))
         raise BadRecording(f"{path}: column 'turn_u_deg', row {row + 1}: {u_deg[row]:g} deg; it is at least 0 deg")
     if info.kind == "points":
-        _check_durations(path, np.asarray(columns["duration_s"], dtype=np.float64))
+        _check_means(path, info, columns)
         return
     starts, ends, number = _data_sets(columns)
     for name, values in (("turn_deg", turn), ("turn_u_deg", u_deg)):
@@ -51,7 +51,14 @@ def check_turns(path: Path, info: RecordingInfo, columns: Columns) -> None:
         )
 
 
-def _check_durations(path: Path, duration_s: NDArray[np.float64]) -> None:
+def _check_means(path: Path, info: RecordingInfo, columns: Columns) -> None:
+    """Refuse means without their time, and without the noise behind them: a rest is known far better than a turn."""
+    for name in ("n", *(f"gyro_{axis}_std" for axis in info.axes)):
+        if name not in columns:
+            raise BadRecording(
+                f"{path}: column {name!r} is missing; of turns it says how much better a rest is known than a turn"
+            )
+    duration_s = np.asarray(columns["duration_s"], dtype=np.float64)
     wrong = ~(duration_s > 0)
     if wrong.any():
         row = int(np.argmax(wrong))

@@ -37,7 +37,13 @@ NO_SURROUNDINGS = frozenset({
 
 
 def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
-    """Return orthonormal columns (m, k), the most important first; k is at most half of m, and at most m - 8."""
+    """Return orthonormal columns (m, k), the most important first; k is at most half of m, and at most m - 8.
+
+    Of turns no law can be told that is not linear in the rate; what is linear is taken in whole, whatever m is.
+    """
+    if "turn_deg" in channels:
+        warm, rate = _chebyshev(channels.temperature_c(axis), max(DEGREES)), channels.rate_dps(axis)[:, None]
+        return _orthonormal(iter([warm[:, 1:4], warm[:, 1:3] * rate]), _linear(channels), MOST_SHARE)
     return _orthonormal(_blocks(channels, axis), np.zeros((len(channels), 0)), MOST_SHARE)
 
 
@@ -64,6 +70,16 @@ def _orthonormal(
                 found[:, k] = new
                 k += 1
     return found[:, :k]
+
+
+def _linear(channels: Channels) -> NDArray[np.float64]:
+    """Return orthonormal columns (m, k) of a bias in every position and the response to every axis."""
+    places = [rows.astype(np.float64) for _, rows in channels.positions()]
+    found = np.zeros((len(channels), 0))
+    for column in (*places, *channels.rates.values()):
+        if (new := _new_part(column, found)) is not None:
+            found = np.column_stack([found, new])
+    return found
 
 
 def _new_part(column: Array, found: NDArray[np.float64]) -> Array | None:

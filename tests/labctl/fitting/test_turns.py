@@ -142,6 +142,16 @@ def test_means_alone_give_the_same(turned: Recording) -> None:
             assert ours[name]["u"] == pytest.approx(theirs[name]["u"], rel=0.2)
 
 
+@pytest.mark.parametrize("each_way", [1, 2, 3])
+def test_noise_floor_is_what_is_left(each_way: int) -> None:
+    """With few data sets too: what is linear in the rate is no drift."""
+    rng = np.random.default_rng(8)
+    error = fit(measured(rng, Unit.drawn(rng), 1.0, each_way, 360.0), "turns").error
+    assert error.noise_floor_dps is not None
+    assert error.rms_dps is not None
+    assert 0.8 < error.noise_floor_dps / error.rms_dps < 2.0
+
+
 def test_each_turn_is_held_out(turned: Recording) -> None:
     assert len(fit_data_of(turned).held_out_pairs) == 12
     error = fit(turned, "turns").error
