@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.temperature_channel import STAND_IN_C
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
@@ -79,7 +80,7 @@ class Compensator:
         return cls(read_calibration(content), outside)
 
     def compensate_output(
-        self, output: Array, temperature_c: Array, channels: Mapping[str, Array] | None = None
+        self, output: Array, temperature_c: Array | None, channels: Mapping[str, Array] | None = None
     ) -> Compensated:
         """Correct what the device gives in its own unit, (n, axes) or (n,); see `compensate`."""
         values = np.asarray(output, dtype=np.float64)
@@ -87,11 +88,11 @@ class Compensator:
         return self.compensate((values - offset) / scale, temperature_c, channels)
 
     def compensate(
-        self, raw_dps: Array, temperature_c: Array | float, channels: Mapping[str, Array] | None = None
+        self, raw_dps: Array, temperature_c: Array | float | None, channels: Mapping[str, Array] | None = None
     ) -> Compensated:
         """Correct rates, (n, axes) deg/s, or (n,) for one axis, at temperatures (n,), (n, axes) or one for all.
 
-        `channels` hold what the model `needs` besides, (n,) each. Raises BadInput where one is missing, for a shape
+        None for the temperature where the calibration was made without a thermometer. `channels` hold what the model `needs` besides, (n,) each. Raises BadInput where one is missing, for a shape
         that does not fit, or outside the calibrated range when that is refused.
         """
         known = channels or {}
@@ -107,7 +108,7 @@ class Compensator:
                 f"rates of {raw.shape[1]} axes given; the calibration has axes {', '.join(self.axes)}; give one rate "
                 "for each"
             )
-        warm = np.asarray(temperature_c, dtype=np.float64)
+        warm = np.asarray(self._known(temperature_c), dtype=np.float64)
         lowest, highest = (float(np.min(warm)), float(np.max(warm))) if warm.size else (self._low_c, self._high_c)
         least, most = (float(np.min(raw)), float(np.max(raw))) if raw.size else (0.0, 0.0)
         calm = lowest >= self._low_c and highest <= self._high_c and least >= self._slow and most <= self._fast
@@ -120,6 +121,21 @@ class Compensator:
             return Compensated((self._correct(held, warm, known) + (raw - held)).reshape(given.shape), flags)
         corrected = self._correct(raw, warm, known)
         return Compensated(corrected.reshape(given.shape), flags)
+
+    @property
+    def needs_temperature(self) -> bool:
+        """Whether each sample needs a temperature; not where the calibration was made without a thermometer."""
+        return bool(np.isfinite(self._high_c - self._low_c))
+
+    def _known(self, temperature_c: Array | float | None) -> Array | float:
+        if temperature_c is not None:
+            return temperature_c
+        if self.needs_temperature:
+            raise BadInput(
+                f"{self.calibration.serial}: its calibration is of {self._low_c:g} to {self._high_c:g} deg C; give the "
+                "temperature of each sample"
+            )
+        return STAND_IN_C
 
     def _judge(self, raw: Array, warm: Array) -> NDArray[np.bool_]:
         """Return which samples are outside the range or no numbers, (n,); raises BadInput when that is refused."""
@@ -140,9 +156,9 @@ class Compensator:
             )
         return np.asarray(cold | fast)
 
-    def step(self, raw_dps: ArrayLike, temperature_c: float) -> tuple[Array, bool]:
+    def step(self, raw_dps: ArrayLike, temperature_c: float | None) -> tuple[Array, bool]:
         """Correct one sample, (axes,) deg/s; returns the corrected rates and whether it lay outside."""
-        found = self.compensate(np.asarray(raw_dps, dtype=np.float64).reshape(1, -1), np.array([temperature_c]))
+        found = self.compensate(np.asarray(raw_dps, dtype=np.float64).reshape(1, -1), temperature_c)
         return found.rate_dps[0], bool(found.outside[0])
 
 

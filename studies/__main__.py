@@ -8,6 +8,7 @@ import sys
 STUDIES = (
     "coverage",
     "use_coverage",
+    "hand_turns",
     "criticism",
     "crash_recovery",
     "process_kill",

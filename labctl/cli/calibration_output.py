@@ -22,11 +22,14 @@ def print_fit(answer: FitResponse) -> None:
     console.print(f"  before             {format_number(error.raw_rms_dps)} deg/s RMS")
     console.print(f"  after              {format_number(error.rms_dps)} deg/s RMS")
     console.print(f"  held-out           {format_number(error.heldout_rms_dps)} deg/s RMS")
+    for leg in error.heldout_by_leg:
+        console.print(f"  {leg.tested + ' by ' + leg.fitted:<18} {format_number(leg.rms_dps)} deg/s RMS")
     console.print(f"  noise floor        {format_number(error.noise_floor_dps)} deg/s")
     low, high = answer.validity.temperature_c
     slow, fast = answer.validity.rate_dps
     rates = "any rate" if slow is None or fast is None else f"{slow:.4g} to {fast:.4g} deg/s"
-    console.print(f"  valid              {low:.1f} to {high:.1f} deg C, {rates}")
+    warm = "any temperature (none was measured)" if low is None or high is None else f"{low:.1f} to {high:.1f} deg C"
+    console.print(f"  valid              {warm}, {rates}")
     for axis, content in answer.axes.items():
         coefficients = content["coefficients"]
         if isinstance(nodes := coefficients.get("temperature_c"), list):

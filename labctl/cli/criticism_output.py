@@ -88,9 +88,14 @@ def _not_testable(answer: CriticismResponse) -> list[str]:
     lacking: dict[str, list[str]] = {}
     for line in answer.not_testable:
         if line["why"] == "channel":
-            lacking.setdefault(", ".join(line["needs"]), []).append(line["effect"])
+            lacking.setdefault(", ".join(map(_channel_in_words, line["needs"])), []).append(line["effect"])
     said = [f"this schedule cannot test: {', '.join(hidden)}"] if hidden else []
     return said + [f"not recorded: {channel}, which would show {', '.join(each)}" for channel, each in lacking.items()]
+
+
+def _channel_in_words(name: str) -> str:
+    """Return the name of a column; of turns the rate is known on average alone."""
+    return "the rate at each instant (table_rate_dps)" if name == "table_rate_dps" else name
 
 
 def _print_static(static: StaticRecordJson) -> None:

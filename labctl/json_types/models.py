@@ -101,6 +101,16 @@ class AxisCoefficients(TypedDict):
     coefficients: Coefficients
 
 
+class LegErrorJson(TypedDict):
+    """Error of the data sets of one direction of the temperature by a fit to those of the other, deg/s."""
+
+    fitted: str
+    tested: str
+    rms_dps: float | None
+    datasets: int
+    why: str
+
+
 class ErrorFiguresJson(TypedDict):
     """Input-referred RMS errors, deg/s."""
 
@@ -109,12 +119,13 @@ class ErrorFiguresJson(TypedDict):
     heldout_rms_dps: float | None
     noise_floor_dps: float | None
     noise_floor_source: str
+    heldout_by_leg: NotRequired[list[LegErrorJson]]
 
 
 class ValidityJson(TypedDict):
     """Lowest and highest temperature, deg C, and true rate, deg/s; null: no limit."""
 
-    temperature_c: list[float]
+    temperature_c: list[float | None]
     rate_dps: list[float | None]
 
 

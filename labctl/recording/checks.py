@@ -14,6 +14,7 @@ from labctl.recording.constant_rate import rate_change
 from labctl.recording.data_set_limits import refuse_large_numbers, refuse_too_many_data_sets
 from labctl.recording.info import RecordingInfo
 from labctl.recording.recording import Column
+from labctl.recording.turns import check_turns, mean_rate_dps
 
 #: What no gyro, table or chamber has ever been at: another unit, or a slip.
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
@@ -46,6 +47,8 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     _datasets(path, np.asarray(columns["dataset"], dtype=np.int64), points=info.kind == "points")
     if info.kind == "samples" and info.motion == "rates":
         _one_rate(path, columns)
+    if info.motion == "turns":
+        check_turns(path, info, columns)
     return _defaults(path, info, columns)
 
 
@@ -148,6 +151,13 @@ def _defaults(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> di
     n = len(columns["dataset"])
     if info.motion == "rest":
         columns.setdefault("table_rate_dps", np.zeros(n))
+        if "position" not in columns and len(info.axes) > 1 and info.latitude_deg is not None:
+            raise BadRecording(
+                f"{path}: column 'position' is missing, and latitude_deg = {info.latitude_deg:g} is given: which body "
+                "axis points up says which output the Earth turns; add the column, or leave latitude_deg out"
+            )
+    if info.motion == "turns":
+        columns["table_rate_dps"] = mean_rate_dps(info, columns)
     if "position" not in columns:
         columns["position"] = np.full(n, info.axes[0])
     _positions(path, columns["position"])

@@ -39,6 +39,7 @@ COLUMNS = (
     Column("table_rate_dps", "number", "deg/s", "rate of the table that was really run", _BOTH, _ON_TABLE),
     Column("turn_deg", "number", "deg", "angle that the unit turned by in a data set", _BOTH, frozenset({"turns"})),
     Column("turn_u_deg", "number", "deg", "standard uncertainty of turn_deg"),
+    Column("duration_s", "number", "s", "length of the data set", frozenset({"points"}), frozenset({"turns"})),
     Column("table_angle_deg", "number", "deg", "table angle, unwrapped within a data set"),
     Column(
         "temperature_c",

@@ -61,6 +61,8 @@ class RecordingInfo(BaseModel):
     power_on_s: float | None = None
     latitude_deg: float | None = Field(default=None, ge=-90, le=90)
     table_axis: Literal["up"] = "up"
+    #: Of turns: standard uncertainty, as a share of the angle, that all of them have in common, such as a fixture's.
+    turn_common_u: float | None = Field(default=None, ge=0, lt=0.5)
     tilt_deg: float | None = None
     tilt_azimuth_deg: float | None = None
     sample_rate_hz: float | None = Field(default=None, gt=0)

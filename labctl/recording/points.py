@@ -7,9 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.info import Motion
 from labctl.recording.quantisation import steps_columns
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
+from labctl.recording.turn_means import turned_points
 
 #: Columns that one data set has one value of: its first reading's.
 FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg")
@@ -18,6 +20,10 @@ FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg")
 LONG_S = 600.0
 MOVED_K = 1.0
 PIECE_S = 60.0
+#: At rest a data set may be a whole ramp: in no window may the temperature move by more than this share of its range,
+#: and no window has fewer readings. `_SLOPES` parts of a data set are compared for how fast the temperature moves.
+WINDOW_SHARE, WINDOW_READINGS = 0.05, 16
+_SLOPES = 20
 
 
 def dataset_starts(dataset: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -34,15 +40,22 @@ def temperature_of(columns: Columns) -> NDArray[np.float64] | None:
     return None if warm is None else np.asarray(warm, dtype=np.float64)
 
 
-def pieces(columns: Columns) -> NDArray[np.int64]:
+def pieces(columns: Columns, motion: Motion = "rates") -> NDArray[np.int64]:
     """Return labels (n,) of readings: they rise with the data set, and within one that is taken in pieces."""
     dataset, warm = np.asarray(columns["dataset"], dtype=np.int64), temperature_of(columns)
     piece = np.zeros(len(dataset), dtype=np.int64)
-    if len(dataset) and "t_s" in columns and warm is not None:
+    if len(dataset) and "t_s" in columns and (warm is not None or motion == "rest"):
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         starts = dataset_starts(dataset)
+        turned = np.asarray(columns["turn_deg"]) != 0 if "turn_deg" in columns else np.zeros(len(dataset), dtype=bool)
         for begin, end in zip(starts, np.append(starts[1:], len(dataset)), strict=True):
-            piece[begin:end] = _minutes(t_s[begin:end] - t_s[begin], warm[begin:end])
+            if turned[begin]:  # a part of a turn is no known angle
+                continue
+            since_s, here = t_s[begin:end] - t_s[begin], None if warm is None else warm[begin:end]
+            if motion == "rest":
+                piece[begin:end] = _windows(since_s, here)
+            elif here is not None:
+                piece[begin:end] = _minutes(since_s, here)
     changes = (dataset[1:] != dataset[:-1]) | (piece[1:] != piece[:-1])
     return np.concatenate([[0], np.cumsum(changes)]).astype(np.int64)
 
@@ -61,6 +74,23 @@ def _minutes(since_s: NDArray[np.float64], temperature_c: NDArray[np.float64]) -
     return piece if np.ptp(means) > MOVED_K else whole
 
 
+def _windows(since_s: NDArray[np.float64], temperature_c: NDArray[np.float64] | None) -> NDArray[np.int64]:
+    """Return the window of each reading of a data set at rest, (n,): about a minute, less where the unit warms faster.
+
+    A window is short against the change of the temperature, so that its mean stands for one point of any smooth law of
+    temperature and time, and has readings enough for its white noise to be known.
+    """
+    length_s, n = float(since_s[-1]), len(since_s)
+    parts = round(length_s / PIECE_S)
+    if temperature_c is not None and n >= _SLOPES * WINDOW_READINGS:
+        means = np.array([part.mean() for part in np.array_split(temperature_c, _SLOPES)])
+        if np.ptp(means) > MOVED_K:
+            fastest = float(np.abs(np.diff(means)).max()) / float(np.ptp(means))
+            parts = max(parts, int(np.ceil(_SLOPES * fastest / WINDOW_SHARE)))
+    parts = max(min(parts, n // WINDOW_READINGS), 1)
+    return np.minimum(since_s / max(length_s, 1e-9) * parts, parts - 1).astype(np.int64)
+
+
 def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Recording:
     """Return points in which each data set that is taken in pieces has a row for each of them, under its own number.
 
@@ -68,12 +98,13 @@ def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Rec
     read. What the readings do not say, such as the set point, a piece has from its data set.
     """
     columns = {name: np.asarray(values) for name, values in points.columns.items()}
-    if not np.any(np.asarray(columns.get("duration_s", 0.0), dtype=np.float64) > LONG_S):
+    longest_s = 0.0 if points.info.motion == "rest" else LONG_S
+    if not np.any(np.asarray(columns.get("duration_s", 0.0), dtype=np.float64) > longest_s):
         return points
     rows: list[dict[str, NDArray[np.generic]]] = []
     for row in range(len(points)):
         kept = {name: values[row : row + 1] for name, values in columns.items()}
-        if kept["duration_s"][0] > LONG_S:
+        if kept["duration_s"][0] > longest_s:
             info = points.info.model_copy(update={"kind": "samples"})
             found = to_points(Recording(info, readings_of(int(kept["dataset"][0]))))
             if len(found) > 1:
@@ -86,8 +117,8 @@ def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Rec
 def to_points(recording: Recording) -> Recording:
     """Return the recording with one row per data set (kind "points"); points and coefficients return as they are.
 
-    A long data set through which the temperature moved has a row for each of its pieces, under its own number.
-    Only valid readings count. `t_s` is the middle of the data set, `table_angle_deg` its start, `duration_s` its
+    A long data set through which the temperature moved, and at rest any longer than a window, has a row for each of its
+    pieces, under its own number. Only valid readings count. `t_s` is the middle of the data set, `table_angle_deg` its start, `duration_s` its
     length; each gyro column gains `_std` (n - 1), where every set has readings enough `_white_std`, and where its
     readings come in coarse steps `_quantisation_std`; every row gains `n`. A data set without a valid reading is left
     out.
@@ -97,7 +128,7 @@ def to_points(recording: Recording) -> Recording:
     columns = recording.columns
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     rows = {name: np.asarray(values)[valid] for name, values in columns.items() if name != "valid"}
-    starts = dataset_starts(pieces(rows))
+    starts = dataset_starts(pieces(rows, recording.info.motion))
     counts = np.diff(np.append(starts, len(rows["dataset"])))
     points: dict[str, NDArray[np.generic]] = {}
     for name, values in rows.items():
@@ -117,6 +148,8 @@ def to_points(recording: Recording) -> Recording:
                 if counts.min() >= LEAST_FOR_SPECTRUM:
                     points[f"{name}_white_std"] = np.array([white_std(readings) for readings in sets])
     points["n"] = counts.astype(np.int64)
+    if recording.info.motion == "turns":
+        points |= turned_points(rows, points, starts, counts)
     return Recording(recording.info.model_copy(update={"kind": "points"}), points, recording.environment)
 
 

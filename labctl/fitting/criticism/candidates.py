@@ -14,6 +14,7 @@ from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.earth import turning_size_dps
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
 from labctl.fitting.models.error_model import ErrorModel, expand
+from labctl.fitting.models.linearity import is_linear_in_rate
 from labctl.fitting.numeric.arrays import Array
 
 #: Effects that contain several others: a model starts from them, and they are never what is missing.
@@ -21,6 +22,8 @@ ONLY_BASE = frozenset({"rate_temperature_surface"})
 
 #: Candidate that is a drift of the thermometer: it depends on the temperature as it is logged.
 THERMOMETER = "temperature_c"
+#: What is not known of a turn at each instant.
+RATE = "table_rate_dps"
 #: Step by which the base's slope over temperature is computed, K.
 SHIFT_K = 0.25
 
@@ -39,13 +42,24 @@ def span_of(data: ReducedRecording) -> Span:
 
 
 def untestable_channels(data: ReducedRecording, catalogue: Mapping[str, Effect] = CATALOGUE) -> dict[str, list[str]]:
-    """Return effects whose channels are not logged, with the channels."""
+    """Return effects whose channels are not logged, with the channels.
+
+    Of turns the rate at each instant is not known: what is not linear in it lacks that column.
+    """
     found: dict[str, list[str]] = {}
     for kind in catalogue.values():
-        absent = [name for name in kind.needs if name not in data.nodes and name != "run"]
+        absent = [name for name in data.nodes.missing(kind.channels) if name != "run"]
+        if not absent and data.info.motion == "turns" and not _takes_mean_rate(data, kind):
+            absent = [RATE]
         if absent:
             found[kind.id] = absent
     return found
+
+
+def _takes_mean_rate(data: ReducedRecording, kind: Effect) -> bool:
+    """Whether the mean of the rate over a data set is enough to show an effect, in every shape."""
+    reference, terms = Reference(), kind.options(span_of(data))
+    return all(is_linear_in_rate(kind, term, data.nodes, axis, reference) for term in terms for axis in data.info.axes)
 
 
 def base_rows(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArray[np.float64], list[str], Array]:
@@ -81,7 +95,7 @@ def _over_temperature(data: ReducedRecording, column: Column, basis: Array) -> N
 
 
 def _turning(data: ReducedRecording, axis: str) -> list[Column]:
-    if data.info.latitude_deg is None or "table_angle_deg" not in data.nodes:
+    if data.info.motion == "turns" or data.info.latitude_deg is None or "table_angle_deg" not in data.nodes:
         return []
     return [
         Column(f"earth_{wave}_{there}", "deg/s", here.astype(np.float64), (wave, 1))

@@ -28,6 +28,7 @@ NO_CHANNELS = frozenset(
     {
         "dataset", "run", "mounting", "n", "valid", "duration_s", "since_begin_s", "previous_rate_dps", "status",
         "table_angle_deg", "chamber_setpoint_c", "temperature_x_c", "temperature_y_c", "temperature_z_c",
+        "turn_deg", "turn_u_deg",
     }
 )  # fmt: skip
 TIMES = frozenset({"t_s", "power_s"})
@@ -48,6 +49,8 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
         if name not in NO_CHANNELS and values.dtype.kind in "fiu" and not name.startswith("gyro_")
     }
     channels["table_rate_dps"] = data.nodes.rate_dps(axis)
+    if data.info.motion == "turns":  # no function of the rate can be told from its mean
+        del channels["table_rate_dps"]
     return {name: v for name, v in channels.items() if np.all(np.isfinite(v)) and np.ptp(v) > 1e-9 * (1 + abs(v[0]))}
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.data.temperature_channel import with_stand_in
 from labctl.fitting.data.temperature_history import TemperatureHistory, history_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
@@ -102,7 +103,10 @@ class Channels:
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Return which of the names are not logged."""
-        return [name for name in names if name not in self.columns and name not in {"table_rate_dps", "temperature_c"}]
+        known = {*self.columns, "table_rate_dps", "temperature_c"}
+        if not self.history.thermometer:
+            known.remove("temperature_c")
+        return [name for name in names if name not in known]
 
 
 def body_rates(table_rate_dps: Array, position: NDArray[np.generic]) -> dict[str, Array]:
@@ -117,7 +121,7 @@ def channels_of(points: Recording, up_rate_dps: float = 0.0) -> Channels:
 
     `up_rate_dps` is added to the table's rate, deg/s: the Earth's rate along the table axis, upwards.
     """
-    columns = dict(points.columns)
+    columns = with_stand_in(points.columns, len(points))
     columns.setdefault("position", np.full(len(points), points.info.axes[0]))
     true = np.asarray(columns["table_rate_dps"], dtype=np.float64) + up_rate_dps
     if "previous_rate_dps" not in columns and points.info.kind == "points":

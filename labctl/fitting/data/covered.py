@@ -12,20 +12,26 @@ from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.points import dataset_starts, temperature_of
+from labctl.recording.turn_means import rates_as_turned
 
 Range = tuple[float, float]
+#: A range of temperatures, deg C; None where no thermometer says how warm the unit was.
+MaybeRange = tuple[float | None, float | None]
 
 
 @dataclass(frozen=True)
 class Covered:
     """Lowest and highest temperature, deg C, and true rate along each body axis, deg/s, over all readings."""
 
-    temperature_c: Range
+    temperature_c: MaybeRange
     rate_dps: Mapping[str, Range]
 
 
 def covered_by(
-    table_rates_dps: tuple[Array, Array], position: NDArray[np.generic], temperature_c: Range, up_rate_dps: float = 0.0
+    table_rates_dps: tuple[Array, Array],
+    position: NDArray[np.generic],
+    temperature_c: MaybeRange,
+    up_rate_dps: float = 0.0,
 ) -> Covered:
     """Return what data sets with lowest and highest table rates, (m,) each, in positions (m,) cover.
 
@@ -39,18 +45,19 @@ def covered_by(
 
 
 def covered_by_readings(recording: Recording, up_rate_dps: float = 0.0) -> Covered | None:
-    """Return what the valid readings of a recording cover; None without a reading or a thermometer."""
+    """Return what the valid readings of a recording cover; None without a reading."""
     columns = recording.columns
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     warm = temperature_of(columns)
-    if warm is None or not valid.any():
+    if not valid.any():
         return None
-    rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)[valid]
+    turned = recording.info.motion == "turns"
+    rate = (rates_as_turned(recording) if turned else np.asarray(columns["table_rate_dps"], dtype=np.float64))[valid]
     starts = dataset_starts(np.asarray(columns["dataset"], dtype=np.int64)[valid])
     axis = recording.info.axes[0]
     position = np.asarray(columns["position"])[valid][starts] if "position" in columns else np.full(len(starts), axis)
     ends = np.minimum.reduceat(rate, starts), np.maximum.reduceat(rate, starts)
-    span = float(warm[valid].min()), float(warm[valid].max())
+    span = (None, None) if warm is None else (float(warm[valid].min()), float(warm[valid].max()))
     return covered_by(ends, position, span, up_rate_dps)
 
 
@@ -58,4 +65,5 @@ def covered_by_means(channels: Channels) -> Covered:
     """Return what data-set means cover, where their readings are not known."""
     warm = np.asarray(channels["temperature_c"], dtype=np.float64)
     rates = {axis: (float(rate.min()), float(rate.max())) for axis, rate in channels.rates.items()}
-    return Covered((float(warm.min()), float(warm.max())), rates)
+    known = channels.history.thermometer
+    return Covered((float(warm.min()), float(warm.max())) if known else (None, None), rates)

@@ -58,9 +58,10 @@ def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array
 
     Its size is known (the Earth's rate times the cosine of the latitude) but not where north lies from the table's
     zero, so both are fitted and belong to the environment. An axis along the table axis has none. Needs the table angle
-    and the length of the data sets; k is 0 without them.
+    and the length of the data sets; k is 0 without them, and for turns, whose angle at each instant is not known.
     """
-    if info.latitude_deg is None or "table_angle_deg" not in channels or "duration_s" not in channels:
+    known = info.latitude_deg is not None and "table_angle_deg" in channels and "duration_s" in channels
+    if info.motion == "turns" or not known:
         return np.zeros((len(channels), 0))
     start = np.deg2rad(np.asarray(channels["table_angle_deg"], dtype=np.float64))
     turned = np.deg2rad(channels.table_rate_dps() * np.asarray(channels["duration_s"], dtype=np.float64))

@@ -48,7 +48,20 @@ class FitData:
     @cached_property
     def without_each_temperature(self) -> list[tuple[FitData, FitData]]:
         """For each temperature left out (`folds`), rising: the other data sets, and those at it."""
-        return [(self.take(~mask), self.take(mask)) for mask in folds(self.temperature_c)]
+        return [(self.take(~mask), self.take(mask)) for mask in self.folds]
+
+    @property
+    def folds(self) -> list[NDArray[np.bool_]]:
+        """The data sets that are left out together, (m,) each: those of one temperature, or without it of one time."""
+        return folds(self.temperature_c, thermometer=self.channels.history.thermometer)
+
+    @cached_property
+    def held_out_pairs(self) -> list[tuple[FitData, FitData]]:
+        """For each part left out: the other data sets, and the part: a temperature, or of turns a turn."""
+        if self.info.motion != "turns":
+            return self.without_each_temperature
+        turns = np.eye(len(self), dtype=bool)[self.channels.table_rate_dps() != 0]
+        return [(self.take(~mask), self.take(mask)) for mask in turns]
 
     @cached_property
     def _rate_counts(self) -> dict[str, int]:

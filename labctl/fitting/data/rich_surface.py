@@ -24,17 +24,26 @@ MOST_SHARE, MOST_SHARE_WITH_LEVELS, LEAST_FREE = 0.5, 0.7, 8
 DEGREES = (6, 4, 2, 2)
 #: Time constants of a warm-up after power-on, s.
 WARM_UP_S = (600.0, 3600.0)
+#: At rest a loop of temperatures shows what lags behind the thermometer, s, or depends on where it came from, K.
+LAGS_S, WIDTHS_K = (150.0, 400.0, 1000.0, 2500.0), (2.0, 6.0, 15.0)
 #: A column of which those before it leave less than this share says nothing new.
 LEAST_NEW = 1e-2
 #: What is logged and no cause of an error by itself, or is there in another form.
 NO_SURROUNDINGS = frozenset({
     "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
     "since_begin_s", "valid", "temperature_c", "temperature_x_c", "temperature_y_c", "temperature_z_c", "power_s",
+    "turn_deg", "turn_u_deg",
 })  # fmt: skip
 
 
 def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
-    """Return orthonormal columns (m, k), the most important first; k is at most half of m, and at most m - 8."""
+    """Return orthonormal columns (m, k), the most important first; k is at most half of m, and at most m - 8.
+
+    Of turns no law can be told that is not linear in the rate; what is linear is taken in whole, whatever m is.
+    """
+    if "turn_deg" in channels:
+        warm, rate = _chebyshev(channels.temperature_c(axis), max(DEGREES)), channels.rate_dps(axis)[:, None]
+        return _orthonormal(iter([warm[:, 1:4], warm[:, 1:3] * rate]), _linear(channels), MOST_SHARE)
     return _orthonormal(_blocks(channels, axis), np.zeros((len(channels), 0)), MOST_SHARE)
 
 
@@ -61,6 +70,16 @@ def _orthonormal(
                 found[:, k] = new
                 k += 1
     return found[:, :k]
+
+
+def _linear(channels: Channels) -> NDArray[np.float64]:
+    """Return orthonormal columns (m, k) of a bias in every position and the response to every axis."""
+    places = [rows.astype(np.float64) for _, rows in channels.positions()]
+    found = np.zeros((len(channels), 0))
+    for column in (*places, *channels.rates.values()):
+        if (new := _new_part(column, found)) is not None:
+            found = np.column_stack([found, new])
+    return found
 
 
 def _new_part(column: Array, found: NDArray[np.float64]) -> Array | None:
@@ -139,6 +158,10 @@ def _history(channels: Channels, warm: NDArray[np.float64], rate: Array) -> Iter
     direction[order] = leg
     if np.ptp(direction) > 0:
         yield np.column_stack([direction, direction * warm[:, 1], direction * warm[:, 2], direction * rate])
+    if not np.any(rate) and channels.history.courses:
+        lags = [channels.history.lag_k(channels.columns, tau) for tau in LAGS_S]
+        states = [channels.history.hysteresis_state(channels.columns, width) for width in WIDTHS_K]
+        yield np.column_stack([*lags, *states])
     since = np.asarray(channels["power_s"], dtype=np.float64) if "power_s" in channels else t_s - t_s.min()
     since = np.maximum(since, 0.0)
     decays = np.column_stack([np.exp(-since / tau) for tau in WARM_UP_S])

@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.recording import Columns, Recording
 from labctl.recording.points import temperature_of
+
+#: The temperature of a unit without a thermometer, deg C: no answer shows it.
+STAND_IN_C = 25.0
 
 
 def with_temperature(recording: Recording) -> Recording:
     """Return a recording that has `temperature_c`, by which fit and criticism go.
 
     Where the unit has no thermometer the chamber's temperature stands in for it (`temperature_of`), in the history too:
-    one thermometer for all. Raises NotEnoughData where there is neither.
+    one thermometer for all. A recording of a motion that needs no thermometer stays without one (`with_stand_in`).
+    Raises NotEnoughData where neither is there and the unit was turned by a table at rates that a law of temperature is
+    fitted to.
     """
     columns, environment = recording.columns, recording.environment
     if "temperature_c" in columns:
         return recording
     warm = temperature_of(columns)
+    if warm is None and recording.info.motion != "rates":
+        return recording
     if warm is None:
         raise NotEnoughData(
             f"{recording.info.serial}: column 'temperature_c' is missing, and so is 'chamber_c', which can replace "
@@ -31,6 +40,14 @@ def with_temperature(recording: Recording) -> Recording:
         there = temperature_of(theirs)
         environment = None if there is None else {**theirs, "temperature_c": there}
     return replace(recording, columns={**columns, "temperature_c": warm}, environment=environment)
+
+
+def with_stand_in(columns: Mapping[str, NDArray[np.generic]], n: int) -> dict[str, NDArray[np.generic]]:
+    """Return the columns, n rows each, of channels: where no thermometer is known, one temperature for all rows.
+
+    A law of temperature then has nothing to be seen by (`TemperatureHistory.thermometer`), and all others go on.
+    """
+    return dict(columns) if "temperature_c" in columns else {**columns, "temperature_c": np.full(n, STAND_IN_C)}
 
 
 def is_chambers(columns: Columns) -> bool:

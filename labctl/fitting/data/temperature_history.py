@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
+from scipy.special import roots_genlaguerre
 
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
@@ -23,6 +24,8 @@ LoggedColumns = Mapping[str, NDArray[np.generic]]
 CourseFunction = Callable[[Array, float], Array]
 #: Spacing of a resampled temperature course, s.
 SPACING_S = 10.0
+#: Plays of which a rounded hysteresis is made.
+ROUNDED_PLAYS = 4
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ class TemperatureHistory:
     counted: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  #: "run", "mounting" -> numbers, rising
     rate_dps: float = 1.0  #: largest table rate, deg/s, without sign
     span_c: tuple[float, float] = (0.0, 1.0)  #: lowest and highest temperature, deg C
+    thermometer: bool = True  #: whether anything says how warm the unit was
     #: What was computed of the courses, by function and its parameter: every axis asks for the same.
     _known: dict[tuple[CourseFunction, float], dict[int, Array]] = field(default_factory=dict, repr=False)
 
@@ -65,9 +69,17 @@ class TemperatureHistory:
         """Return by how much a first-order follower with time constant `tau_s` lags the thermometer, (n,) K."""
         return self._evaluate(columns, _lag, tau_s)
 
-    def hysteresis_state(self, columns: LoggedColumns, width_k: float) -> Array:
-        """Return the state of a play hysteresis of width `width_k`, (n,), 1: approached from below, -1: from above."""
-        return self._evaluate(columns, _play, width_k)
+    def hysteresis_state(self, columns: LoggedColumns, width_k: float, *, rounded: bool = False) -> Array:
+        """Return the state of a play hysteresis of width `width_k`, (n,), 1: approached from below, -1: from above.
+
+        With `rounded` of several plays together (`rounded_plays`): it nears the new side exponentially, over `width_k`.
+        """
+        if not rounded:
+            return self._evaluate(columns, _play, width_k)
+        found = np.zeros(len(next(iter(columns.values()), ())))
+        for width, share in rounded_plays(width_k):
+            found += share * self._evaluate(columns, _play, width)
+        return found
 
     def _evaluate(self, columns: LoggedColumns, function: CourseFunction, parameter: float) -> Array:
         """Return a function of each run's temperature course, (k,) to (k,), at the times of the rows, (n,)."""
@@ -84,6 +96,17 @@ class TemperatureHistory:
                     known[number] = function(course.temperature_c, parameter)
                 found[here] = course.at(known[number], t_s[here])
         return found
+
+
+def rounded_plays(width_k: float) -> list[tuple[float, float]]:
+    """Return widths, K, and shares of plays whose sum nears its new side as 1 - exp(-way / width_k).
+
+    The distribution of widths r that does so exactly has the density r exp(-r / w) / w^2 (Prandtl and Ishlinskii's
+    hysteresis); four plays are its Gauss quadrature. Unlike a state that moves with every step of the temperature, a
+    play stands still in the noise of a thermometer.
+    """
+    nodes, weights = roots_genlaguerre(ROUNDED_PLAYS, 1.0)
+    return [(float(width_k * node), float(weight)) for node, weight in zip(nodes, weights, strict=True)]
 
 
 def _slope(temperature_c: Array, over_s: float) -> Array:
@@ -131,6 +154,8 @@ def history_of(recording: Recording) -> TemperatureHistory:
         if name in columns
     }
     rate = float(np.max(np.abs(np.asarray(columns["table_rate_dps"], dtype=np.float64)), initial=0.0)) or 1.0
+    if "temperature_c" not in columns:
+        return TemperatureHistory({}, counted, rate, thermometer=False)
     warm = np.asarray(columns["temperature_c"], dtype=np.float64)
     span = (float(warm.min()), float(warm.max())) if len(warm) else (0.0, 1.0)
     if "t_s" not in columns:

@@ -51,11 +51,14 @@ def level_means(temperature_c: Array, labels: NDArray[np.int64]) -> Array:
     return sums / np.bincount(labels)
 
 
-def folds(temperature_c: Array) -> list[NDArray[np.bool_]]:
+def folds(temperature_c: Array, *, thermometer: bool = True) -> list[NDArray[np.bool_]]:
     """Return the data sets to leave out together, one mask (n,) per temperature level, rising.
 
-    Without discrete levels: 8 bins of equal count in temperature.
+    Without discrete levels: 8 bins of equal count in temperature. Without a thermometer: 8 in order of time.
     """
+    if not thermometer:
+        n = len(temperature_c)
+        return [np.arange(n) * BINS // n == part for part in range(BINS)] if n >= BINS else []
     labels = temperature_levels(temperature_c)
     if labels is None:
         ranks = np.argsort(np.argsort(temperature_c, kind="stable"), kind="stable")

@@ -128,6 +128,7 @@ class Effect(ABC):
     origin: ClassVar[Origin]
     rows: ClassVar[Rows] = "own"
     needs: tuple[str, ...] = ()  #: channels beyond rate and temperature
+    by_temperature: bool = False  #: whether it cannot be seen without a thermometer
     default_order: ClassVar[int | None] = None  #: of a polynomial; None where there is no order to choose
     min_order: ClassVar[int] = 1
     max_order: ClassVar[int | None] = None
@@ -143,6 +144,11 @@ class Effect(ABC):
     @abstractmethod
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the regressors of this effect for one output axis; none where it does not touch the axis."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels beyond the rate that it cannot be seen without, the thermometer among them."""
+        return (*self.needs, "temperature_c") if self.by_temperature else self.needs
 
     def shaped_by(self, term: Term, coefficients: Mapping[str, float]) -> Term:
         """Return a term whose columns have the shape of a fit: axis -> its first coefficient, at the nodes' mean."""

@@ -34,6 +34,7 @@ class BiasTemperature(Effect):
     id = "bias_temperature"
     term = "Bias temperature sensitivity"
     sentence = "The output at rest changes with the gyro's temperature."
+    by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True

@@ -64,6 +64,7 @@ class Formula(Effect):
         self.sentence = sentence or f"The error follows {text}."
         self._tree = _parsed(name, text)
         self.needs = tuple(sorted(_names(self._tree) - {OWN_RATE, "table_rate_dps", "temperature_c"}))
+        self.by_temperature = "temperature_c" in _names(self._tree)
         self.shows_at_rest = _names(self._tree).isdisjoint(RATES)
         names = {"table_rate_dps" if name == OWN_RATE else name for name in _names(self._tree)}
         self.draws = tuple("time" if name == "t_s" else name for name in sorted(names))

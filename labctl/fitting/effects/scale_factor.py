@@ -42,6 +42,7 @@ class ScaleFactorTemperature(Effect):
     id = "scale_factor_temperature"
     term = "Scale factor temperature sensitivity"
     sentence = "The scale factor changes with the gyro's temperature."
+    by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     default_order = 2
     max_order = 5

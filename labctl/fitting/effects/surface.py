@@ -25,6 +25,7 @@ class RateTemperatureSurface(Effect):
     id = "rate_temperature_surface"
     term = "Bias and scale factor surface over rate and temperature"
     sentence = "The error is a smooth surface over rate and temperature: a cubic along one, a parabola along the other."
+    by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     default_order = 3
     max_order = 5

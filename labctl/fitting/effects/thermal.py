@@ -18,6 +18,7 @@ class TemperatureRate(Effect):
     in_use = False
     term = "Temperature rate sensitivity (Shupe effect)"
     sentence = "The bias shifts while the temperature changes, in proportion to how fast."
+    by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
@@ -48,6 +49,7 @@ class ThermalLag(Effect):
     in_use = False
     term = "Thermal lag (sensing element behind the thermometer)"
     sentence = "The part that matters follows the thermometer late, so the correction comes for another temperature."
+    by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
@@ -75,17 +77,26 @@ class ThermalHysteresis(Effect):
     in_use = False
     term = "Thermal hysteresis"
     sentence = "The bias depends on whether the temperature was reached from below or from above."
+    by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
     needs = ("t_s",)
-    parameters = (Parameter("width_k", "K", 1.0, 15.0, logarithmic=True), Parameter("bowed", "1", 0, 1))
+    parameters = (
+        Parameter("width_k", "K", 1.0, 15.0, logarithmic=True),
+        Parameter("bowed", "1", 0, 1),
+        Parameter("rounded", "1", 0, 1),
+    )
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.2), "piezo": (0.0, 0.2)}
     experiment = "temperatures on the way up and on the way down, then a smaller loop"
     draws = ("legs", "temperature_c")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        state = channels.history.hysteresis_state(channels.columns, term.parameters.get("width_k", 3.0))
+        """A play of the temperature; `rounded`: several plays together, so that the new side is approached smoothly."""
+        width_k = term.parameters.get("width_k", 3.0)
+        state = channels.history.hysteresis_state(
+            channels.columns, width_k, rounded=bool(term.parameters.get("rounded", 0.0))
+        )
         if term.parameters.get("bowed", 0.0):
             warm = channels.temperature_c(axis)
             low, high = channels.history.span_c
@@ -94,8 +105,9 @@ class ThermalHysteresis(Effect):
         return [Column("leg", "deg/s", state)]
 
     def options(self, span: Span) -> list[Term]:
-        plain = by_parameter(self.id, width_k=np.array([1.5, 4.0, 8.0]), bowed=np.array([0.0]))
-        return plain + by_parameter(self.id, width_k=np.array([1.5]), bowed=np.array([1.0]))
+        plain = by_parameter(self.id, width_k=np.array([1.5, 4.0, 8.0, 15.0]), bowed=np.array([0.0]))
+        rounded = by_parameter(self.id, width_k=np.array([1.5, 4.0, 8.0, 15.0]), rounded=np.array([1.0]))
+        return [*plain, *rounded, *by_parameter(self.id, width_k=np.array([1.5]), bowed=np.array([1.0]))]
 
 
 class WarmUp(Effect):
@@ -155,6 +167,7 @@ class ThermometerError(Effect):
     id = "thermometer_error"
     term = "Thermometer error"
     sentence = "The thermometer is off; while calibrating this hides in the temperature terms, in use it does not."
+    by_temperature = True
     origin: ClassVar[Origin] = "bench"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True

@@ -12,6 +12,7 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
+from labctl.fitting.estimation.common_turn_error import with_common_error
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
@@ -39,6 +40,7 @@ def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] |
     for axis in data.outputs:
         design, solution = _converged(data, model, axis, fixed[axis] if fixed else None)
         k = design.columns.shape[1]
+        solution = with_common_error(data, axis, design.columns, solution)
         fits[axis] = _axis_fit(design, solution)
         solutions[axis], turning[axis] = replace(solution, white_dps=data.white_dps(axis)), solution.values[k:]
     return AxisSolutions(fits, solutions, turning)

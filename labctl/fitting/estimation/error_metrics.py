@@ -9,18 +9,19 @@ import numpy as np
 
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import ErrorFiguresJson
+from labctl.json_types.models import ErrorFiguresJson, LegErrorJson
 
 
 @dataclass(frozen=True)
 class ErrorFigures:
-    """The four figures of a calibration; None where one cannot be had."""
+    """The figures of a calibration; None where one cannot be had."""
 
     raw_rms_dps: float | None
     rms_dps: float | None
     heldout_rms_dps: float | None
     noise_floor_dps: float | None
     noise_floor_source: str = "none"
+    heldout_by_leg: tuple[LegErrorJson, ...] = ()  #: where the temperature goes both ways
 
     def to_dict(self) -> ErrorFiguresJson:
         """Return this as JSON."""
@@ -30,6 +31,7 @@ class ErrorFigures:
             "heldout_rms_dps": self.heldout_rms_dps,
             "noise_floor_dps": self.noise_floor_dps,
             "noise_floor_source": self.noise_floor_source,
+            "heldout_by_leg": list(self.heldout_by_leg),
         }
 
 

@@ -16,8 +16,10 @@ from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.coefficient_tables import from_coefficients
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held_out import held_out_errors
+from labctl.fitting.estimation.held_out_legs import errors_by_leg
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.estimation.validity import valid_rates_dps
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
@@ -40,7 +42,8 @@ def fit(
     preset = preset_for(model, effects or [])
     if recording.info.kind == "coefficients" and preset.name == "weiss1995":
         return from_coefficients(recording)
-    return fit_preset(fit_data_of(recording, covered), preset)
+    data = fit_data_of(recording, covered)
+    return fit_preset(data, with_shapes(data, preset))
 
 
 @single_threaded
@@ -58,8 +61,9 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
     floor = data.noise_floor
     error = ErrorFigures(
-        rms(raw), rms(residual), rms(held_out_errors(data, preset, found.solutions)), floor.rms_dps, floor.source
-    )
+        rms(raw), rms(residual), rms(held_out_errors(data, preset, found.solutions)), floor.rms_dps, floor.source,
+        tuple(errors_by_leg(data, preset, found.solutions)),
+    )  # fmt: skip
     return FitResult(
         fitted,
         error,

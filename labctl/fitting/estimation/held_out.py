@@ -1,4 +1,4 @@
-"""Held-out errors: each temperature corrected by a fit without its data."""
+"""Held-out errors: each temperature, or each turn by hand, corrected by a fit without its data."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from labctl.fitting.numeric.least_squares import Solution
 
 
 def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solution]) -> dict[str, Array]:
-    """Return axis -> (m,) deg/s, corrected minus true rate of each temperature left out in turn.
+    """Return axis -> (m,) deg/s, corrected minus true rate of each part left out in turn (`held_out_pairs`).
 
     The drift of each axis stays that of `solutions`, the fit to all data sets. Empty where a fold leaves too little.
     """
-    pairs = data.without_each_temperature
+    pairs = data.held_out_pairs
     if preset.inner_only:
         pairs = pairs[1:-1]
     errors: dict[str, list[Array]] = {axis: [] for axis in data.outputs}

@@ -8,6 +8,7 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import kind_of
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.linearity import is_linear_in_rate
 
 #: A polynomial of order q in temperature needs at least q times this span.
 SPAN_PER_ORDER_C = 1.0
@@ -17,13 +18,28 @@ def require_enough_data(data: FitData, model: ErrorModel) -> None:
     """Raise NotEnoughData, saying what is missing and how much, where the data sets cannot determine the model."""
     serial = data.info.serial
     for term in model.terms:
-        if absent := data.channels.missing(kind_of(term).needs):
+        if absent := data.channels.missing(kind_of(term).channels):
             raise NotEnoughData(
                 f"{serial}: effect {term.effect} needs column {absent[0]!r}; the recording has none: add the column, "
                 "or leave the effect out"
             )
+    _require_mean_rates(data, model)
     _require_rates(data, model)
     _require_temperatures(data, model)
+
+
+def _require_mean_rates(data: FitData, model: ErrorModel) -> None:
+    """Refuse what turns cannot tell: their rate is known on average alone."""
+    if data.info.motion != "turns":
+        return
+    for axis in data.outputs:
+        for term in model.terms:
+            if not is_linear_in_rate(kind_of(term), term, data.channels, axis, model.reference):
+                raise NotEnoughData(
+                    f"{data.info.serial}: {term.effect} needs the rate at each instant, and of a turn only the mean is "
+                    "known; leave it out, or measure at known rates (motion = 'rates') or with a recorded rate "
+                    "(motion = 'profile')"
+                )
 
 
 def _require_rates(data: FitData, model: ErrorModel) -> None:

@@ -28,7 +28,7 @@ class FitResult:
 
     fitted: FittedModel
     error: ErrorFigures
-    temperature_c: tuple[float, float]  #: range of the readings, deg C
+    temperature_c: tuple[float | None, float | None]  #: range of the readings, deg C; None: no thermometer
     rate_dps: tuple[float | None, float | None]  #: range of the true rates over all axes, deg/s; None: no limit
     noise: Mapping[str, AxisNoiseJson] = field(default_factory=dict)  #: axis -> white noise and drift, as JSON
     environment: FitEnvironment = field(default_factory=FitEnvironment)

@@ -91,6 +91,31 @@ def _bias_scale(data: FitData) -> tuple[ErrorModel, Rows]:
     return ErrorModel("bias_scale", terms, "rate", reference=_centre(data)), _all(data)
 
 
+def _bias(data: FitData) -> tuple[ErrorModel, Rows]:
+    return ErrorModel("bias", (Term("bias"),), "rate", reference=_centre(data)), _all(data)
+
+
+def _bias_temperature(data: FitData) -> tuple[ErrorModel, Rows]:
+    terms = (Term("bias"), Term("bias_temperature"))
+    return ErrorModel("bias_temperature", terms, "rate", reference=_centre(data)), _all(data)
+
+
+def _turns(data: FitData) -> tuple[ErrorModel, Rows]:
+    several = len(data.info.axes) > 1
+    aligned = ALIGNED if several else ALIGNED[:2]
+    gravity = (Term("g_sensitivity"), *((Term("cross_g_sensitivity"),) if several else ()))
+    terms = aligned + (gravity if _rests_both_ways(data) else ())
+    return ErrorModel("turns", terms, "rate", reference=_centre(data)), _all(data)
+
+
+def _rests_both_ways(data: FitData) -> bool:
+    """Whether every body axis that is used rested pointing up, and pointing down: gravity is then told from bias."""
+    still = data.channels.table_rate_dps() == 0
+    position = np.asarray(data.channels["position"]).astype(np.str_)
+    used = {*data.info.axes, *np.char.lstrip(position, "-").tolist()}
+    return {sign + axis for axis in used for sign in ("", "-")} <= set(position[still].tolist())
+
+
 #: name -> (preset, one sentence for a person)
 PRESETS: dict[str, tuple[Preset, str]] = {
     "ojeda2000": (
@@ -112,6 +137,18 @@ PRESETS: dict[str, tuple[Preset, str]] = {
     "bias_scale": (
         Preset("bias_scale", _bias_scale),
         "A plain start: bias and scale factor, each a parabola in temperature.",
+    ),
+    "bias_temperature": (
+        Preset("bias_temperature", _bias_temperature),
+        "At rest: the bias as a parabola in temperature; lag, hysteresis and warm-up can be added.",
+    ),
+    "bias": (
+        Preset("bias", _bias),
+        "At rest: one bias for each axis; it needs no table and no thermometer.",
+    ),
+    "turns": (
+        Preset("turns", _turns),
+        "For turns by a known angle: bias, scale factor, misalignment; g-sensitivity where it rested both ways up.",
     ),
 }
 
@@ -160,12 +197,21 @@ def unchanged(model: ErrorModel) -> Preset:
     return Preset(model.name, lambda data: (model, _all(data)))
 
 
+#: A parabola of the bias takes more different temperatures than it has coefficients beside the constant.
+BIAS_LEVELS = 2
+
+
 def usual_model(data: FitData) -> ErrorModel:
     """Return the published model that fits a recording's axes, in its forward form.
 
     Raises NotEnoughData where the data sets cannot determine it.
     """
-    name = "yang2018" if len(data.info.axes) > 1 and data.levels is not None else "ojeda2000"
+    if data.info.motion == "turns":
+        name = "turns"
+    elif not np.any(data.channels.table_rate_dps()):
+        name = "bias_temperature" if data.distinct_temperatures() > BIAS_LEVELS else "bias"
+    else:
+        name = "yang2018" if len(data.info.axes) > 1 and data.levels is not None else "ojeda2000"
     model, _ = preset_for(name, []).build(data)
     return changed(model).build(data)[0]
 

@@ -164,7 +164,10 @@ def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, values
     largest = scatter.largest_drift_dps / max(drift_noise.DRIFT_SIZES)
     if scatter.white_var is None:
         return float(min(1.0, largest / np.sqrt(max(total, 1e-300))))
-    unexplained = np.sqrt(max(total - scatter.white_var.mean(), 0.01 * scatter.white_var.mean(), 1e-24))
+    # each data set counts by what its white noise lets it say of the rest: DerSimonian and Laird 1986, eq. 8
+    per_white = 1.0 / scatter.white_var
+    excess = float(residual**2 @ per_white) / freedom - 1.0
+    unexplained = np.sqrt(max(max(excess, 0.01) / float(per_white.mean()), 1e-24))
     return float(min(unexplained, largest))
 
 

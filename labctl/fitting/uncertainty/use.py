@@ -10,6 +10,7 @@ import numpy as np
 
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
+from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.presets import Preset, preset_for
 from labctl.fitting.numeric.blas_threads import single_threaded
@@ -89,7 +90,8 @@ def evidence_of(recording: Recording, model: str | None, effects: list[str] | No
     """
     if recording.info.kind == "coefficients":
         return {}
-    return use_evidence(fit_data_of(recording), preset_for(model, effects or []))
+    data = fit_data_of(recording)
+    return use_evidence(data, with_shapes(data, preset_for(model, effects or [])))
 
 
 def combined_dps(*components_dps: float | None) -> float | None:

@@ -11,6 +11,7 @@ from labctl.recording.sanity.outlying import check_outlying
 from labctl.recording.sanity.response import responses
 from labctl.recording.sanity.summary import Summary, summarise
 from labctl.recording.sanity.timing import check_time
+from labctl.recording.sanity.turned import check_turned, off_turns
 from labctl.recording.sanity.within import check_at_rest, check_changes, check_codes, check_spread, with_two_rates
 
 
@@ -23,11 +24,15 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
     """Return the findings of a summary, the certain ones first."""
     if len(summary) == 0:
         return []
-    known = responses(summary)
+    off = off_turns(summary)
+    sound = np.ones(len(summary), dtype=bool)
+    sound[[turn.row for turn in off]] = False
+    trusted = summary.take(sound) if off else summary
     whole = summary.take(~np.any([with_two_rates(summary, axis) for axis in summary.info.axes], axis=0))
     found = [
-        *check_responses(summary, known),
-        *check_outlying(whole, responses(whole)),
+        *check_turned(summary, off),
+        *check_responses(trusted, responses(trusted)),
+        *(check_outlying(whole, responses(whole)) if summary.info.motion != "turns" else ()),
         *check_changes(summary),
         *check_at_rest(summary),
         *check_spread(summary),

@@ -17,6 +17,8 @@ from labctl.recording.points import dataset_starts, temperature_of
 from labctl.recording.quantisation import codes_of
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.sanity.blocks import NO_CHANGE, level_change, noise_of_reading, wander
+from labctl.recording.turn_means import rates_as_turned
+from labctl.recording.turns import USUAL_U_DEG
 
 #: Time steps longer than this many usual ones, and than so many seconds, are a gap.
 GAP_STEPS, GAP_S = 5.0, 0.5
@@ -68,6 +70,8 @@ def _of_readings(recording: Recording) -> Summary:
         return Summary(recording.info, {"dataset": np.zeros(0, dtype=np.int64)})
     outputs: dict[str, NDArray[np.float64]] = {a: recording.gyro_dps(a)[valid] for a in recording.info.axes}
     starts = dataset_starts(np.asarray(rows["dataset"], dtype=np.int64))
+    if recording.info.motion == "turns":
+        rows["rate_as_turned_dps"] = rates_as_turned(recording)[valid]
     sets = [
         _one_set(recording.info, rows, outputs, slice(int(begin), int(end)))
         for begin, end in zip(starts, np.append(starts[1:], len(rows["dataset"])), strict=True)
@@ -91,6 +95,10 @@ def _one_set(
         **_times(t_s),
         "turning_dps": _turning(rows, here, t_s),
     }
+    if info.motion == "turns":
+        as_turned = np.asarray(rows["rate_as_turned_dps"], dtype=np.float64)[here]
+        found |= {**_turn(rows, here.start), "duration_s": float(t_s[-1] - t_s[0])}
+        found |= {"rate_low_dps": float(as_turned.min()), "rate_high_dps": float(as_turned.max())}
     for axis, values in outputs.items():
         figures = _output(values[here], None if warm is None else warm[here], at_rest=not rate.any())
         found |= {f"{name}_{axis}": value for name, value in figures.items()}
@@ -103,6 +111,13 @@ def _place(info: RecordingInfo, rows: Columns, row: int) -> dict[str, Any]:
         "position": str(rows["position"][row]) if "position" in rows else info.axes[0],
         "run": int(rows["run"][row]) if "run" in rows else 1,
     }
+
+
+def _turn(columns: Columns, row: int) -> dict[str, Any]:
+    """Return what is said of the turn of the data set that begins at a row."""
+    turn, known = float(columns["turn_deg"][row]), "turn_u_deg" in columns
+    u_deg = float(columns["turn_u_deg"][row]) if known else USUAL_U_DEG
+    return {"turn_deg": turn, "turn_u_deg": u_deg if turn else 0.0, "turn_u_known": known}
 
 
 def _temperatures(warm: NDArray[np.float64]) -> dict[str, float]:
@@ -162,6 +177,10 @@ def _of_means(recording: Recording) -> Summary:
         "t_begin_s": t_s, "t_end_s": t_s, "turning_dps": unknown,
         **dict.fromkeys(("step_s", "gap_s", "lost_s"), unknown),
     }  # fmt: skip
+    if info.motion == "turns":
+        turns = [_turn(rows, row) for row in range(m)]
+        found |= {name: np.array([turn[name] for turn in turns]) for name in turns[0]}
+        found["duration_s"] = np.asarray(rows["duration_s"], dtype=np.float64)
     for axis in info.axes:
         output = info.output.get(axis)
         scale = abs(output.scale) if output else 1.0

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from labctl.recording.quantisation import quantisation_std
 from labctl.recording.sanity.finding import Finding, numbers_in_words
 from labctl.recording.sanity.summary import Summary
+from labctl.recording.sanity.turned import is_turned
 
 #: A unit moves at rest when its output wanders by this much, deg/s, by this share of its fastest rate, and by so many
 #: times what the other data sets at rest do.
@@ -31,6 +32,7 @@ def check_at_rest(summary: Summary) -> Iterator[Finding]:
     if not still.any():
         return
     fast = float(np.abs(np.asarray(summary["table_rate_dps"], dtype=np.float64)).max())
+    resting = "the unit" if summary.info.motion == "turns" else "the table"
     for axis in summary.info.axes:
         wander = summary.of_axis("wander", axis)
         if np.isnan(wander).all():
@@ -42,17 +44,18 @@ def check_at_rest(summary: Summary) -> Iterator[Finding]:
             yield Finding(
                 "moves_at_rest", "certain" if most > max(MOVED_SHARE * fast, 1.0) else "likely",
                 f"axis {axis}, {numbers_in_words(summary['dataset'][moving])}",
-                f"the table rate is given as 0 and the output changes by {most:.3g} deg/s (root mean square)",
+                f"{resting} is at rest by its columns and the output changes by {most:.3g} deg/s (root mean square)",
                 most, "deg/s", f"at most {max(MOVES_DPS, MOVES_SHARE * fast):.2g} deg/s",
                 "correct the rate, or leave out the readings in which the unit was moved",
             )  # fmt: skip
 
 
 def with_two_rates(summary: Summary, axis: str) -> NDArray[np.bool_]:
-    """Return which data sets, (m,), have a sudden change of an output within them."""
+    """Return which data sets, (m,), have a sudden change of an output within them; a turn may have any."""
     rate, change = np.asarray(summary["table_rate_dps"], dtype=np.float64), summary.of_axis("change", axis)
     step = np.nan_to_num(summary.of_axis("code_step", axis))
-    return np.asarray(np.abs(change) > np.maximum(CHANGE_DPS + CHANGE_SHARE * np.abs(rate), 3.0 * step))
+    two_rates = np.abs(change) > np.maximum(CHANGE_DPS + CHANGE_SHARE * np.abs(rate), 3.0 * step)
+    return np.asarray(two_rates & ~is_turned(summary))
 
 
 def check_changes(summary: Summary) -> Iterator[Finding]:
@@ -79,7 +82,10 @@ def check_spread(summary: Summary) -> Iterator[Finding]:
     """Yield data-set means whose readings spread far more than those at a like rate: moved, or two rates in one."""
     if summary.info.kind != "points":
         return
+    summary = summary.take(~is_turned(summary))
     rate = np.abs(np.asarray(summary["table_rate_dps"], dtype=np.float64))
+    if not len(rate):
+        return
     fast = float(rate.max(initial=0.0))
     for axis in summary.info.axes:
         spread = summary.of_axis("std", axis)

@@ -30,14 +30,15 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
     columns = read_table(source)
     if target.suffix not in {".csv", ".parquet"} or target.resolve() == source.resolve():
         raise BadInput(f"{target}: name a result file other than the input, ending in .csv or .parquet")
-    for name in (*(f"gyro_{axis}" for axis in compensator.axes), "temperature_c", *compensator.needs):
+    thermometer = ("temperature_c",) if compensator.needs_temperature or "temperature_c" in columns else ()
+    for name in (*(f"gyro_{axis}" for axis in compensator.axes), *thermometer, *compensator.needs):
         if name not in columns:
             raise BadInput(
                 f"{source}: column {name!r} is missing; add it (the calibration has axes {compensator.axes})"
             )
     raw = np.column_stack([_floats(columns[f"gyro_{axis}"]) for axis in compensator.axes])
     corrected = compensator.compensate_output(
-        raw, _floats(columns["temperature_c"]), {name: _floats(columns[name]) for name in compensator.needs}
+        raw, _floats(columns["temperature_c"]) if thermometer else None, {name: _floats(columns[name]) for name in compensator.needs}
     )
     for index, axis in enumerate(compensator.axes):
         columns[f"rate_{axis}_dps"] = corrected.rate_dps[:, index]

@@ -14,6 +14,7 @@ from labctl.fitting.criticism import best_shapes, criticise
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formulas
 from labctl.fitting.estimation.fit import fit_preset
+from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.uncertainty import use_evidence
@@ -160,7 +161,7 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     base, _ = changed(model, (), tuple(request.remove)).build(context)
     add = tuple(_shaped(measured, base, term) for term in wanted)
     before = fit_preset(context, changed(model))
-    after = fit_preset(context, changed(model, add, tuple(request.remove)))
+    after = fit_preset(context, with_shapes(context, changed(model, add, tuple(request.remove)), all_of_them=bool(add)))
     return _Change(row, measured.row, measured.points, before, after, measured.inspection.warnings)
 
 

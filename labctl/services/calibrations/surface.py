@@ -7,6 +7,7 @@ import numpy as np
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
+from labctl.fitting.data.temperature_channel import STAND_IN_C
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
@@ -51,6 +52,8 @@ def _rate_span(store: Store, row: CalibrationRecord, calibration: Calibration) -
 
 def _grid(span: tuple[float, float], points: int) -> Array:
     low, high = span
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return np.array([STAND_IN_C])  # no thermometer, and so no law of temperature: one is like any other
     return np.linspace(low, high, points) if high > low else np.array([low])
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 
 import numpy as np
 
 from labctl.calibration import Calibration, read_calibration
+from labctl.fitting.data.temperature_channel import STAND_IN_C
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.uncertainty import COVERAGE, AxisEvidence, RateUncertainty, rate_uncertainty
 from labctl.services.schemas.uncertainty import AxisUncertainty, UncertaintyGrid, UncertaintyResponse
@@ -57,7 +59,12 @@ def grid_rates(low_dps: float, high_dps: float) -> list[float]:
 
 
 def grid_temperatures(low_c: float, high_c: float) -> list[float]:
-    """Return the lowest, the middle and the highest temperature, deg C, or the middle of a calibration at one."""
+    """Return the lowest, the middle and the highest temperature, deg C, or the middle of a calibration at one.
+
+    Without limits, of a calibration made without a thermometer, any one stands for all.
+    """
+    if not math.isfinite(high_c - low_c):
+        return [STAND_IN_C]
     middle = (low_c + high_c) / 2
     return [low_c, middle, high_c] if high_c - low_c >= LEAST_SPAN_K else [middle]
 

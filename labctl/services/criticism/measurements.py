@@ -52,7 +52,7 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) ->
             f"recording {row.id} is a table of coefficients: a model is compared with readings or means; name a "
             "recording of these"
         )
-    if row.kind != "samples":
+    if row.kind != "samples" or points.info.motion == "turns":
         return points
     info = points.info.model_copy(update={"kind": "samples"})
     parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]

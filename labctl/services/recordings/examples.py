@@ -8,7 +8,7 @@ from pathlib import Path
 
 from labctl.errors import BadInput
 from labctl.services.recordings.inspection import inspect_stored
-from labctl.services.recordings.transfer import suggested_model
+from labctl.services.recordings.transfer import model_for
 from labctl.services.schemas.recordings import SimulatedRecordingResponse, SimulatedRequest
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from labctl.store import Store
@@ -35,9 +35,10 @@ def add_simulated(store: Store, request: SimulatedRequest, at: datetime) -> Simu
     recipe, bench, hidden = made.plan.recipe.name, made.bench.name, dict(made.hidden)
     what = {"recipe": recipe, "bench": bench, "seed": request.seed, "hidden": hidden}
     number = store.recordings.add_import(made.recording, at, what)
+    row = store.recordings.get(number)
     return SimulatedRecordingResponse(
         serial=made.recording.info.serial, recording=number, datasets=made.plan.datasets,
-        readings=len(made.recording), suggested_model=suggested_model(made.recording.info), recipe=recipe,
+        readings=len(made.recording), suggested_model=model_for(store, row), recipe=recipe,
         bench=bench, seed=request.seed, hidden=hidden,
-        warnings=inspect_stored(store, store.recordings.get(number), made.recording).warnings,
+        warnings=inspect_stored(store, row, made.recording).warnings,
     )  # fmt: skip

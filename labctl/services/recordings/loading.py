@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData, NotFound
-from labctl.recording import Recording
+from labctl.recording import Recording, to_points
 from labctl.recording.output_steps import per_reading
 from labctl.recording.points import with_pieces
 from labctl.recording.quantisation import QUANTISATION
@@ -20,10 +20,15 @@ from labctl.store import RecordingRow, Store
 
 
 def points_of(store: Store, row: RecordingRow) -> Recording:
-    """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces."""
+    """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces.
+
+    Of turns they are integrals over the readings, which are few.
+    """
     points = store.recordings.points(row.id, head=row)
     if row.kind != "samples":
         return points
+    if points.info.motion == "turns":
+        return to_points(store.recordings.samples(row.id))
 
     def readings(dataset: int) -> Mapping[str, NDArray[np.generic]]:
         compute(UNNAMED)

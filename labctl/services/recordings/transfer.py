@@ -12,12 +12,14 @@ from typing import IO, BinaryIO, Literal
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 from labctl.errors import BadRecording
-from labctl.recording import RecordingInfo, read_recording, write_recording
+from labctl.fitting.estimation.suggestion import suggested_model
+from labctl.recording import read_recording, write_recording
 from labctl.recording.files import FILE_NAMES
 from labctl.services.recordings.inspection import inspect_stored
+from labctl.services.recordings.loading import points_of
 from labctl.services.recordings.staging import staging_folder
 from labctl.services.schemas.recordings import ImportResponse
-from labctl.store import Store
+from labctl.store import RecordingRow, Store
 
 CHUNK_BYTES = 1 << 20
 #: CSV shrinks to a fifth at the quickest; Parquet is packed already.
@@ -36,16 +38,16 @@ def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
         recording=number,
         datasets=datasets,
         readings=readings,
-        suggested_model=suggested_model(recording.info),
+        suggested_model=model_for(store, row),
         warnings=inspect_stored(store, row, recording).warnings,
     )
 
 
-def suggested_model(info: RecordingInfo) -> str:
-    """Return the published model that a recording of this kind is usually fitted with."""
-    if info.kind == "coefficients":
-        return "weiss1995"
-    return "yang2018" if len(info.axes) > 1 else "ojeda2000"
+def model_for(store: Store, row: RecordingRow) -> str:
+    """Return the fullest published model that a stored recording determines."""
+    if row.kind == "samples" and not row.datasets:
+        return "bias"
+    return suggested_model(points_of(store, row))
 
 
 def import_files(

@@ -62,6 +62,16 @@ class ModelResponse(ResponseModel):
     reference: ReferenceJson | None = Field(default=None, description="What the terms are centred on.")
 
 
+class LegError(ResponseModel):
+    """How well data sets of one direction of the temperature are predicted by a fit to the others."""
+
+    fitted: str = Field(description="heating, cooling, or all legs but one.")
+    tested: str = Field(description="cooling, heating, or each leg in turn.")
+    rms_dps: float | None = Field(description="Root mean square over the data sets tested; null: see `why`.")
+    datasets: int
+    why: str = Field(default="", description="Why there is no figure; empty where there is one.")
+
+
 class ErrorFigures(ResponseModel):
     """Input-referred errors in deg/s, one value per data set and axis, root mean square over all."""
 
@@ -70,12 +80,17 @@ class ErrorFigures(ResponseModel):
     heldout_rms_dps: float | None = Field(description="Each temperature predicted by a fit without its data.")
     noise_floor_dps: float | None = Field(description="Root of the mean variance of a data-set mean: white and drift.")
     noise_floor_source: str = Field(default="none", description="What the noise floor was found from.")
+    heldout_by_leg: list[LegError] = Field(
+        default_factory=list, description="Heating by a fit to cooling and so on; empty: the temperature goes one way."
+    )
 
 
 class Validity(ResponseModel):
     """Where the calibration was measured; outside it is extrapolation."""
 
-    temperature_c: tuple[float, float] = Field(description="Lowest and highest of the readings, deg C.")
+    temperature_c: tuple[float | None, float | None] = Field(
+        description="Lowest and highest of the readings, deg C; null: no thermometer, and no law of temperature."
+    )
     rate_dps: tuple[float | None, float | None] = Field(
         description="Lowest and highest true rate, deg/s; null: no limit, nothing of the model depends on the rate."
     )

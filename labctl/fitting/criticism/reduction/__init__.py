@@ -18,11 +18,11 @@ __all__ = ["LEAST_INDEPENDENT_SHARE", "OUTLIER", "STEP_LINES", "ReducedRecording
 
 
 def reduce_recording(recording: Recording, *, outliers: bool = True) -> ReducedRecording:
-    """Return a recording reduced; points have their means only. Without `outliers` every reading counts.
+    """Return a recording reduced; points and turns have their means only. Without `outliers` every reading counts.
 
     Raises NotEnoughData where the recording has no temperature.
     """
     recording = with_temperature(recording)
-    return (
-        reduce_samples(recording, outliers=outliers) if recording.info.kind == "samples" else reduce_points(recording)
-    )
+    if recording.info.kind == "points" or recording.info.motion == "turns":
+        return reduce_points(recording)
+    return reduce_samples(recording, outliers=outliers)

@@ -11,6 +11,7 @@ from labctl.fitting.criticism.reduction.decimation import FASTEST_HZ
 from labctl.fitting.criticism.reduction.rectangular import Padded
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.data.earth import up_rate_dps
+from labctl.fitting.data.temperature_channel import with_stand_in
 from labctl.fitting.data.temperature_history import history_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
@@ -35,7 +36,7 @@ def nodes_of(
 
     weights = np.add.reduceat(basis, edges, axis=2)
     bins = len(edges)
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, NDArray[np.generic]] = {}
     for name, values in numbers.items():
         if not name.startswith("gyro_"):
             columns[name] = averaged(padded.of(values)).ravel()
@@ -53,6 +54,7 @@ def nodes_of(
     columns["duration_s"] = length.ravel()
     position = texts["position"][begin] if "position" in texts else np.full(m, recording.info.axes[0])
     text: dict[str, NDArray[np.str_]] = {"position": np.repeat(np.asarray(position, dtype=np.str_), bins)}
-    true = columns["table_rate_dps"] + up_rate_dps(recording.info)
+    true = np.repeat(rate, bins) + up_rate_dps(recording.info)
+    columns = with_stand_in(columns, m * bins)
     channels = Channels({**columns, **text}, body_rates(true, text["position"]), history_of(recording))
     return channels, weights

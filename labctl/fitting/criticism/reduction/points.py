@@ -11,6 +11,9 @@ from labctl.fitting.data.mean_noise import quantisation_var_of, white_var_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording, to_points
 
+#: No mean is taken to be known better than to this share of the usual variance.
+LEAST_SHARE = 1e-6
+
 
 def reduce_points(recording: Recording) -> ReducedRecording:
     """Return the means of a recording as its only coordinates, R = 1."""
@@ -28,13 +31,16 @@ def reduce_points(recording: Recording) -> ReducedRecording:
 def _white_of_points(points: Recording) -> dict[str, Array] | None:
     """Return axis -> (m,) variance of a mean from white noise, (deg/s)^2; None without spread or number of readings.
 
-    One level of white noise for all data sets, and what coarse steps leave in each mean.
+    One level of white noise for all data sets, and what coarse steps leave in each mean; for turns each has its own.
     """
     found: dict[str, Array] = {}
     for axis in points.info.axes:
         variance = white_var_of(points, axis)
-        if variance is None:
+        if variance is None or not np.any(variance > 0):
             return None
+        if points.info.motion == "turns":  # a rest is known far better than a turn
+            found[axis] = np.maximum(variance, LEAST_SHARE * float(np.median(variance)))
+            continue
         n = np.maximum(np.asarray(points.columns["n"], dtype=np.float64), 1.0)
         left = quantisation_var_of(points, axis)
         found[axis] = float(np.median((variance - left) * n)) / n + left

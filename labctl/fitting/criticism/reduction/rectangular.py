@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording.info import Motion
 from labctl.recording.points import dataset_starts, pieces
 
 #: A data set longer than this many median ones is taken in pieces.
@@ -36,13 +37,13 @@ def pad(dataset: NDArray[np.int64]) -> Padded:
     return Padded(there.astype(np.float64), np.where(there, starts[:, None] + offset, 0))
 
 
-def piece_labels(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.int64]:
+def piece_labels(columns: Mapping[str, NDArray[np.generic]], motion: Motion = "rates") -> NDArray[np.int64]:
     """Return labels (n,) that change with the row of the fit, and within one that is far longer than the median.
 
     A static record at one temperature is one row of the fit. In a rectangular array it would need memory, and its
     single mean would hide the drift within it.
     """
-    rows = pieces(columns)
+    rows = pieces(columns, motion)
     starts = dataset_starts(rows)
     counts = np.diff(np.append(starts, len(rows)))
     parts = -(-counts // max(int(LONGEST * np.median(counts)), 1))

@@ -21,7 +21,7 @@ from labctl.recording.quantisation import QUANTISATION
 def reduce_samples(recording: Recording, *, outliers: bool) -> ReducedRecording:
     """Return the coordinates of every data set; without `outliers` every valid reading counts."""
     numbers, dataset, texts = decimated_columns(with_quantisation(recording))
-    padded = pad(piece_labels({"dataset": dataset, **numbers}))
+    padded = pad(piece_labels({"dataset": dataset, **numbers}, recording.info.motion))
     m = len(padded.there)
     begin = padded.index[:, 0]
     t_s = numbers.get("t_s", np.arange(len(dataset), dtype=np.float64) / FASTEST_HZ)

@@ -45,7 +45,8 @@ def held_out_rises(comparison: Comparison, terms: tuple[Term, ...], catalogue: M
 
 def _by_temperature(comparison: Comparison) -> list[NDArray[np.bool_]]:
     data = comparison.data
-    masks = folds(data.at_sets(data.nodes.temperature_c(data.info.axes[0])))
+    warm = data.at_sets(data.nodes.temperature_c(data.info.axes[0]))
+    masks = folds(warm, thermometer=data.nodes.history.thermometer)
     inner = masks[1:-1] if isinstance(comparison.model.temperature, LagrangeTable) else masks
     return [mask for mask in inner if not mask.all()]
 

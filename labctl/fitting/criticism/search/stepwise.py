@@ -95,7 +95,10 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
         findings, final = _one_by_one(first, initial, step, catalogue)
         form = _form(findings) if len(findings) > 1 else step.form
     if not findings and form in {"missing", "ambiguous"}:  # what would be named predicts worse than nothing
-        form = "unexplained"
+        findings = _pair(first, initial, catalogue)  # alone it may: two effects of opposite signs hide each other
+        if findings and held_out_rises(first, tuple(finding.term for finding in findings), catalogue):
+            findings = []
+        form = _form(findings) if findings else "unexplained"
     depends = depends or step.depends_on or _driver_of(initial, step)
     found = tuple(finding.term for finding in findings)
     if findings:

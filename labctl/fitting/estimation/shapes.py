@@ -1,0 +1,112 @@
+"""Shapes of the effects that remember: time constants and widths, found together by variable projection.
+
+A lag's time constant and a hysteresis' width enter a model nonlinearly. For given shapes the coefficients are a
+weighted least-squares fit; the shapes are those that leave the least, at the noise that the recording shows beside its
+rich surface. Where a model has several, each is found beside the others: alone, a hysteresis takes part of a lag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.effects import Effect, Parameter, Span, Term, kind_of
+from labctl.fitting.estimation.axis_design import axis_design
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.presets import Preset
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.drift_noise import whitened
+
+#: Shapes are found to this share, in at most so many evaluations for each.
+TOLERANCE, EVALUATIONS = 0.005, 60
+
+
+def quantities(kind: Effect) -> list[Parameter]:
+    """Return the parameters of an effect of the bias that are found from the data; none for other effects."""
+    return [each for each in kind.parameters if each.logarithmic] if kind.shows_at_rest else []
+
+
+def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> Preset:
+    """Return a preset whose effects that remember have the shapes that fit the data best.
+
+    Of those that a term states already only with `all_of_them`, and then where there are several. Raises NotEnoughData
+    where the preset cannot be built.
+    """
+    model, _ = preset.build(data)
+    remembering = [term for term in model.terms if quantities(kind_of(term))]
+    open_ = [term for term in remembering if not set(term.parameters) & {p.name for p in quantities(kind_of(term))}]
+    if not (open_ or (all_of_them and len(remembering) > 1)):
+        return preset
+    if any(data.channels.missing(kind_of(term).channels) for term in remembering):
+        return preset  # the fit says what is missing
+    shapes = {t.effect: t for t in _found(data, model, [t.effect for t in (remembering if all_of_them else open_)])}
+    if not shapes:
+        return preset
+
+    def build(some: FitData) -> tuple[ErrorModel, Array]:
+        made, rows = preset.build(some)
+        terms = (
+            replace(t, parameters=shapes[t.effect].parameters) if t.effect in shapes else t for t in made.terms
+        )
+        return made.with_terms(tuple(terms)), rows
+
+    return Preset(preset.name, build, preset.inner_only)
+
+
+@single_threaded
+def _found(data: FitData, model: ErrorModel, effects: Sequence[str]) -> list[Term]:
+    """Return the terms of these effects in their best shapes."""
+    search = _Search(data, model)
+    terms = {term.effect: term for term in model.terms}
+    for name in effects:
+        if not terms[name].parameters:
+            options = kind_of(terms[name]).options(Span(1.0, 0.1, (0.0,), frozenset(data.channels.columns)))
+            shaped = [replace(terms[name], parameters=option.parameters) for option in options]
+            terms[name] = min(shaped, key=lambda term: search.left({**terms, name: term}))
+    free = [(name, p) for name in effects for p in quantities(kind_of(terms[name])) if p.name in terms[name].parameters]
+    if not free:
+        return [terms[name] for name in effects]
+
+    def at(logarithms: Array) -> dict[str, Term]:
+        made = dict(terms)
+        for (name, parameter), value in zip(free, logarithms.tolist(), strict=True):
+            made[name] = replace(made[name], parameters={**made[name].parameters, parameter.name: float(np.exp(value))})
+        return made
+
+    begin = np.log([terms[name].parameters[p.name] for name, p in free])
+    bounds = [(float(np.log(p.low)), float(np.log(p.high))) for _, p in free]
+    best = minimize(
+        lambda x: search.left(at(x)), np.clip(begin, *np.array(bounds).T), method="Nelder-Mead", bounds=bounds,
+        options={"xatol": TOLERANCE, "fatol": 0.01, "maxfev": EVALUATIONS * len(free)},
+    )  # fmt: skip
+    made = at(np.asarray(best.x)) if best.fun < search.left(terms) else terms
+    return [made[name] for name in effects]
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What shapes of a model leave of the data, at the drift of the recording's noise floor."""
+
+    data: FitData
+    model: ErrorModel
+
+    def left(self, terms: dict[str, Term]) -> float:
+        """Return the weighted sum of squares that a model with these terms leaves, over all axes."""
+        model = self.model.with_terms(tuple(terms[term.effect] for term in self.model.terms))
+        total = 0.0
+        for axis in self.data.outputs:
+            design = axis_design(self.data, model, axis)
+            scatter = self.data.scatter(axis)
+            white = scatter.white_var if scatter.white_var is not None else np.ones(len(self.data))
+            y = self.data.outputs[axis] - self.data.true_rate_dps(axis) - design.offset_dps
+            drift = self.data.noise_floor.axes[axis].drift
+            rows = whitened(scatter, [drift], white, np.column_stack([design.columns, y]))[0][0]
+            size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
+            taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
+            total += float(np.sum((rows[:, -1] - rows[:, :-1] / size @ taken) ** 2))
+        return total

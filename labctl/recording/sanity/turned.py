@@ -1,0 +1,129 @@
+"""Turns by a known angle: whether what came out of the gyro is the angle that is said, and how well it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.summary import Summary
+from labctl.recording.turns import USUAL_U_DEG
+
+#: Share of a turn that may be off beside two more turns of its axis, beside turns of other axes, and alone.
+OFF_SAME, OFF_OTHERS, OFF_ALONE = 0.05, 0.1, 0.15
+#: And as many standard uncertainties of its angle.
+UNCERTAINTIES = 5.0
+#: From this share on a turn is certainly not what is said, where others say what a turn gives.
+CERTAIN_SHARE = 0.1
+#: Turns of one axis that say what a turn of it gives, and turns of any axes that do.
+ENOUGH, PAIR = 3, 2
+#: A lone turn outside of this share has another unit rather than another angle; the gain says which.
+UNIT_SHARE = (0.5, 2.0)
+
+
+@dataclass(frozen=True)
+class OffTurn:
+    """A turn that came out otherwise than is said."""
+
+    row: int  #: of the summary
+    said_deg: float
+    came_deg: float
+    tolerance_deg: float
+    certain: bool
+
+
+def is_turned(summary: Summary) -> NDArray[np.bool_]:
+    """Return which data sets, (m,), are turns by a known angle; none in a recording of another motion."""
+    if summary.info.motion != "turns" or len(summary) == 0:
+        return np.zeros(len(summary), dtype=bool)
+    return np.asarray(summary["turn_deg"]) != 0
+
+
+def off_turns(summary: Summary) -> list[OffTurn]:
+    """Return the turns whose integral is far from their angle, by the other turns' ratio of the two."""
+    turned = is_turned(summary)
+    if not turned.any():
+        return []
+    turn, u_deg = (np.asarray(summary[name], dtype=np.float64) for name in ("turn_deg", "turn_u_deg"))
+    ratio = _ratios(summary, turned)
+    axis = np.char.lstrip(np.asarray(summary["position"]).astype(np.str_), "-")
+    found = []
+    for row in np.flatnonzero(np.isfinite(ratio)):
+        expected, allowed = _expected(ratio, axis, int(row))
+        if expected is None:
+            continue
+        share = ratio[row] / expected
+        tolerance = max(allowed, UNCERTAINTIES * u_deg[row] / abs(turn[row]))
+        if abs(share - 1) > tolerance:
+            certain = allowed < OFF_ALONE and abs(share - 1) > CERTAIN_SHARE
+            said = float(turn[row])
+            found.append(OffTurn(int(row), said, float(share) * said, tolerance * abs(said), certain))
+    return found
+
+
+def _ratios(summary: Summary, turned: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return what came out of each turn over what is said, (m,); NaN at rest and where its axis has no output."""
+    position = np.asarray(summary["position"]).astype(np.str_)
+    turn, duration_s = (np.asarray(summary[name], dtype=np.float64) for name in ("turn_deg", "duration_s"))
+    found = np.full(len(summary), np.nan)
+    for axis in summary.info.axes:
+        mean = summary.of_axis("mean", axis)
+        for there, sign in ((axis, 1.0), (f"-{axis}", -1.0)):
+            rows = turned & (position == there)
+            rests = ~turned & (position == there) if np.any(~turned & (position == there)) else ~turned
+            bias = float(np.median(mean[rests])) if rests.any() else 0.0
+            found[rows] = (mean[rows] - bias) * duration_s[rows] / (sign * turn[rows])
+    return found
+
+
+def _expected(ratio: NDArray[np.float64], axis: NDArray[np.str_], row: int) -> tuple[float, float] | tuple[None, float]:
+    """Return the ratio that a turn should have, and by which share it may be off."""
+    known = np.isfinite(ratio)
+    same = ratio[known & (axis == axis[row])]
+    if len(same) >= ENOUGH:
+        return _consensus(same), OFF_SAME
+    if known.sum() >= PAIR:
+        return _consensus(ratio[known]), OFF_OTHERS
+    return (1.0, OFF_ALONE) if UNIT_SHARE[0] <= abs(ratio[row]) <= UNIT_SHARE[1] else (None, OFF_ALONE)
+
+
+def _consensus(ratios: NDArray[np.float64]) -> float:
+    """Return the median of the largest group of ratios (n,) that agree; that of a gyro in its unit, 1, has a vote."""
+    votes = np.append(1.0, ratios)
+    near = np.abs(votes[None, :] - votes[:, None]) <= OFF_OTHERS * np.abs(votes[:, None])
+    group = near[int(np.argmax(near.sum(axis=1)))][1:]
+    return float(np.median(ratios[group])) if group.any() else 1.0
+
+
+def check_turned(summary: Summary, off: list[OffTurn]) -> Iterator[Finding]:
+    """Yield the turns that came out otherwise than is said, and uncertainties that are not said."""
+    for each in off:
+        number, position = summary["dataset"][each.row], summary["position"][each.row]
+        yield Finding(
+            "turn", "certain" if each.certain else "likely", f"data set {number}, axis {str(position).lstrip('-')}",
+            turn_in_words(each), each.came_deg, "deg", f"{each.said_deg:g} +- {each.tolerance_deg:.2g} deg",
+            what_to_do(each),
+        )  # fmt: skip
+    if is_turned(summary).any() and not bool(np.all(summary["turn_u_known"])):
+        yield Finding(
+            "turn_uncertainty", "likely", "column turn_u_deg",
+            f"it is missing, and {USUAL_U_DEG:g} deg is taken for every turn", USUAL_U_DEG, "deg",
+            "the standard uncertainty of each turn", "give the column; the scale factor is as certain as it says",
+        )  # fmt: skip
+
+
+def turn_in_words(off: OffTurn) -> str:
+    """Return what came out of a turn, in words."""
+    came = round(off.came_deg)
+    only = "only " if 0 <= off.came_deg / off.said_deg < 1 else ""
+    return f"{only}{came:d} deg came out of {off.said_deg:g}"
+
+
+def what_to_do(off: OffTurn) -> str:
+    """Return what to do about a turn that came out otherwise."""
+    if off.came_deg * off.said_deg < 0:
+        return "correct the sign of turn_deg or of the position, or turn again"
+    return "turn again, or correct turn_deg"
