@@ -149,7 +149,12 @@ def print_improvement(answer: ImproveResponse) -> None:
                 style="yellow",
             )
     for left in answer.left_out:
-        console.print(f"  {left['effect']} stays on the bench ({left['origin']}); a calibration file leaves it out")
+        size = left.get("rms_dps")
+        cost = "" if size is None else f", which leaves {size:.2g} deg/s RMS on these data"
+        console.print(
+            f"  {left['effect']} stays on the bench ({left['origin']}); a calibration file leaves it out{cost}",
+            soft_wrap=True,
+        )
     console.print(f"next: labctl criticise {answer.serial}", style="dim")
 
 
