@@ -196,9 +196,7 @@ class Compensator:
             )
         return np.asarray(cold | fast)
 
-    def step(
-        self, raw_dps: ArrayLike, temperature_c: float | None, t_s: float | None = None
-    ) -> tuple[Array, bool]:
+    def step(self, raw_dps: ArrayLike, temperature_c: float | None, t_s: float | None = None) -> tuple[Array, bool]:
         """Correct one sample, (axes,) deg/s; returns the corrected rates and whether it lay outside.
 
         Where the unit `remembers` samples come in order of time, with their times `t_s` in s; raises BadInput for one

@@ -1,4 +1,4 @@
-"""Recordings at rest: one data set through temperature loops, without a table, a position or, if asked, a thermometer."""
+"""Recordings at rest: one data set through temperature loops, with or without a thermometer."""
 
 from __future__ import annotations
 
@@ -48,7 +48,9 @@ def at_rest(
     if thermometer:
         columns["temperature_c"] = warm
     for k, axis in enumerate(axes):
-        law = 0.1 * (k + 1) + 2e-3 * warm - 1e-5 * (k + 1) * warm**2 if thermometer else np.full(len(t_s), 0.1 * (k + 1))
+        law = (
+            0.1 * (k + 1) + 2e-3 * warm - 1e-5 * (k + 1) * warm**2 if thermometer else np.full(len(t_s), 0.1 * (k + 1))
+        )
         if lag_s:
             law = law + 2e-3 * (follow(warm, lag_s) - warm)
         columns[f"gyro_{axis}"] = law + rng.normal(0, NOISE_DPS, len(t_s))

@@ -17,7 +17,7 @@ from labctl.exports.c_header import c_name
 from labctl.fitting import fit, fit_data_of
 from labctl.recording import to_points
 from tests.helpers.calibrations import calibrated
-from tests.helpers.rest import NOISE_DPS, at_rest, follow, loop_course
+from tests.helpers.rest import NOISE_DPS, at_rest, loop_course
 
 EFFECTS = ["bias", "bias_temperature", "thermal_lag"]
 BOTH = [*EFFECTS, "thermal_hysteresis"]

@@ -27,7 +27,10 @@ class Covered:
 
 
 def covered_by(
-    table_rates_dps: tuple[Array, Array], position: NDArray[np.generic], temperature_c: MaybeRange, up_rate_dps: float = 0.0
+    table_rates_dps: tuple[Array, Array],
+    position: NDArray[np.generic],
+    temperature_c: MaybeRange,
+    up_rate_dps: float = 0.0,
 ) -> Covered:
     """Return what data sets with lowest and highest table rates, (m,) each, in positions (m,) cover.
 

@@ -193,7 +193,9 @@ def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int,
         order = np.argsort(t_s[here], kind="stable")
         times, values = t_s[here][order], warm[here][order]
         if source is columns and "duration_s" in columns:
-            times, values = _to_the_ends(times, values, np.asarray(columns["duration_s"], dtype=np.float64)[here][order])
+            times, values = _to_the_ends(
+                times, values, np.asarray(columns["duration_s"], dtype=np.float64)[here][order]
+            )
         grid = np.arange(times[0], times[-1] + SPACING_S, SPACING_S)
         found[int(run)] = TemperatureCourse(float(grid[0]), np.interp(grid, times, values))
     return found

@@ -25,9 +25,8 @@ def suggested_model(points: Recording) -> str:
     if points.info.kind == "coefficients":
         return "weiss1995"
     data = fit_data_of(points)
-    if not data.channels.table_rate_dps().any():
-        names = AT_REST
-    else:
+    names: tuple[str, ...] = AT_REST
+    if data.channels.table_rate_dps().any():
         names = SEVERAL_AXES if len(data.info.axes) > 1 else ONE_AXIS
     return next((name for name in names[:-1] if _is_determined(data, name)), names[-1])
 
