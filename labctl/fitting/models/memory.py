@@ -102,7 +102,7 @@ class RunningMemory:
         return self._t_s if self._at else None
 
     def error_dps(self, t_s: float, temperature_c: float) -> Array:
-        """Return the error at a sample, (axes,) deg/s; samples come in order of time. One without a number moves none."""
+        """Return the error at a sample, (axes,) deg/s, in order of time; one that is no number moves nothing."""
         if not (np.isfinite(t_s) and np.isfinite(temperature_c)):
             return np.full_like(self._none, np.nan)
         if self._at:
