@@ -1,4 +1,4 @@
-"""The Allan deviation of a unit's newest record at rest, or of a file: a recording, or a table with a column of times."""
+"""Allan deviation of a unit's newest record at rest, or of a file: a recording, or a table with a column of times."""
 
 from __future__ import annotations
 
