@@ -9,6 +9,8 @@ STUDIES = (
     "coverage",
     "use_coverage",
     "criticism",
+    "rest_loops",
+    "rest_peers",
     "crash_recovery",
     "process_kill",
     "process_pairs",
