@@ -116,7 +116,7 @@ def build_calibration(
 
     `evidence`, by axis, is what the uncertainty in use is computed from; without it that is unknown.
     """
-    exported, left_out = result.fitted.exported()
+    exported, left_out = result.exported()
     document: CalibrationJson = {
         "schema": SCHEMA,
         "serial": info.serial,

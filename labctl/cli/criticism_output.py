@@ -157,8 +157,11 @@ def print_improvement(answer: ImproveResponse) -> None:
                 style="yellow",
             )
     for left in answer.left_out:
+        size = left.get("rms_dps")
+        cost = "" if size is None else f", which leaves {size:.2g} deg/s RMS on these data"
         console.print(
-            f"  {left['effect']} not part of a calibration ({left['origin']}); a calibration file leaves it out"
+            f"  {left['effect']} not part of a calibration ({left['origin']}); a calibration file leaves it out{cost}",
+            soft_wrap=True,
         )
     console.print(f"next: labctl criticise {answer.serial}", style="dim")
 

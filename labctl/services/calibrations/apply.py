@@ -38,7 +38,9 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
             )
     raw = np.column_stack([_floats(columns[f"gyro_{axis}"]) for axis in compensator.axes])
     corrected = compensator.compensate_output(
-        raw, _floats(columns["temperature_c"]) if thermometer else None, {name: _floats(columns[name]) for name in compensator.needs}
+        raw,
+        _floats(columns["temperature_c"]) if thermometer else None,
+        {name: _floats(columns[name]) for name in compensator.needs},
     )
     for index, axis in enumerate(compensator.axes):
         columns[f"rate_{axis}_dps"] = corrected.rate_dps[:, index]

@@ -93,7 +93,7 @@ def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewR
 
     def work() -> PreviewResponse:
         change = _change(store, serial, request)
-        _, left_out = change.after.fitted.exported()
+        _, left_out = change.after.exported()
         said = {"serial": serial, **change.figures, "left_out": left_out, "residuals": _residuals(store, change)}
         return PreviewResponse.model_validate(said, extra="forbid")
 

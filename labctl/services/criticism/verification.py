@@ -79,7 +79,7 @@ def applied_errors(
     compensator = Compensator(calibration)
     raw = np.column_stack([data.outputs[axis] for axis in calibration.axes])
     warm = np.column_stack([data.channels.temperature_c(axis) for axis in calibration.axes])
-    found = compensator.compensate(raw, warm, _channels(compensator, data))
+    found = compensator.compensate(raw, warm, _channels(compensator, data), history=data.channels.history)
     errors = {axis: found.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
     return errors, found.outside
 
@@ -90,7 +90,11 @@ def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[n
         raise BadInput(
             f"the model needs channel {absent[0]!r}, which the recording does not have; name another recording"
         )
-    return {name: np.asarray(data.channels[name], dtype=np.float64) for name in compensator.needs}
+    needed = {name: np.asarray(data.channels[name], dtype=np.float64) for name in compensator.needs}
+    if not compensator.remembers:
+        return needed
+    kept = {name: data.channels[name] for name in ("run", "temperature_c") if name in data.channels}
+    return {**needed, **{name: np.asarray(values, dtype=np.float64) for name, values in kept.items()}}
 
 
 def _expected_dps(row: CalibrationRecord) -> float | None:

@@ -33,16 +33,17 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanRespon
 
     def work() -> AllanResponse:
         if dataset is None:
-            return _response(recording, _at_rest(store, recording, info))
+            return _response(recording, _at_rest(store, recording, info), info)
         columns = store.recordings.dataset(recording, dataset)
-        return _response(recording, _of_set(Recording(info, columns), dataset))
+        return _response(recording, _of_set(Recording(info, columns), dataset), info)
 
     question = {"recording": recording, "readings": store.recordings.fingerprint(recording), "dataset": dataset}
     return cached(AllanResponse, question, work)
 
 
-def _response(recording: int, found: StaticRecord) -> AllanResponse:
-    return AllanResponse.model_validate({"recording": recording, **found.to_json()}, extra="forbid")
+def _response(recording: int, found: StaticRecord, info: RecordingInfo) -> AllanResponse:
+    said = {"recording": recording, "datasheet": dict(info.datasheet), **found.to_json()}
+    return AllanResponse.model_validate(said, extra="forbid")
 
 
 def _of_set(recording: Recording, dataset: int) -> StaticRecord:

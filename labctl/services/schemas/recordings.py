@@ -160,10 +160,11 @@ class TraceResponse(ResponseModel):
 class AllanResponse(ResponseModel):
     """An overlapping Allan deviation, axis by axis, and the figures of IEEE Std 952 that it shows."""
 
-    recording: int
+    recording: int | None = Field(description="null: of a file that is not in the database.")
     datasets: list[int] = Field(description="First and last data set of the stretch.")
     temperature_c: float | None
     duration_s: float | None
     axes: dict[str, AllanJson] = Field(
         description="tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K."
     )
+    datasheet: dict[str, float] = Field(default_factory=dict, description="What the maker promises, if it is known.")

@@ -1147,8 +1147,11 @@ export interface components {
          * @description An overlapping Allan deviation, axis by axis, and the figures of IEEE Std 952 that it shows.
          */
         AllanResponse: {
-            /** Recording */
-            recording: number;
+            /**
+             * Recording
+             * @description null: of a file that is not in the database.
+             */
+            recording: number | null;
             /**
              * Datasets
              * @description First and last data set of the stretch.
@@ -1164,6 +1167,13 @@ export interface components {
              */
             axes: {
                 [key: string]: components["schemas"]["AllanJson"];
+            };
+            /**
+             * Datasheet
+             * @description What the maker promises, if it is known.
+             */
+            datasheet: {
+                [key: string]: number;
             };
         };
         /**
@@ -2432,6 +2442,11 @@ export interface components {
              * @default none
              */
             noise_floor_source: string;
+            /**
+             * Heldout By Leg
+             * @description Heating by a fit to cooling and so on; empty: the temperature goes one way.
+             */
+            heldout_by_leg: components["schemas"]["LegError"][];
         };
         /**
          * EventResponse
@@ -3037,6 +3052,37 @@ export interface components {
             origin: "sensor" | "package" | "fixture" | "bench" | "environment";
             /** Term */
             term: string;
+            /** Rms Dps */
+            rms_dps?: number | null;
+        };
+        /**
+         * LegError
+         * @description How well data sets of one direction of the temperature are predicted by a fit to the others.
+         */
+        LegError: {
+            /**
+             * Fitted
+             * @description heating, cooling, or all legs but one.
+             */
+            fitted: string;
+            /**
+             * Tested
+             * @description cooling, heating, or each leg in turn.
+             */
+            tested: string;
+            /**
+             * Rms Dps
+             * @description Root mean square over the data sets tested; null: see `why`.
+             */
+            rms_dps: number | null;
+            /** Datasets */
+            datasets: number;
+            /**
+             * Why
+             * @description Why there is no figure; empty where there is one.
+             * @default
+             */
+            why: string;
         };
         /**
          * LegLine
@@ -4375,11 +4421,11 @@ export interface components {
         Validity: {
             /**
              * Temperature C
-             * @description Lowest and highest of the readings, deg C.
+             * @description Lowest and highest of the readings, deg C; null: no thermometer, and no law of temperature.
              */
             temperature_c: [
-                number,
-                number
+                number | null,
+                number | null
             ];
             /**
              * Rate Dps

@@ -40,7 +40,10 @@ def test_examples_come_with_the_package(client: TestClient) -> None:
     turned = client.post("/api/recordings/example", json={"name": "imucal-turns"}).json()
     assert turned.items() >= {"serial": "IMUCAL-FERRARIS", "suggested_model": "turns", "warnings": []}.items()
     refused = client.post("/api/recordings/example", json={"name": "../.."})
-    assert (refused.status_code, "there are imucal-turns, osu-fog, weiss-gyrostar" in refused.json()["detail"]) == (400, True)
+    assert (refused.status_code, "there are imucal-turns, osu-fog, weiss-gyrostar" in refused.json()["detail"]) == (
+        400,
+        True,
+    )
 
 
 def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClient) -> None:
