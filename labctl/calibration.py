@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -87,17 +87,15 @@ class Calibration:
 
     @property
     def temperature_c(self) -> tuple[float, float]:
-        """The calibrated temperatures."""
+        """The calibrated temperatures; infinite where the document has null: no thermometer was there."""
         with _reading("validity"):
-            low, high = self.document["validity"]["temperature_c"]
-            return float(low), float(high)
+            return _limits(self.document["validity"]["temperature_c"])
 
     @property
     def rate_dps(self) -> tuple[float, float]:
         """The calibrated rates; infinite where the document has null: nothing of the model depends on the rate."""
         with _reading("validity"):
-            low, high = self.document["validity"]["rate_dps"]
-            return -math.inf if low is None else float(low), math.inf if high is None else float(high)
+            return _limits(self.document["validity"]["rate_dps"])
 
     def to_bytes(self) -> bytes:
         """Return the bytes that are stored and served, always the same."""
@@ -145,8 +143,15 @@ def build_calibration(
         ),
         "hash": "",
     }
+    if result.poses is not None:
+        document["poses"] = result.poses
     document["hash"] = hash_of(document)
     return Calibration(document)
+
+
+def _limits(pair: Sequence[float | None]) -> tuple[float, float]:
+    low, high = pair
+    return -math.inf if low is None else float(low), math.inf if high is None else float(high)
 
 
 def _unit_json(unit: OutputUnit) -> OutputUnitJson:

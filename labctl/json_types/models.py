@@ -7,6 +7,7 @@ from typing import Literal, NotRequired
 from typing_extensions import TypedDict
 
 from labctl.json_types.findings import FindingJson
+from labctl.json_types.poses import PosesJson
 
 Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
 
@@ -114,7 +115,7 @@ class ErrorFiguresJson(TypedDict):
 class ValidityJson(TypedDict):
     """Lowest and highest temperature, deg C, and true rate, deg/s; null: no limit."""
 
-    temperature_c: list[float]
+    temperature_c: list[float | None]
     rate_dps: list[float | None]
 
 
@@ -149,6 +150,7 @@ class FitResultJson(TypedDict):
     noise: dict[str, AxisNoiseJson]
     environment: FitEnvironment
     reference_temperature_c: float
+    poses: NotRequired[PosesJson]
 
 
 class LeftOut(TypedDict):

@@ -19,6 +19,12 @@ from labctl.recording.recording import Column
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
 #: A spread is a root of squares: beyond this a square is no number, and so is what is made of it.
 LARGEST = 1e100
+#: What a recording of free motion is told.
+NO_REFERENCE = (
+    "column 'table_rate_dps' is missing, so nothing says how the unit turned: free motion alone calibrates no gyro; "
+    "say motion = 'rest' for a unit at rest, 'turns' with column turn_deg for turns by known angles, or 'poses' with "
+    "columns accel_x_g, accel_y_g and accel_z_g for turns by hand between rests"
+)
 POSITIONS = frozenset(sign + axis for sign in ("", "-") for axis in "xyz")
 
 
@@ -26,6 +32,8 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     """Return the columns with the format's defaults filled in; raises BadRecording on the first thing that is wrong."""
     for name in needed(info):
         if name not in columns:
+            if name == "table_rate_dps" and info.motion == "rates":
+                raise BadRecording(f"{path}: {NO_REFERENCE}")
             raise BadRecording(
                 f"{path}: column {name!r} is missing (needed for kind = {info.kind!r}, motion = {info.motion!r}: "
                 f"{BY_NAME[name].meaning})"

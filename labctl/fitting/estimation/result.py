@@ -20,6 +20,7 @@ from labctl.json_types.models import (
     FitEnvironment,
     FitResultJson,
 )
+from labctl.json_types.poses import PosesJson
 
 
 @dataclass(frozen=True)
@@ -28,17 +29,18 @@ class FitResult:
 
     fitted: FittedModel
     error: ErrorFigures
-    temperature_c: tuple[float, float]  #: range of the readings, deg C
+    temperature_c: tuple[float | None, float | None]  #: range of the readings, deg C; None: no thermometer
     rate_dps: tuple[float | None, float | None]  #: range of the true rates over all axes, deg/s; None: no limit
     noise: Mapping[str, AxisNoiseJson] = field(default_factory=dict)  #: axis -> white noise and drift, as JSON
     environment: FitEnvironment = field(default_factory=FitEnvironment)
     residual_dps: Mapping[str, Array] = field(default_factory=dict)  #: axis -> (m,) corrected minus true rate, deg/s
+    poses: PosesJson | None = None  #: what a calibration by hand says beside its coefficients
 
     def to_json(self) -> FitResultJson:
         """Return what `labctl fit --json` gives of the model, besides serial and version."""
         model = self.fitted.model
         whole = model.to_dict()
-        return {
+        found: FitResultJson = {
             "model": {
                 "name": model.name,
                 "effects": model.effect_ids,
@@ -54,6 +56,9 @@ class FitResult:
             "environment": self.environment,
             "reference_temperature_c": model.reference.temperature_c,
         }
+        if self.poses is not None:
+            found["poses"] = self.poses
+        return found
 
 
 def coefficients_json(model: ErrorModel, fit: AxisFit) -> Coefficients:

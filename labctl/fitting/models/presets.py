@@ -86,6 +86,17 @@ def _bias_scale(data: FitData) -> tuple[ErrorModel, Rows]:
     return ErrorModel("bias_scale", terms, "rate", reference=_centre(data)), _all(data)
 
 
+#: The model of a recording in poses; `labctl.fitting.poses` fits it, since no data set of it has a known rate.
+POSES = "poses"
+
+
+def _poses(data: FitData) -> tuple[ErrorModel, Rows]:
+    raise BadInput(
+        f"{data.info.serial}: model {POSES} takes a recording with motion = 'poses'; this one says motion = "
+        f"{data.info.motion!r}"
+    )
+
+
 #: name -> (preset, one sentence for a person)
 PRESETS: dict[str, tuple[Preset, str]] = {
     "ojeda2000": (
@@ -107,6 +118,10 @@ PRESETS: dict[str, tuple[Preset, str]] = {
     "bias_scale": (
         Preset("bias_scale", _bias_scale),
         "A plain start: bias and scale factor, each a parabola in temperature.",
+    ),
+    POSES: (
+        Preset(POSES, _poses),
+        "By hand, without a table (Tedaldi et al. 2014): rests in many poses; gravity tells where each turn ended.",
     ),
 }
 

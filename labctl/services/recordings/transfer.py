@@ -45,6 +45,8 @@ def suggested_model(info: RecordingInfo) -> str:
     """Return the published model that a recording of this kind is usually fitted with."""
     if info.kind == "coefficients":
         return "weiss1995"
+    if info.motion == "poses":
+        return "poses"
     return "yang2018" if len(info.axes) > 1 else "ojeda2000"
 
 

@@ -18,6 +18,7 @@ from labctl.json_types.models import (
     TermJson,
     UsualRange,
 )
+from labctl.json_types.poses import PosesJson
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.certification import CertificationResponse
 from labctl.services.schemas.criticism import ResidualColumns
@@ -75,7 +76,9 @@ class ErrorFigures(ResponseModel):
 class Validity(ResponseModel):
     """Where the calibration was measured; outside it is extrapolation."""
 
-    temperature_c: tuple[float, float] = Field(description="Lowest and highest of the readings, deg C.")
+    temperature_c: tuple[float | None, float | None] = Field(
+        description="Lowest and highest of the readings, deg C; null: no thermometer, and no law of temperature."
+    )
     rate_dps: tuple[float | None, float | None] = Field(
         description="Lowest and highest true rate, deg/s; null: no limit, nothing of the model depends on the rate."
     )
@@ -100,6 +103,9 @@ class FittedResponse(ResponseModel):
     )
     reference_temperature_c: float | None = Field(default=None, description="Temperature terms are centred on it.")
     recording: int | None = Field(default=None, description="The recording that it was fitted to.")
+    poses: PosesJson | None = Field(
+        default=None, description="Of a calibration by hand: rests, the accelerometer, moves, held-out moves."
+    )
 
 
 class FitResponse(FittedResponse):
