@@ -8,6 +8,7 @@ import sys
 STUDIES = (
     "coverage",
     "use_coverage",
+    "poses",
     "criticism",
     "crash_recovery",
     "process_kill",

@@ -53,6 +53,7 @@ class Truth:
     accel: Array  #: (3, 3) E, upper triangle
     accel_bias_g: Array  #: (3,)
     readings_bias_dps: Array = field(default_factory=lambda: np.zeros((0, 3)))  #: (n, 3) with all that wanders
+    warms_up: bool = False
 
 
 def simulate_session(seed: int, session: Session | None = None) -> tuple[Recording, Truth]:
@@ -79,7 +80,9 @@ def simulate_session(seed: int, session: Session | None = None) -> tuple[Recordi
     accel += np.where(pose[:, None] >= 0, per_pose[np.maximum(pose, 0)], 0.0)
     accel += rng.normal(0, session.accel_noise_g, accel.shape)
     stamps = t_s + rng.normal(0, session.jitter_s, len(t_s)) if session.jitter_s else t_s
-    truth = Truth(truth.gyro, truth.bias_dps, truth.per_g, truth.accel, truth.accel_bias_g, bias)
+    truth = Truth(
+        truth.gyro, truth.bias_dps, truth.per_g, truth.accel, truth.accel_bias_g, bias, session.warm_up_dps != 0
+    )
     return _recording(session, stamps, accel, gyro), truth
 
 

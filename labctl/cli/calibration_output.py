@@ -57,7 +57,8 @@ def print_poses(poses: PosesJson) -> None:
     console.print(
         f"{rests['count']} rests in {rests['poses']} poses; {moves['used']} of {moves['count']} turns used; gravity "
         f"after a turn off by {moves['residual_deg']:.2g} deg, held out by {held_out['rms_deg']:.2g} deg, "
-        f"{100 * held_out['within_2u']:.0f} % of it within U = 2 u",
+        f"{100 * held_out['within_2u']:.0f} % of it within U = 2 u; as exported, one bias and no g-sensitivity: "
+        f"{moves['applied_rms_dps']:.2g} deg/s RMS",
         soft_wrap=True,
     )
     for left in moves["left_out"]:

@@ -35,7 +35,7 @@ class RestsJson(TypedDict):
 
 
 class AccelerometerJson(TypedDict):
-    """The accelerometer as gravity shows it: reading = bias + force + scale_factor x own + misalignment x other force."""
+    """The accelerometer by gravity: reading = bias + force + scale_factor x own force + misalignment x another."""
 
     axes: dict[str, dict[str, AccelerometerCoefficient]]
     gravity_g: float
@@ -53,13 +53,17 @@ class MoveLeftOutJson(TypedDict):
 
 
 class MovesJson(TypedDict):
-    """The moves between rests, and what is left of them; a residual is one of two components square to gravity."""
+    """The moves between rests, and what is left of them; a residual is one of two components square to gravity.
+
+    `applied_rms_dps` is what the exported calibration leaves: one bias throughout, no sensitivity to specific force.
+    """
 
     count: int
     used: int
     left_out: list[MoveLeftOutJson]
     turned_deg: dict[str, float]
     residual_deg: float
+    applied_rms_dps: float
     known_deg: float
     extra_deg: float
     condition: float

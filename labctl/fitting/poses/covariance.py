@@ -79,10 +79,15 @@ def _of_each_move(moves: Moves, equations: Equations, readings_u: Array) -> NDAr
 
 
 def of_readings(moves: Moves, bias: Bias) -> Array:
-    """Return what the spacing of the readings and the jitter of their time stamps leave of each move, (m,) rad."""
+    """Return what spacing and jitter of the readings leave of a component of each move's angle, (m,) rad.
+
+    Both are sizes of a rotation about any direction; a component has a third of its square.
+    """
     rate = rate_without_bias(moves, bias)
     matrix = integrate(rate, moves.step_s, moves.share, np.zeros((3, 3))).matrix
-    return np.asarray(np.hypot(integration_u(rate, moves.step_s, np.zeros((3, 3)), matrix), _jitter_angle(moves)))
+    return np.asarray(
+        np.hypot(integration_u(rate, moves.step_s, np.zeros((3, 3)), matrix), _jitter_angle(moves)) / np.sqrt(3.0)
+    )
 
 
 def _jitter_angle(moves: Moves) -> Array:

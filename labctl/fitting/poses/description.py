@@ -35,13 +35,16 @@ WRONG = "does not agree with the other moves"
 
 def describe(
     readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, bias: Bias, every: Moves, moves: Moves,
-    gyro: Gyroscope,
+    gyro: Gyroscope, applied_rms_dps: float,
 ) -> PosesJson:  # fmt: skip
-    """Return all that is said of a calibration; `moves` are those of `every` that can be used."""
+    """Return all that is said of a calibration; `moves` are those of `every` that can be used.
+
+    `applied_rms_dps` is what the exported calibration leaves of the used ones.
+    """
     return {
         "rests": _rests(rests, accelerometer, bias),
         "accelerometer": accelerometer_json(accelerometer, known=readings.info.latitude_deg is not None),
-        "moves": _moves(every, moves, gyro),
+        "moves": _moves(every, moves, gyro, applied_rms_dps),
         "held_out": _held_out(gyro),
         "not_determined": NOT_DETERMINED,
     }
@@ -81,7 +84,7 @@ def accelerometer_json(accelerometer: Accelerometer, *, known: bool) -> Accelero
     }
 
 
-def _moves(every: Moves, moves: Moves, gyro: Gyroscope) -> MovesJson:
+def _moves(every: Moves, moves: Moves, gyro: Gyroscope, applied_rms_dps: float) -> MovesJson:
     used = gyro.used
     left = gyro.equations.residual.reshape(-1, 2)[used]
     known = np.diag(gyro.noise).reshape(-1, 2)[used]
@@ -92,6 +95,7 @@ def _moves(every: Moves, moves: Moves, gyro: Gyroscope) -> MovesJson:
         "left_out": _left_out(every, moves, gyro),
         "turned_deg": {str(a): float(v) for a, v in zip(AXES, turned_deg(moves.take(used)), strict=True)},
         "residual_deg": float(np.degrees(np.sqrt(np.mean(left**2)))),
+        "applied_rms_dps": applied_rms_dps,
         "known_deg": float(np.degrees(np.sqrt(np.mean(known)))),
         "extra_deg": float(np.degrees(gyro.extra_rad)),
         "condition": condition_of(gyro.equations.jacobian[rows], gyro.total_of_used),

@@ -63,7 +63,8 @@ def require_determined(serial: str, moves: Moves, equations: Equations, noise: N
     )
     raise NotEnoughData(
         f"{serial}: turn about the {AXES[column]} axis too, by 90 deg or more with {AXES[column]} level: {known}, "
-        f"which leaves {what} with u = {u[row, column]:.2g} (limit {LARGEST_U:g}); a turn about the vertical shows nothing"
+        f"which leaves {what} with u = {u[row, column]:.2g} (limit {LARGEST_U:g}); a turn about the vertical shows "
+        "nothing"
     )
 
 

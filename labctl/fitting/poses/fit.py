@@ -27,6 +27,11 @@ from labctl.fitting.poses.triad import corrected
 from labctl.recording import Recording
 
 TERMS = tuple(map(Term, ("bias", "scale_factor", "misalignment", "g_sensitivity", "cross_g_sensitivity")))
+#: The effect, and the unit, of each coefficient of an axis.
+EFFECTS = (
+    "bias", "scale_factor", "misalignment", "misalignment",
+    "g_sensitivity", "cross_g_sensitivity", "cross_g_sensitivity",
+)  # fmt: skip
 UNITS = ("deg/s", "1", "1", "1", "deg/s/g", "deg/s/g", "deg/s/g")
 #: Reference temperature where there is no thermometer; no coefficient depends on it.
 NO_THERMOMETER_C = 25.0
@@ -69,6 +74,8 @@ def _result(
     used = gyro.used
     seconds = moves.duration_s[used]
     raw = uncorrected_errors(moves_between(readings, rests).take(every.usable), accelerometer)
+    exported = corrected(readings.gyro_dps, gyro.errors, bias.mean_dps)
+    applied = uncorrected_errors(moves_between(readings, rests, exported).take(every.usable), accelerometer)
     warm = readings.temperature_c
     span = (None, None) if warm is None else (float(warm.min()), float(warm.max()))
     reference = Reference(NO_THERMOMETER_C if warm is None else float(np.round(warm.mean())))
@@ -82,7 +89,7 @@ def _result(
         span,
         _rates(moves.take(used), bias, gyro.errors),
         dict(zip(AXES, bias.solutions, strict=True)),
-        describe(readings, rests, accelerometer, bias, every, moves, gyro),
+        describe(readings, rests, accelerometer, bias, every, moves, gyro, rms_dps(applied[used], seconds)),
     )
 
 
@@ -106,11 +113,9 @@ def _axes(bias: Bias, gyro: Gyroscope) -> dict[str, AxisFit]:
         values = _between(solution.values[order], row[[i, *others]])
         whole = block_diag(rest[:1, :1], matrix, rest[1:, 1:])
         whole[0, 4:] = whole[4:, 0] = rest[0, 1:]
-        names = ("bias", "scale_factor", *(f"misalignment_{AXES[j]}" for j in others))
-        names += ("g_own", *(f"g_{AXES[j]}" for j in others))
-        effects = ("bias", "scale_factor", "misalignment", "misalignment")
-        effects += ("g_sensitivity", "cross_g_sensitivity", "cross_g_sensitivity")
-        found[str(axis)] = AxisFit(effects, names, UNITS, values[:, None], whole)
+        matrix_names = ("scale_factor", *(f"misalignment_{AXES[j]}" for j in others))
+        names = ("bias", *matrix_names, "g_own", *(f"g_{AXES[j]}" for j in others))
+        found[str(axis)] = AxisFit(EFFECTS, names, UNITS, values[:, None], whole)
     return found
 
 

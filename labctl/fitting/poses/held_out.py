@@ -51,14 +51,14 @@ def held_out_moves(equations: Equations, covariance: NDArray[np.float64], used: 
         spread[move] = np.linalg.inv(left[here, here])
         error[move] = spread[move] @ (left[here] @ residual)
     for move in np.flatnonzero(~used):
-        here = np.array([2 * move, 2 * move + 1])
+        both = np.array([2 * move, 2 * move + 1])
         # the noise that it shares with used moves is known from them; what is left of it, and of the coefficients
-        shared = covariance[np.ix_(here, np.flatnonzero(rows))]
-        design = equations.jacobian[here] - shared @ weighted
+        shared = covariance[np.ix_(both, np.flatnonzero(rows))]
+        design = equations.jacobian[both] - shared @ weighted
         error[move] = (
-            equations.residual[here]
+            equations.residual[both]
             - shared @ (left @ residual)
-            - equations.jacobian[here] @ (normal @ (weighted.T @ residual))
+            - equations.jacobian[both] @ (normal @ (weighted.T @ residual))
         )
-        spread[move] = covariance[np.ix_(here, here)] - shared @ inverse @ shared.T + design @ normal @ design.T
+        spread[move] = covariance[np.ix_(both, both)] - shared @ inverse @ shared.T + design @ normal @ design.T
     return HeldOut(error, spread)

@@ -1,4 +1,4 @@
-"""Verification by poses: a version applied to readings, and gravity after each turn where the corrected rates put it."""
+"""Verification by poses: a version applied to readings, and gravity where the corrected rates put it."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def errors_in_poses(
     """
     if set(calibration.axes) != set(AXES):
         raise BadInput(
-            f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}; a turn by "
-            "hand is about x, y and z"
+            f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}; a turn "
+            "by hand is about x, y and z"
         )
     compensator = Compensator(calibration)
     readings = readings_of(recording)
@@ -50,8 +50,8 @@ def _temperature(calibration: Calibration, readings: PoseReadings) -> Array:
         return readings.temperature_c
     if np.isfinite(calibration.temperature_c[1]):
         raise BadInput(
-            f"{calibration.serial} version {calibration.version} depends on the temperature; the recording has no column "
-            "temperature_c"
+            f"{calibration.serial} version {calibration.version} depends on the temperature; the recording has no "
+            "column temperature_c"
         )
     return np.full(len(readings), ANY_C)
 
