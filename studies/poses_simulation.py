@@ -41,6 +41,7 @@ class Session:
     wrong_moves: tuple[int, ...] = ()  #: moves of which the gyro misses some readings without a mark
     axes_turned: tuple[int, ...] = (0, 1, 2)
     about_vertical: bool = False  #: every turn is about the vertical
+    temperature_c: float | None = None  #: of a thermometer, where there is one
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,8 @@ def _recording(session: Session, t_s: Array, accel: Array, gyro: Array) -> Recor
     columns: dict[str, NDArray[np.generic]] = {"dataset": np.ones(len(t_s), dtype=np.int64), "t_s": t_s}
     for i, axis in enumerate("xyz"):
         columns |= {f"accel_{axis}_g": accel[:, i], f"gyro_{axis}": gyro[:, i]}
+    if session.temperature_c is not None:
+        columns["temperature_c"] = np.full(len(t_s), session.temperature_c)
     return Recording(info, columns)
 
 

@@ -29,6 +29,8 @@ SAME_POSE_DEG = 5.0
 LARGEST_U = 0.02
 #: A rest whose gravity is off by more than this many standard deviations was none.
 WRONG = 5.0
+#: Rounds in which wrong rests are left out and taken in again.
+ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -52,13 +54,15 @@ def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Acceleromet
     white = rests.accel_white_var.mean(axis=1)
     used = np.ones(len(rests), dtype=np.bool_)
     theta = _fitted(rests.accel_g, gravity, np.ones(len(rests)), robust=True)
-    for _ in range(len(rests)):
+    for turn in range(ROUNDS):
         residual = _sizes(theta, rests.accel_g) - gravity
         jacobian = _jacobian(theta, rests.accel_g)
         extra = between_variance(jacobian[used], residual[used], np.diag(white[used]))
         sigma = np.sqrt(white + extra)
-        wrong = np.abs(residual) > WRONG * np.sqrt(np.maximum(sigma**2, np.median(residual[used] ** 2)))
-        if np.array_equal(wrong, ~used) or np.count_nonzero(~wrong) < LEAST_POSES:
+        # at first a wrong rest would hide in the scatter that it makes itself
+        usual = 1.4826 * float(np.median(np.abs(residual))) * np.sqrt(len(rests) / max(len(rests) - PARAMETERS, 1))
+        wrong = np.abs(residual) > WRONG * (np.hypot(usual, np.sqrt(white)) if turn == 0 else sigma)
+        if (turn > 0 and np.array_equal(wrong, ~used)) or np.count_nonzero(~wrong) < LEAST_POSES:
             break
         used = ~wrong
         theta = _fitted(rests.accel_g[used], gravity, sigma[used], robust=False, start=theta)

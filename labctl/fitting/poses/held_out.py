@@ -32,33 +32,30 @@ class HeldOut:
 
 
 def held_out_moves(equations: Equations, covariance: NDArray[np.float64], used: NDArray[np.bool_]) -> HeldOut:
-    """Return what each of m moves is off from what the used ones, mask (m,), without it say.
+    """Return what each of m moves is off from what coefficients fitted to the used ones, mask (m,), without it say.
 
-    `covariance` (2m, 2m) is that of the residuals. Of a used move by the inverse of the covariance beside the design
-    (Dubrule 1983), so that no fit has to be made again.
+    `covariance` (2m, 2m) is that of the residuals. The fit without a used move is that to all with two unknowns more,
+    which take up the whole of its residual, so none has to be made again.
     """
-    m = len(used)
-    error, spread = np.zeros((m, 2)), np.zeros((m, 2, 2))
     rows = np.repeat(used, 2)
     jacobian, residual = equations.jacobian[rows], equations.residual[rows]
-    factor = cho_factor(covariance[np.ix_(rows, rows)])
-    inverse = cho_solve(factor, np.eye(len(residual)))
+    known = covariance[np.ix_(rows, rows)]
+    inverse = cho_solve(cho_factor(known), np.eye(len(residual)))
     weighted = inverse @ jacobian
     normal = np.linalg.inv(jacobian.T @ weighted)
-    left = inverse - weighted @ normal @ weighted.T
+    gain = normal @ weighted.T  # from residuals to coefficients
+    left = inverse - weighted @ gain
+    error, spread = np.zeros((len(used), 2)), np.zeros((len(used), 2, 2))
     for place, move in enumerate(np.flatnonzero(used)):
         here = slice(2 * place, 2 * place + 2)
-        spread[move] = np.linalg.inv(left[here, here])
-        error[move] = spread[move] @ (left[here] @ residual)
+        own = np.linalg.solve(left[here, here], left[here])
+        without = -jacobian[here] @ (gain - normal @ weighted[here].T @ own)
+        without[:, here] += np.eye(2)
+        error[move], spread[move] = without @ residual, without @ known @ without.T
     for move in np.flatnonzero(~used):
         both = np.array([2 * move, 2 * move + 1])
-        # the noise that it shares with used moves is known from them; what is left of it, and of the coefficients
-        shared = covariance[np.ix_(both, np.flatnonzero(rows))]
-        design = equations.jacobian[both] - shared @ weighted
-        error[move] = (
-            equations.residual[both]
-            - shared @ (left @ residual)
-            - equations.jacobian[both] @ (normal @ (weighted.T @ residual))
-        )
-        spread[move] = covariance[np.ix_(both, both)] - shared @ inverse @ shared.T + design @ normal @ design.T
+        predict = equations.jacobian[both] @ gain
+        shared = covariance[np.ix_(both, np.flatnonzero(rows))] @ predict.T
+        error[move] = equations.residual[both] - predict @ residual
+        spread[move] = covariance[np.ix_(both, both)] - shared - shared.T + predict @ known @ predict.T
     return HeldOut(error, spread)

@@ -20,8 +20,12 @@ from labctl.fitting.poses.readings import PoseReadings
 WINDOW_S, LEAST_IN_WINDOW = 0.5, 8
 #: A window rests where each channel scatters by less than this many times its static noise.
 FACTOR = 3.0
+#: No reading at rest scatters by more than this: what does is in motion throughout.
+NOISIEST_G, NOISIEST_DPS = 0.05, 3.0
 #: The quietest share of windows, from which the static noise is found first, and rounds in which it settles.
 QUIETEST, ROUNDS = 0.1, 6
+#: Half seconds at rest, beyond one in each rest, that tell the noise of a mean; with fewer, readings are independent.
+LEAST_BLOCKS = 20
 #: Both ends of a quiet stretch are cut by this share of a window: the turn begins there.
 MARGIN = 0.5
 #: A rest lasts at least so long, s, after its ends were cut.
@@ -73,6 +77,7 @@ def find_rests(readings: PoseReadings) -> Rests:
     channels = np.column_stack([readings.accel_g, readings.gyro_dps])
     spread = _spread(channels, size)
     noise = _static_noise(spread, _steps(channels))
+    _require_quiet(readings.info.serial, noise)
     quiet = np.all(spread < FACTOR * noise, axis=1) & ~_broken(readings.breaks, size)
     inside = _union(quiet, size, len(readings))
     begin, end = _stretches(inside & ~readings.breaks, inside)
@@ -83,23 +88,24 @@ def find_rests(readings: PoseReadings) -> Rests:
     begin, end = begin[long], end[long]
     if len(begin) == 0:
         raise NotEnoughData(
-            f"{readings.info.serial}: the recording has no rest of {LEAST_REST_S:g} s; lay the unit down between turns "
-            "for 2 s or more, in many poses"
+            f"{readings.info.serial}: the recording has no rest of {LEAST_REST_S:g} s; lay the unit down between "
+            "turns for 2 s or more, in many poses"
         )
     accel, gyro = _means(readings.accel_g, begin, end), _means(readings.gyro_dps, begin, end)
     still = ~_turning(gyro)
     begin, end = begin[still], end[still]
     first, last = readings.t_s[begin], readings.t_s[end - 1]
-    density = _density(channels, begin, end, size, readings.spacing_s)
+    density = _density(channels, begin, end, size, readings.spacing_s, noise)
     return Rests(
         begin, end, (first + last) / 2, last - first + readings.spacing_s, accel[still], gyro[still], noise,
-        np.maximum(density, noise**2 * readings.spacing_s),
+        density,
     )  # fmt: skip
 
 
 def _density(
-    channels: NDArray[np.float64], begin: NDArray[np.int64], end: NDArray[np.int64], size: int, spacing_s: float
-) -> Array:
+    channels: NDArray[np.float64], begin: NDArray[np.int64], end: NDArray[np.int64], size: int, spacing_s: float,
+    noise: Array,
+) -> Array:  # fmt: skip
     """Return the variance of a mean over one second of each channel, (channels,): from means over half a second.
 
     A filter inside the sensor lets neighbouring readings agree, so that a mean is less certain than their number says.
@@ -112,7 +118,22 @@ def _density(
         means = channels[first : first + blocks * size].reshape(blocks, size, -1).mean(axis=1)
         squares += np.sum((means - means.mean(axis=0)) ** 2, axis=0)
         freedom += blocks - 1
-    return squares / max(freedom, 1) * size * spacing_s
+    white = noise**2 * spacing_s
+    if freedom < LEAST_BLOCKS:
+        return np.asarray(white)
+    # rounding leaves means that agree better than their readings allow
+    return np.asarray(np.maximum(squares / freedom * size * spacing_s, white / 4))
+
+
+def _require_quiet(serial: str, noise: Array) -> None:
+    """Raise NotEnoughData where even the quietest windows scatter as no sensor at rest does."""
+    accel, gyro = float(noise[:3].max()), float(noise[3:].max())
+    if accel > NOISIEST_G or gyro > NOISIEST_DPS:
+        raise NotEnoughData(
+            f"{serial}: nothing rests in the recording: its quietest half seconds scatter by {accel:.2g} g and "
+            f"{gyro:.2g} deg/s (at rest at most {NOISIEST_G:g} g and {NOISIEST_DPS:g} deg/s); lay the unit down between "
+            "turns for 2 s or more, in many poses"
+        )
 
 
 def _spread(channels: NDArray[np.float64], size: int) -> NDArray[np.float64]:
