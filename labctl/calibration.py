@@ -143,6 +143,8 @@ def build_calibration(
         ),
         "hash": "",
     }
+    if result.poses is not None:
+        document["poses"] = result.poses
     document["hash"] = hash_of(document)
     return Calibration(document)
 

@@ -9,6 +9,7 @@ STUDIES = (
     "coverage",
     "use_coverage",
     "hand_turns",
+    "poses",
     "criticism",
     "rest_loops",
     "rest_peers",

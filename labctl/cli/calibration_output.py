@@ -10,6 +10,7 @@ from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
 if TYPE_CHECKING:
     from labctl.json_types.models import Coefficients, Entry
+    from labctl.json_types.poses import PosesJson
     from labctl.services.schemas.calibrations import FitResponse
     from labctl.services.schemas.certification import CertificationResponse
 
@@ -42,6 +43,31 @@ def print_fit(answer: FitResponse) -> None:
             shown = rounded_to_uncertainty(value, u)
             rows.add_row(name, unit, shown.value + shown.power, shown.u + shown.power if shown.u else "-")
         console.print(rows)
+    if answer.poses is not None:
+        print_poses(answer.poses)
+
+
+def print_poses(poses: PosesJson) -> None:
+    """Print what a calibration by hand says beside the gyro's coefficients: the accelerometer, rests and moves."""
+    rests, moves, held_out = poses["rests"], poses["moves"], poses["held_out"]
+    rows = table("accelerometer", "axis", "coefficient", "unit", "value", "u", numbers=2)
+    for axis, coefficients in poses["accelerometer"]["axes"].items():
+        for name, entry in coefficients.items():
+            shown = rounded_to_uncertainty(entry["value"], entry["u"])
+            rows.add_row(axis, name, entry["unit"], shown.value + shown.power, shown.u + shown.power)
+    console.print(rows)
+    console.print(
+        f"{rests['count']} rests in {rests['poses']} poses; {moves['used']} of {moves['count']} turns used; gravity "
+        f"after a turn off by {moves['residual_deg']:.2g} deg, held out by {held_out['rms_deg']:.2g} deg, "
+        f"{100 * held_out['within_2u']:.0f} % of it within U = 2 u; as exported, one bias and no g-sensitivity: "
+        f"{moves['applied_rms_dps']:.2g} deg/s RMS",
+        soft_wrap=True,
+    )
+    for left in moves["left_out"]:
+        where = f"{left['from_s']:.1f} to {left['until_s']:.1f} s"
+        console.print(f"  left out: turn from {where}: {left['why']}", style="yellow", markup=False, soft_wrap=True)
+    console.print(f"frame: {poses['accelerometer']['frame']}", style="dim", markup=False, soft_wrap=True)
+    console.print(f"not determined: {poses['not_determined']}", style="dim", markup=False, soft_wrap=True)
 
 
 def print_certification(answer: CertificationResponse) -> None:

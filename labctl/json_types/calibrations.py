@@ -15,6 +15,7 @@ from labctl.json_types.models import (
     LeftOut,
     ValidityJson,
 )
+from labctl.json_types.poses import PosesJson
 
 
 class UnitJson(TypedDict):
@@ -72,6 +73,7 @@ class CalibrationJson(TypedDict):
     environment: FitEnvironment
     validity: ValidityJson
     use: NotRequired[dict[str, AxisEvidenceJson]]
+    poses: NotRequired[PosesJson]
     provenance: dict[str, object]
     how_to_use: str
     hash: str

@@ -7,6 +7,7 @@ from typing import Literal, NotRequired
 from typing_extensions import TypedDict
 
 from labctl.json_types.findings import FindingJson
+from labctl.json_types.poses import PosesJson
 
 Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
 
@@ -160,6 +161,7 @@ class FitResultJson(TypedDict):
     noise: dict[str, AxisNoiseJson]
     environment: FitEnvironment
     reference_temperature_c: float
+    poses: NotRequired[PosesJson]
 
 
 class LeftOut(TypedDict):

@@ -20,6 +20,12 @@ from labctl.recording.turns import check_turns, mean_rate_dps
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
 #: A spread is a root of squares: beyond this a square is no number, and so is what is made of it.
 LARGEST = 1e100
+#: What a recording of free motion is told.
+NO_REFERENCE = (
+    "column 'table_rate_dps' is missing, so nothing says how the unit turned: free motion alone calibrates no gyro; "
+    "say motion = 'rest' for a unit at rest, 'turns' with column turn_deg for turns by known angles, or 'poses' with "
+    "columns accel_x_g, accel_y_g and accel_z_g for turns by hand between rests"
+)
 POSITIONS = frozenset(sign + axis for sign in ("", "-") for axis in "xyz")
 
 
@@ -27,11 +33,7 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     """Return the columns with the format's defaults filled in; raises BadRecording on the first thing that is wrong."""
     for name in needed(info):
         if name not in columns:
-            raise BadRecording(
-                f"{path}: column {name!r} is missing; add it (needed for kind = {info.kind!r}, motion = "
-                f"{info.motion!r}: "
-                f"{BY_NAME[name].meaning})"
-            )
+            raise _missing(path, info, name)
         _finite(path, name, columns[name], columns.get("valid"))
     for name, (low, high) in POSSIBLE.items():
         if name in columns:
@@ -50,6 +52,15 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     if info.motion == "turns":
         check_turns(path, info, columns)
     return _defaults(path, info, columns)
+
+
+def _missing(path: Path, info: RecordingInfo, name: str) -> BadRecording:
+    if name == "table_rate_dps" and info.motion == "rates":
+        return BadRecording(f"{path}: {NO_REFERENCE}")
+    return BadRecording(
+        f"{path}: column {name!r} is missing; add it (needed for kind = {info.kind!r}, motion = {info.motion!r}: "
+        f"{BY_NAME[name].meaning})"
+    )
 
 
 def _possible(path: Path, name: str, values: NDArray[np.float64], low: float, high: float) -> None:

@@ -123,6 +123,15 @@ class FitData:
         return len(np.unique(np.round(self.temperature_c)))
 
 
+def refuse_poses(info: RecordingInfo) -> None:
+    """Raise BadInput for a recording in poses: none of its data sets has a known rate."""
+    if info.motion == "poses":
+        raise BadInput(
+            f"{info.serial}: of a recording in poses no rate is known, only where gravity was before and after each "
+            "turn: `fit --model poses` and `verify` take it, no other model and no criticism"
+        )
+
+
 def fit_data_of(recording: Recording, covered: Covered | None = None) -> FitData:
     """Return what a fit of this recording works on.
 
@@ -134,6 +143,7 @@ def fit_data_of(recording: Recording, covered: Covered | None = None) -> FitData
         raise BadInput(
             f"{recording.info.serial}: the recording is a table of coefficients; fit it with --model weiss1995"
         )
+    refuse_poses(recording.info)
     points = to_points(recording)
     if len(points) == 0:
         raise NotEnoughData(

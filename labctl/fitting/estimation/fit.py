@@ -18,13 +18,14 @@ from labctl.fitting.estimation.coefficient_tables import from_coefficients
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held_out import held_out_errors
 from labctl.fitting.estimation.held_out_legs import errors_by_leg
+from labctl.fitting.estimation.of_poses import of_poses
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.estimation.validity import valid_rates_dps
 from labctl.fitting.models.error_model import ErrorModel, is_exported
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel, without
-from labctl.fitting.models.presets import Preset, preset_for
+from labctl.fitting.models.presets import POSES, Preset, preset_for
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.least_squares import Solution
@@ -41,6 +42,8 @@ def fit(
     takes).
     """
     preset = preset_for(model, effects or [])
+    if recording.info.motion == "poses" or preset.name == POSES:
+        return of_poses(recording, model, effects or [])
     if recording.info.kind == "coefficients" and preset.name == "weiss1995":
         return from_coefficients(recording)
     data = fit_data_of(recording, covered)

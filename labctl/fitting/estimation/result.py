@@ -21,6 +21,7 @@ from labctl.json_types.models import (
     FitResultJson,
     LeftOut,
 )
+from labctl.json_types.poses import PosesJson
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,7 @@ class FitResult:
     noise: Mapping[str, AxisNoiseJson] = field(default_factory=dict)  #: axis -> white noise and drift, as JSON
     environment: FitEnvironment = field(default_factory=FitEnvironment)
     residual_dps: Mapping[str, Array] = field(default_factory=dict)  #: axis -> (m,) corrected minus true rate, deg/s
+    poses: PosesJson | None = None  #: what a calibration by hand says beside its coefficients
     left_out_dps: Mapping[str, float] = field(default_factory=dict)  #: effect that is not exported -> its RMS, deg/s
 
     def exported(self) -> tuple[FittedModel, list[LeftOut]]:
@@ -45,7 +47,7 @@ class FitResult:
         """Return what `labctl fit --json` gives of the model, besides serial and version."""
         model = self.fitted.model
         whole = model.to_dict()
-        return {
+        found: FitResultJson = {
             "model": {
                 "name": model.name,
                 "effects": model.effect_ids,
@@ -61,6 +63,9 @@ class FitResult:
             "environment": self.environment,
             "reference_temperature_c": model.reference.temperature_c,
         }
+        if self.poses is not None:
+            found["poses"] = self.poses
+        return found
 
 
 def coefficients_json(model: ErrorModel, fit: AxisFit) -> Coefficients:

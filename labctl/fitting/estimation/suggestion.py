@@ -6,7 +6,7 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.estimation.axis_design import axis_design
 from labctl.fitting.estimation.requirements import require_enough_data
-from labctl.fitting.models.presets import preset_for
+from labctl.fitting.models.presets import POSES, preset_for
 from labctl.fitting.numeric.least_squares import rank_of
 from labctl.recording import Recording
 
@@ -25,6 +25,8 @@ def suggested_model(points: Recording) -> str:
     """
     if points.info.kind == "coefficients":
         return "weiss1995"
+    if points.info.motion == POSES:
+        return POSES
     data = fit_data_of(points)
     if not data.channels.table_rate_dps().any():
         names = AT_REST

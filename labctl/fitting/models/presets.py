@@ -116,6 +116,17 @@ def _rests_both_ways(data: FitData) -> bool:
     return {sign + axis for axis in used for sign in ("", "-")} <= set(position[still].tolist())
 
 
+#: The model of a recording in poses; `labctl.fitting.poses` fits it, since no data set of it has a known rate.
+POSES = "poses"
+
+
+def _poses(data: FitData) -> tuple[ErrorModel, Rows]:
+    raise BadInput(
+        f"{data.info.serial}: model {POSES} takes a recording with motion = 'poses'; this one says motion = "
+        f"{data.info.motion!r}"
+    )
+
+
 #: name -> (preset, one sentence for a person)
 PRESETS: dict[str, tuple[Preset, str]] = {
     "ojeda2000": (
@@ -149,6 +160,10 @@ PRESETS: dict[str, tuple[Preset, str]] = {
     "turns": (
         Preset("turns", _turns),
         "For turns by a known angle: bias, scale factor, misalignment; g-sensitivity where it rested both ways up.",
+    ),
+    POSES: (
+        Preset(POSES, _poses),
+        "By hand, without a table (Tedaldi et al. 2014): rests in many poses; gravity tells where each turn ended.",
     ),
 }
 

@@ -84,11 +84,13 @@ def use_evidence(
 
 
 def evidence_of(recording: Recording, model: str | None, effects: list[str] | None) -> dict[str, AxisEvidence]:
-    """Return what a recording shows of a model's errors in use, by axis; nothing for a table of coefficients.
+    """Return what a recording shows of a model's errors in use, by axis.
+
+    Nothing for a table of coefficients, and in poses, where no error at a single rate is seen.
 
     Raises what `fit` raises.
     """
-    if recording.info.kind == "coefficients":
+    if recording.info.kind == "coefficients" or recording.info.motion == "poses":
         return {}
     data = fit_data_of(recording)
     return use_evidence(data, with_shapes(data, preset_for(model, effects or [])))

@@ -48,8 +48,11 @@ class Summary:
 
 
 def summarise(recording: Recording) -> Summary:
-    """Return the summary of a recording of readings or of means; empty for a table of coefficients."""
-    if recording.info.kind == "coefficients" or len(recording) == 0:
+    """Return the summary of a recording of readings or of means; empty for a table of coefficients.
+
+    Also of a recording in poses, of which no rate is known: its fit judges rests and turns itself.
+    """
+    if recording.info.kind == "coefficients" or recording.info.motion == "poses" or len(recording) == 0:
         return Summary(recording.info, {"dataset": np.zeros(0, dtype=np.int64)})
     return _of_readings(recording) if recording.info.kind == "samples" else _of_means(recording)
 

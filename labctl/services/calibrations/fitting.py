@@ -15,7 +15,7 @@ from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.recordings.coverage import covered_of
 from labctl.services.recordings.inspection import as_json, inspect_stored, refuse_wrong, warning_of
-from labctl.services.recordings.loading import newest_row, points_of
+from labctl.services.recordings.loading import newest_row, source_of
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
@@ -45,7 +45,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
     recording, campaign = row.id, row.campaign
     found = inspect_stored(store, row)
     refuse_wrong(found.warnings, f"fit of recording {recording} of {serial}", accepted=request.accept_warnings)
-    source = points_of(store, row)
+    source = source_of(store, row)
     covered = covered_of(found, source.info) if row.kind == "samples" else None
     result = fit(source, request.model, request.effects, covered=covered)
     warnings = [*found.warnings, *map(warning_of, worse_than_raw(result.error))]

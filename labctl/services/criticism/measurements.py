@@ -9,6 +9,7 @@ import numpy as np
 
 from labctl.errors import BadInput
 from labctl.fitting.criticism import decimate
+from labctl.fitting.data.fit_data import refuse_poses
 from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.output_steps import per_reading, quantisation_of
@@ -54,6 +55,7 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) ->
         )
     if row.kind != "samples" or points.info.motion == "turns":
         return points
+    refuse_poses(points.info)
     info = points.info.model_copy(update={"kind": "samples"})
     parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

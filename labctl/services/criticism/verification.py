@@ -14,8 +14,9 @@ from labctl.errors import BadInput
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.recording import Recording
 from labctl.services.criticism.measurements import Measurements
+from labctl.services.criticism.pose_verification import errors_in_poses
 from labctl.services.criticism.versions import version_of
-from labctl.services.recordings.loading import newest_row
+from labctl.services.recordings.loading import motion_of, newest_row, source_of
 from labctl.services.schemas.criticism import AxisVerification, VerificationResponse
 from labctl.store import CalibrationRecord, Store
 
@@ -38,12 +39,17 @@ def verify_unit(
 def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> VerificationResponse:
     """Apply a version to the means of a recording, as its consumer applies it to readings.
 
+    In poses to the readings: what gravity is off by after each turn, over how long the turn took.
+
     Raises BadInput where the recording lacks an axis or a channel of the model, NotEnoughData.
     """
     document, _ = store.calibrations.document(row.serial, row.version)
     calibration = read_calibration(document)
-    errors, outside = applied_errors(calibration, measured.points)
-    pooled = np.concatenate(list(errors.values()))
+    if motion_of(measured.row) == "poses":
+        pooled, errors, outside = errors_in_poses(calibration, source_of(store, measured.row))
+    else:
+        errors, outside = applied_errors(calibration, measured.points)
+        pooled = np.concatenate(list(errors.values()))
     rms, expected = _rms(pooled), _expected_dps(row)
     return VerificationResponse(
         serial=row.serial,
@@ -98,7 +104,12 @@ def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[n
 
 
 def _expected_dps(row: CalibrationRecord) -> float | None:
-    """Return the error that a version promises for a data set: held-out, else of its own data; None where unknown."""
+    """Return the error that a version promises for a data set: held-out, else of its own data; None where unknown.
+
+    A version of poses promises what its exported part leaves: without the sensitivity to specific force.
+    """
+    if "poses" in row.answer:
+        return row.answer["poses"]["moves"]["applied_rms_dps"]
     error = row.answer["error"]
     known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"]) if figure is not None]
     return max(known, default=None)

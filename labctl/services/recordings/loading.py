@@ -38,6 +38,18 @@ def points_of(store: Store, row: RecordingRow) -> Recording:
     return _with_steps(pieces, inspect_stored(store, row))
 
 
+def source_of(store: Store, row: RecordingRow) -> Recording:
+    """Return what a recording is fitted by: its means, or in poses, where it is turned between rests, its readings."""
+    if motion_of(row) == "poses" and row.kind == "samples":
+        return store.recordings.samples(row.id)
+    return points_of(store, row)
+
+
+def motion_of(row: RecordingRow) -> str:
+    """Return what moved the unit."""
+    return str(row.info.get("motion", "rates"))
+
+
 def _with_steps(points: Recording, found: RecordingInspection) -> Recording:
     """Return means with a column for what coarse steps of an output leave in them, where they do."""
     if not found.quantisation_dps:

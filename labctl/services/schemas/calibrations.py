@@ -18,6 +18,7 @@ from labctl.json_types.models import (
     TermJson,
     UsualRange,
 )
+from labctl.json_types.poses import PosesJson
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.certification import CertificationResponse
 from labctl.services.schemas.criticism import ResidualColumns
@@ -115,6 +116,9 @@ class FittedResponse(ResponseModel):
     )
     reference_temperature_c: float | None = Field(default=None, description="Temperature terms are centred on it.")
     recording: int | None = Field(default=None, description="The recording that it was fitted to.")
+    poses: PosesJson | None = Field(
+        default=None, description="Of a calibration by hand: rests, the accelerometer, moves, held-out moves."
+    )
 
 
 class FitResponse(FittedResponse):

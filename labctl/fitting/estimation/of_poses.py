@@ -1,0 +1,62 @@
+"""Calibration of a recording in poses, as every other fit gives it."""
+
+from __future__ import annotations
+
+from labctl.errors import BadInput
+from labctl.fitting.estimation.error_metrics import ErrorFigures
+from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.models.presets import POSES
+from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.least_squares import Solution
+from labctl.fitting.poses.fit import fit_poses
+from labctl.json_types.models import AxisNoiseJson, FitEnvironment
+from labctl.recording import Recording
+
+#: Where the noise floor of a calibration by hand is from.
+FLOOR_SOURCE = "noise of rests and moves"
+
+
+@single_threaded
+def of_poses(recording: Recording, model: str | None, effects: list[str]) -> FitResult:
+    """Fit model `poses`, and no other, to a recording in poses.
+
+    Raises BadInput for another model or motion, NotEnoughData where rests or turns do not determine it.
+    """
+    serial = recording.info.serial
+    if model != POSES or effects:
+        raise BadInput(
+            f"{serial}: a recording in poses is fitted by --model {POSES} alone, without effects added: no rate of its "
+            "turns is known, only where gravity was before and after"
+        )
+    found = fit_poses(recording)
+    error = ErrorFigures(found.raw_rms_dps, found.rms_dps, found.heldout_rms_dps, found.noise_floor_dps, FLOOR_SOURCE)
+    return FitResult(
+        found.fitted,
+        error,
+        found.temperature_c,
+        found.rate_dps,
+        {axis: _noise_json(solution) for axis, solution in found.solutions.items()},
+        _environment(recording),
+        poses=found.poses,
+    )
+
+
+def _noise_json(solution: Solution) -> AxisNoiseJson:
+    drift = solution.drift
+    return {
+        "white_dps": solution.white_dps,
+        "drift_dps": drift.drift_dps,
+        "drift_tau_s": drift.tau_s if drift.drift_dps > 0 else None,
+        "per_rate": 0.0,
+        "covariance_scale": solution.scale,
+    }
+
+
+def _environment(recording: Recording) -> FitEnvironment:
+    latitude = recording.info.latitude_deg
+    if latitude is None:
+        return {"earth_rate": "not subtracted: the latitude is not known; it is in the uncertainty of g_own"}
+    return {
+        "earth_rate": "its vertical part subtracted from the rests; its horizontal part counts as noise",
+        "latitude_deg": latitude,
+    }

@@ -1,0 +1,162 @@
+"""Calibration of the accelerometer by gravity: in every rest the specific force has the same size.
+
+Nine parameters (Tedaldi et al. 2014, eqs. 9 and 10; Skog and Haendel 2006): bias, scale factor and misalignment, with
+the accelerometer's z axis as the body's. The direction of gravity in the body is what the gyro is held against.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from labctl.errors import NotEnoughData
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.between import between_variance
+from labctl.fitting.poses.gravity import local_gravity_g
+from labctl.fitting.poses.readings import AXES, PoseReadings
+from labctl.fitting.poses.rests import Rests
+from labctl.fitting.poses.triad import UPPER, corrected, unit
+
+PARAMETERS = 3 + len(UPPER)
+#: Rests in different directions that nine parameters take at least: some must be left to tell how well they fit.
+LEAST_POSES = 12
+#: Directions closer than this count as one pose, deg.
+SAME_POSE_DEG = 5.0
+#: A scale factor or misalignment that is less certain than this is not determined, and so a bias in g.
+LARGEST_U = 0.02
+#: A rest whose gravity is off by more than this many standard deviations was none.
+WRONG = 5.0
+#: Rounds in which wrong rests are left out and taken in again.
+ROUNDS = 8
+
+
+@dataclass(frozen=True)
+class Accelerometer:
+    """A calibrated accelerometer, and the directions of gravity in the rests."""
+
+    errors: NDArray[np.float64]  #: (3, 3) scale factor errors on the diagonal, misalignments above it
+    bias_g: Array  #: (3,)
+    covariance: NDArray[np.float64]  #: (9, 9) of the bias, then of the errors in the order of UPPER
+    up: NDArray[np.float64]  #: (k, 3) direction of the specific force in each rest
+    u_rest_g: Array  #: (k,) standard uncertainty of a component of each rest's mean
+    used: NDArray[np.bool_]  #: (k,) rests that agree with gravity
+    residual_g: float  #: root mean square of what is left of the rests' sizes
+    gravity_g: float
+
+
+def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Accelerometer:
+    """Fit the nine parameters. Raises NotEnoughData where the poses do not determine them, with what to do."""
+    _require_poses(readings.info.serial, rests)
+    gravity = local_gravity_g(readings.info)
+    white = rests.accel_white_var.mean(axis=1)
+    used = np.ones(len(rests), dtype=np.bool_)
+    theta = _fitted(rests.accel_g, gravity, np.ones(len(rests)), robust=True)
+    for turn in range(ROUNDS):
+        residual = _sizes(theta, rests.accel_g) - gravity
+        jacobian = _jacobian(theta, rests.accel_g)
+        extra = between_variance(jacobian[used], residual[used], np.diag(white[used]))
+        sigma = np.sqrt(white + extra)
+        # at first a wrong rest would hide in the scatter that it makes itself
+        usual = 1.4826 * float(np.median(np.abs(residual))) * np.sqrt(len(rests) / max(len(rests) - PARAMETERS, 1))
+        wrong = np.abs(residual) > WRONG * (np.hypot(usual, np.sqrt(white)) if turn == 0 else sigma)
+        if (turn > 0 and np.array_equal(wrong, ~used)) or np.count_nonzero(~wrong) < LEAST_POSES:
+            break
+        used = ~wrong
+        theta = _fitted(rests.accel_g[used], gravity, sigma[used], robust=False, start=theta)
+    theta = _fitted(rests.accel_g[used], gravity, sigma[used], robust=False, start=theta)
+    jacobian = _jacobian(theta, rests.accel_g[used]) / sigma[used][:, None]
+    covariance = _covariance(readings.info.serial, jacobian, rests.accel_g[used])
+    left = _sizes(theta, rests.accel_g[used]) - gravity
+    errors, bias = matrices(theta)
+    return Accelerometer(
+        errors, bias, covariance, unit(corrected(rests.accel_g, errors, bias)), sigma, used,
+        float(np.sqrt(np.mean(left**2))), gravity,
+    )  # fmt: skip
+
+
+def matrices(theta: Array) -> tuple[NDArray[np.float64], Array]:
+    """Return errors (3, 3) and bias (3,) of the nine parameters."""
+    errors = np.zeros((3, 3))
+    for value, place in zip(theta[3:], UPPER, strict=True):
+        errors[place] = value
+    return errors, theta[:3]
+
+
+def _sizes(theta: Array, accel_g: NDArray[np.float64]) -> Array:
+    return np.asarray(np.linalg.norm(corrected(accel_g, *matrices(theta)), axis=1))
+
+
+def _jacobian(theta: Array, accel_g: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the derivative of the sizes by the nine parameters, (k, 9)."""
+    errors, bias = matrices(theta)
+    inverse = np.linalg.inv(np.eye(3) + errors)
+    force = corrected(accel_g, errors, bias)
+    pull = -unit(force) @ inverse  # what one g of error in a reading changes of the size
+    return np.column_stack([pull, *(pull[:, i] * force[:, j] for i, j in UPPER)])
+
+
+def _fitted(
+    accel_g: NDArray[np.float64], gravity: float, sigma: Array, *, robust: bool, start: Array | None = None
+) -> Array:
+    """Return the nine parameters by least squares; robust: a rest that was none pulls with a bounded force."""
+    begin = np.zeros(PARAMETERS) if start is None else start
+    scale = 1.0
+    if robust:
+        first = least_squares(
+            lambda theta: _sizes(theta, accel_g) - gravity, begin, lambda theta: _jacobian(theta, accel_g)
+        )
+        scale = max(1.4826 * float(np.median(np.abs(first.fun))), 1e-9)
+        begin = first.x
+    found = least_squares(
+        lambda theta: (_sizes(theta, accel_g) - gravity) / sigma,
+        begin,
+        lambda theta: _jacobian(theta, accel_g) / sigma[:, None],
+        loss="cauchy" if robust else "linear",
+        f_scale=scale,
+        x_scale="jac",
+    )
+    return np.asarray(found.x, dtype=np.float64)
+
+
+def different_poses(directions: NDArray[np.float64]) -> int:
+    """Return how many directions (k, 3) are further than SAME_POSE_DEG from each other."""
+    kept: list[NDArray[np.float64]] = []
+    limit = np.cos(np.radians(SAME_POSE_DEG))
+    for each in unit(directions):
+        if all(float(each @ other) < limit for other in kept):
+            kept.append(each)
+    return len(kept)
+
+
+def _require_poses(serial: str, rests: Rests) -> None:
+    poses = different_poses(rests.accel_g)
+    if poses < LEAST_POSES:
+        raise NotEnoughData(
+            f"{serial}: {len(rests)} rests in {poses} different poses; bias, scale factor and misalignment of the "
+            f"accelerometer, by which the gyro is calibrated, take at least {LEAST_POSES}: lay the unit down for 2 s "
+            "or more on each face, each edge and some corners; free motion without rests is no reference"
+        )
+
+
+def _covariance(serial: str, jacobian: NDArray[np.float64], accel_g: NDArray[np.float64]) -> NDArray[np.float64]:
+    covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    rank = np.linalg.matrix_rank(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300), tol=1e-6)
+    u = np.sqrt(np.diag(covariance))
+    if rank == PARAMETERS and float(u.max()) <= LARGEST_U:
+        return np.asarray(covariance)
+    directions = unit(accel_g)
+    faces = {
+        f"{sign}{a}": float((s * directions[:, i]).max())
+        for i, a in enumerate(AXES)
+        for sign, s in (("", 1), ("-", -1))
+    }
+    face = min(faces, key=lambda name: faces[name])
+    raise NotEnoughData(
+        f"{serial}: the poses do not determine the accelerometer's nine parameters (the least certain has u = "
+        f"{float(u.max()) if rank == PARAMETERS else np.inf:.2g}, limit {LARGEST_U:g}): lay the unit down with {face} "
+        f"up too (the nearest pose is {np.degrees(np.arccos(np.clip(faces[face], -1, 1))):.0f} deg from it), and on "
+        "edges and corners"
+    )

@@ -1,0 +1,96 @@
+"""Covariance of the equations of moves by what is known: noise of gyro and accelerometer, and what moves share."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.accelerometer import Accelerometer
+from labctl.fitting.poses.bias import Bias
+from labctl.fitting.poses.equations import Equations, rate_without_bias
+from labctl.fitting.poses.moves import Moves
+from labctl.fitting.poses.rotation import integrate, integration_u
+from labctl.fitting.poses.triad import UPPER
+
+
+def move_covariance(
+    moves: Moves, accelerometer: Accelerometer, bias: Bias, equations: Equations, readings_u: Array
+) -> NDArray[np.float64]:
+    """Return the covariance (2m, 2m) of the residuals, rad^2; `readings_u` (m,) is what `of_readings` gives.
+
+    Of each rest its direction of gravity and its bias, which the moves before and after it share; of all rests the
+    accelerometer's nine parameters; of each move the gyro's white noise, the jitter of its time stamps, and what the
+    integration leaves.
+    """
+    m, rests = len(moves), len(accelerometer.up)
+    before, after = moves.before, moves.before + 1
+    tilt = _by_reading(moves, accelerometer, equations)
+    by_rest = np.zeros((m, 2, rests, 6))
+    rows = np.arange(m)
+    by_rest[rows, :, before, :3] = tilt[0] * accelerometer.u_rest_g[before][:, None, None]
+    by_rest[rows, :, after, :3] = tilt[1] * accelerometer.u_rest_g[after][:, None, None]
+    u_bias = np.radians(bias.u_rest_dps)
+    turned = (
+        equations.by_turn @ equations.rotations.by_bias_before,
+        equations.by_turn @ equations.rotations.by_bias_after,
+    )
+    by_rest[rows, :, before, 3:] += turned[0] * u_bias[before][:, None, :]
+    by_rest[rows, :, after, 3:] += turned[1] * u_bias[after][:, None, :]
+    shared = by_rest.reshape(2 * m, -1)
+    common = _by_parameters(moves, accelerometer, tilt)
+    total = shared @ shared.T + common @ accelerometer.covariance @ common.T
+    own = _of_each_move(moves, equations, readings_u)
+    for k in range(m):
+        total[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] += own[k]
+    return np.asarray(total)
+
+
+def _by_reading(
+    moves: Moves, accelerometer: Accelerometer, equations: Equations
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the derivative (m, 2, 3) of the equations by the accelerometer's mean in the rest before and after."""
+    inverse = np.linalg.inv(np.eye(3) + accelerometer.errors) / accelerometer.gravity_g
+    up = accelerometer.up
+    level = np.eye(3) - up[:, :, None] * up[:, None, :]  # only what is square to gravity changes its direction
+    back = equations.rotations.matrix.transpose(0, 2, 1)
+    before = equations.across @ back @ level[moves.before] @ inverse
+    after = -equations.across @ level[moves.before + 1] @ inverse
+    return before, after
+
+
+def _by_parameters(
+    moves: Moves, accelerometer: Accelerometer, tilt: tuple[NDArray[np.float64], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Return the derivative (2m, 9) of the equations by the accelerometer's bias and errors."""
+    found = []
+    for by_reading, rest in zip(tilt, (moves.before, moves.before + 1), strict=True):
+        force = accelerometer.up[rest] * accelerometer.gravity_g
+        parts = [-by_reading, *(-by_reading[:, :, i, None] * force[:, None, j, None] for i, j in UPPER)]
+        found.append(np.concatenate(parts, axis=2))
+    return np.asarray(found[0] + found[1]).reshape(-1, 9)
+
+
+def _of_each_move(moves: Moves, equations: Equations, readings_u: Array) -> NDArray[np.float64]:
+    """Return the covariance (m, 2, 2) of what no two moves share."""
+    white = np.einsum("mab,mca,mdb->mcd", equations.rotations.white, equations.by_turn, equations.by_turn)
+    noise = white * float(np.mean(moves.density)) * np.radians(1.0) ** 2
+    return np.asarray(noise + readings_u[:, None, None] ** 2 * np.eye(2))
+
+
+def of_readings(moves: Moves, bias: Bias) -> Array:
+    """Return what spacing and jitter of the readings leave of a component of each move's angle, (m,) rad.
+
+    Both are sizes of a rotation about any direction; a component has a third of its square.
+    """
+    rate = rate_without_bias(moves, bias)
+    matrix = integrate(rate, moves.step_s, moves.share, np.zeros((3, 3))).matrix
+    return np.asarray(
+        np.hypot(integration_u(rate, moves.step_s, np.zeros((3, 3)), matrix), _jitter_angle(moves)) / np.sqrt(3.0)
+    )
+
+
+def _jitter_angle(moves: Moves) -> Array:
+    """Return what independent errors of the time stamps make of each move's angle, (m,) rad."""
+    change = np.linalg.norm(np.diff(np.radians(moves.rate_dps), axis=1), axis=2) * (moves.step_s > 0)
+    return np.asarray(moves.jitter_s * np.sqrt(np.sum(change**2, axis=1)))

@@ -1,0 +1,127 @@
+"""What is said beside the coefficients of a calibration by hand, as JSON."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from labctl.fitting.poses.accelerometer import Accelerometer, different_poses
+from labctl.fitting.poses.bias import Bias
+from labctl.fitting.poses.determination import condition_of, turned_deg
+from labctl.fitting.poses.gyroscope import Gyroscope
+from labctl.fitting.poses.moves import Moves
+from labctl.fitting.poses.readings import AXES, PoseReadings
+from labctl.fitting.poses.rests import FACTOR, WINDOW_S, Rests
+from labctl.fitting.poses.triad import UPPER
+from labctl.json_types.poses import (
+    AccelerometerCoefficient,
+    AccelerometerJson,
+    HeldOutMovesJson,
+    MoveLeftOutJson,
+    MovesJson,
+    PosesJson,
+    RestsJson,
+)
+
+FRAME = (
+    "body axes by the accelerometer: z along its z axis, its y axis in the plane of y and z; how they lie in the case "
+    "is not known"
+)
+NOT_DETERMINED = (
+    "the mounting of the body axes in the case; turns about the vertical, which leave gravity where it is; g-squared "
+    "sensitivity and nonlinearity of the scale factors"
+)
+WRONG = "does not agree with the other moves"
+
+
+def describe(
+    readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, bias: Bias, every: Moves, moves: Moves,
+    gyro: Gyroscope, applied_rms_dps: float,
+) -> PosesJson:  # fmt: skip
+    """Return all that is said of a calibration; `moves` are those of `every` that can be used.
+
+    `applied_rms_dps` is what the exported calibration leaves of the used ones.
+    """
+    return {
+        "rests": _rests(rests, accelerometer, bias),
+        "accelerometer": accelerometer_json(accelerometer, known=readings.info.latitude_deg is not None),
+        "moves": _moves(every, moves, gyro, applied_rms_dps),
+        "held_out": _held_out(gyro),
+        "not_determined": NOT_DETERMINED,
+    }
+
+
+def _rests(rests: Rests, accelerometer: Accelerometer, bias: Bias) -> RestsJson:
+    return {
+        "count": len(rests),
+        "poses": different_poses(accelerometer.up),
+        "used": int(np.count_nonzero(accelerometer.used)),
+        "window_s": WINDOW_S,
+        "factor": FACTOR,
+        "noise": {"accel_g": rests.noise[:3].tolist(), "gyro_dps": rests.noise[3:].tolist()},
+        "t_s": rests.t_s.tolist(),
+        "duration_s": rests.duration_s.tolist(),
+        "bias_dps": {axis: bias.rest_dps[:, i].tolist() for i, axis in enumerate(AXES)},
+    }
+
+
+def accelerometer_json(accelerometer: Accelerometer, *, known: bool) -> AccelerometerJson:
+    """Return an accelerometer's coefficients by axis; `known`: whether the latitude gave the local gravity."""
+    u = np.sqrt(np.diag(accelerometer.covariance))
+    axes: dict[str, dict[str, AccelerometerCoefficient]] = {
+        str(axis): {"bias": {"value": float(accelerometer.bias_g[i]), "u": float(u[i]), "unit": "g"}}
+        for i, axis in enumerate(AXES)
+    }
+    for place, (i, j) in enumerate(UPPER):
+        name = "scale_factor" if i == j else f"misalignment_{AXES[j]}"
+        value = float(accelerometer.errors[i, j])
+        axes[AXES[i]][name] = {"value": value, "u": float(u[3 + place]), "unit": "1"}
+    return {
+        "axes": axes,
+        "gravity_g": accelerometer.gravity_g,
+        "gravity_source": "latitude, at sea level" if known else "standard gravity: the latitude is not known",
+        "residual_g": accelerometer.residual_g,
+        "frame": FRAME,
+    }
+
+
+def _moves(every: Moves, moves: Moves, gyro: Gyroscope, applied_rms_dps: float) -> MovesJson:
+    used = gyro.used
+    left = gyro.equations.residual.reshape(-1, 2)[used]
+    known = np.diag(gyro.noise).reshape(-1, 2)[used]
+    rows = np.repeat(used, 2)
+    return {
+        "count": len(every),
+        "used": int(np.count_nonzero(used)),
+        "left_out": _left_out(every, moves, gyro),
+        "turned_deg": {str(a): float(v) for a, v in zip(AXES, turned_deg(moves.take(used)), strict=True)},
+        "residual_deg": float(np.degrees(np.sqrt(np.mean(left**2)))),
+        "applied_rms_dps": applied_rms_dps,
+        "known_deg": float(np.degrees(np.sqrt(np.mean(known)))),
+        "extra_deg": float(np.degrees(gyro.extra_rad)),
+        "condition": condition_of(gyro.equations.jacobian[rows], gyro.total_of_used),
+        "jitter_s": float(np.median(moves.jitter_s)),
+    }
+
+
+def _left_out(every: Moves, moves: Moves, gyro: Gyroscope) -> list[MoveLeftOutJson]:
+    reasons = dict(zip(every.before.tolist(), every.why_not, strict=True))
+    for place in np.flatnonzero(~gyro.used):
+        off = np.degrees(np.linalg.norm(gyro.held_out.error[place]))
+        u = np.degrees(np.sqrt(np.trace(gyro.held_out.covariance[place]) / 2))
+        reasons[int(moves.before[place])] = (
+            f"{WRONG}: gravity ends {off:.2g} deg from where they put it, u = {u:.2g} deg"
+        )
+    return [
+        {"from_s": float(every.t_s[k, 0]), "until_s": float(every.t_s[k, 1]), "why": reasons[int(before)]}
+        for k, before in enumerate(every.before)
+        if reasons[int(before)]
+    ]
+
+
+def _held_out(gyro: Gyroscope) -> HeldOutMovesJson:
+    error = gyro.held_out.error[gyro.used]
+    return {
+        "rms_deg": float(np.degrees(np.sqrt(np.mean(error**2)))),
+        "within_2u": float(np.mean(gyro.held_out.within[gyro.used])),
+        "components": int(error.size),
+    }

@@ -1,0 +1,75 @@
+"""Whether the moves determine the nine coefficients of the gyro, and which turns are missing where they do not."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import NotEnoughData
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.equations import Equations
+from labctl.fitting.poses.moves import Moves
+from labctl.fitting.poses.readings import AXES
+
+#: Moves that nine coefficients take at least: two equations each, and some must be left to tell how well they fit.
+LEAST_MOVES = 9
+#: A coefficient that the moves leave less certain than this is not determined.
+LARGEST_U = 0.03
+#: Moves that turn about an axis by less than this in all show nothing of it, deg.
+LEAST_TURN_DEG = 90.0
+#: The condition above which the normal equations in scaled columns lose their meaning.
+LARGEST_CONDITION = 1e5
+
+
+def require_moves(serial: str, moves: Moves) -> None:
+    """Raise NotEnoughData where fewer moves can be used than nine coefficients take, with why the others cannot."""
+    usable = int(np.count_nonzero(moves.usable))
+    if usable >= LEAST_MOVES:
+        return
+    why = "; ".join(sorted({reason for reason in moves.why_not if reason}))
+    raise NotEnoughData(
+        f"{serial}: {usable} turns between rests can be used, nine coefficients of the gyro take at least {LEAST_MOVES}"
+        f"{f' ({len(moves) - usable} cannot: {why[:200]})' if why else ''}: turn the unit by 90 deg or more from "
+        "rest to rest, about each axis, both ways"
+    )
+
+
+def condition_of(jacobian: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+    """Return the condition of the nine columns (2m, 9), whitened and scaled to unit length."""
+    white = np.linalg.solve(np.linalg.cholesky(covariance), jacobian)
+    norms = np.linalg.norm(white, axis=0)
+    singular = np.linalg.svd(white / np.where(norms > 0, norms, 1.0), compute_uv=False)
+    return float(singular[0] / singular[-1]) if singular[-1] > 0 else float("inf")
+
+
+def require_determined(serial: str, moves: Moves, equations: Equations, noise: NDArray[np.float64]) -> None:
+    """Raise NotEnoughData where a coefficient is less certain than LARGEST_U, naming the turns that would tell it.
+
+    `noise` (2m, 2m) is the covariance of the equations, rad^2.
+    """
+    white = np.linalg.solve(np.linalg.cholesky(noise), equations.jacobian)
+    # half a unit of a coefficient is known before: what no move sees then shows as that, and not as a singular matrix
+    u = np.sqrt(np.diag(np.linalg.inv(white.T @ white + np.eye(9) / 0.5**2))).reshape(3, 3)
+    if float(u.max()) <= LARGEST_U and condition_of(equations.jacobian, noise) <= LARGEST_CONDITION:
+        return
+    turned = turned_deg(moves)
+    column = int(np.argmin(turned)) if turned.min() < LEAST_TURN_DEG else int(np.argmax(u.max(axis=0)))
+    row = int(np.argmax(u[:, column]))
+    what = f"scale_factor of {AXES[row]}" if row == column else f"misalignment_{AXES[column]} of {AXES[row]}"
+    known = (
+        f"in all moves together the unit turned about {AXES[column]} by {turned[column]:.0f} deg"
+        if turned[column] < LEAST_TURN_DEG
+        else f"gravity saw too little of the turns about {AXES[column]}"
+    )
+    raise NotEnoughData(
+        f"{serial}: turn about the {AXES[column]} axis too, by 90 deg or more with {AXES[column]} level: {known}, "
+        f"which leaves {what} with u = {u[row, column]:.2g} (limit {LARGEST_U:g}); a turn about the vertical shows "
+        "nothing"
+    )
+
+
+def turned_deg(moves: Moves) -> Array:
+    """Return the turns about each axis, without sign and added over all moves, (3,) deg."""
+    rest = np.median(moves.rate_dps[:, 0], axis=0)  # a move begins at rest
+    mean = (moves.rate_dps[:, :-1] + moves.rate_dps[:, 1:]) / 2 - rest
+    return np.asarray(np.abs(np.einsum("mki,mk->mi", mean, moves.step_s)).sum(axis=0))

@@ -1,0 +1,88 @@
+"""Readings of a recording in poses: time, specific force and gyro output, all three axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadInput, NotEnoughData
+from labctl.fitting.numeric.arrays import Array
+from labctl.recording import Recording, RecordingInfo
+from labctl.recording.points import temperature_of
+
+AXES: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")
+#: A data set in poses has at least so many readings: two rests of a second and a turn between them, at 10 Hz.
+LEAST_READINGS = 30
+#: Readings further apart than this many usual spacings have a gap between them.
+GAP = 2.5
+
+
+@dataclass(frozen=True)
+class PoseReadings:
+    """n valid readings in order of time."""
+
+    info: RecordingInfo
+    t_s: Array  #: (n,)
+    accel_g: NDArray[np.float64]  #: (n, 3) as the accelerometers say, g
+    gyro_dps: NDArray[np.float64]  #: (n, 3) by the nominal scale factor and offset, deg/s
+    temperature_c: Array | None  #: (n,); None without a thermometer
+    breaks: NDArray[np.bool_]  #: (n,) whether the time before a reading is unknown: power-on, re-mounting, gap
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    @property
+    def spacing_s(self) -> float:
+        """The usual time between two readings, s."""
+        return float(np.median(np.diff(self.t_s)))
+
+
+def readings_of(recording: Recording) -> PoseReadings:
+    """Return the valid readings of a recording in poses.
+
+    Raises BadInput for another motion, for means and for fewer than three axes, NotEnoughData for too few readings.
+    """
+    info, serial = recording.info, recording.info.serial
+    if info.motion != "poses":
+        raise BadInput(
+            f"{serial}: model poses takes a recording with motion = 'poses'; this one says motion = {info.motion!r}"
+        )
+    if info.kind != "samples":
+        raise BadInput(f"{serial}: poses need every reading of the turns (kind = 'samples'), not {info.kind!r}")
+    absent = [axis for axis in AXES if axis not in info.axes]
+    if absent:
+        raise BadInput(
+            f"{serial}: poses need gyros about x, y and z, since a turn by hand is about all three; the recording has "
+            f"no column gyro_{absent[0]}"
+        )
+    columns = recording.columns
+    valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
+    if np.count_nonzero(valid) < LEAST_READINGS:
+        raise NotEnoughData(
+            f"{serial}: the recording has {np.count_nonzero(valid)} valid readings; rests and turns take at least "
+            f"{LEAST_READINGS}"
+        )
+    warm = temperature_of(columns)
+    t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]
+    return PoseReadings(
+        info,
+        t_s,
+        np.column_stack([np.asarray(columns[f"accel_{a}_g"], dtype=np.float64)[valid] for a in AXES]),
+        np.column_stack([recording.gyro_dps(a)[valid] for a in AXES]),
+        None if warm is None else warm[valid],
+        _breaks(recording, valid, t_s),
+    )
+
+
+def _breaks(recording: Recording, valid: NDArray[np.bool_], t_s: Array) -> NDArray[np.bool_]:
+    found = np.zeros(len(t_s), dtype=np.bool_)
+    steps = np.diff(t_s)
+    found[1:] = steps > GAP * float(np.median(steps))
+    for name in ("run", "mounting"):
+        if name in recording.columns:
+            values = np.asarray(recording.columns[name])[valid]
+            found[1:] |= values[1:] != values[:-1]
+    return found
