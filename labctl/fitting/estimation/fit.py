@@ -76,7 +76,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         {axis: _noise_json(floor.axes[axis], solution) for axis, solution in found.solutions.items()},
         _environment(data, found.turning),
         residual,
-        _left_out_dps(fitted, data),
+        left_out_dps=_left_out_dps(fitted, data),
     )
 
 
