@@ -47,7 +47,9 @@ class ThermalLag(Effect):
     id = "thermal_lag"
     in_use = False
     term = "Thermal lag (sensing element behind the thermometer)"
-    sentence = "The part that matters follows the thermometer late, so the correction comes for another temperature."
+    sentence = (
+        "The sensing element follows the thermometer with a delay, so the correction is made for another temperature."
+    )
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
