@@ -96,7 +96,7 @@ class Database:
                 migrate.upgrade(connection)
         except DatabaseError as error:
             trouble = self._trouble(error)
-            if isinstance(trouble, DiskFull | DatabaseUnreachable):
+            if isinstance(trouble, DiskFull | DatabaseUnreachable) or self._backend.words_for(error):
                 raise trouble from error
             raise StoreError(
                 f"{self._shown}: not a labctl database, or damaged ({error.orig}); "
