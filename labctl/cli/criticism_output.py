@@ -70,7 +70,7 @@ def print_criticism(answer: CriticismResponse) -> None:
         console.print(rows)
     for experiment in answer.experiments:
         console.print(
-            f"to tell {', '.join(experiment['separates'])} apart: {experiment['do']} "
+            f"to distinguish {', '.join(experiment['separates'])}: {experiment['do']} "
             f"({experiment['hours']:.0f} h, {100 * experiment['power']:.0f} % sure to)",
             markup=False,
         )

@@ -47,7 +47,7 @@ def test_a_key_that_stands_twice_is_refused(calibration: Calibration, key: str, 
     content = doubled(calibration, key, first)
     last = json.loads(content)
     assert hash_of(last) == last["hash"] == calibration.hash
-    with pytest.raises(BadCalibrationFile, match=f"key '{key}' stands twice"):
+    with pytest.raises(BadCalibrationFile, match=f"key '{key}' is repeated"):
         read_calibration(content)
 
 

@@ -36,7 +36,7 @@ class SimulatedSerialPort(serial.SerialBase):
     def open(self) -> None:
         """Open the port."""
         if self.is_open:
-            raise serial.SerialException("the port is open already")
+            raise serial.SerialException("the port is open already; close it first")
         self._unread.clear()
         self.is_open = True
 

@@ -14,7 +14,7 @@ from labctl.cli.output import console, print_json
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
 By = Annotated[str, typer.Option("--by", metavar="NAME", help="Name of the person.")]
-Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")]
+Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")]
 Override = Annotated[
     bool,
     typer.Option("--override", help="Certify despite objections; the reason must be a sentence."),

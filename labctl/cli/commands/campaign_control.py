@@ -57,7 +57,9 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
 
 def pause(
     campaign: Id,
-    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")] = "paused from the command line",
+    reason: Annotated[
+        str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")
+    ] = "paused from the command line",
     by: By = None,
     as_json: Json = False,
     database: Database = None,
@@ -111,7 +113,9 @@ def resume(
 
 def abort(
     campaign: Id,
-    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")] = "aborted from the command line",
+    reason: Annotated[
+        str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")
+    ] = "aborted from the command line",
     as_json: Json = False,
     database: Database = None,
 ) -> None:

@@ -13,7 +13,7 @@ from labctl.cli.output import console, print_json, stderr, table
 app = typer.Typer(no_args_is_help=True, help="API keys: who may read, make changes and approve over HTTP.")
 
 KeyName = Annotated[str, typer.Argument(metavar="NAME", help="Name of the key's owner; the audit trail shows it.")]
-Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")]
+Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")]
 
 
 @app.command("create")

@@ -17,7 +17,7 @@ class BiasDrift(Effect):
     id = "bias_drift"
     in_use = False
     term = "Bias ramp (drift, aging)"
-    sentence = "The bias creeps in one direction through the whole campaign."
+    sentence = "The bias drifts in one direction during the whole campaign."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
@@ -48,7 +48,7 @@ class RunShift(_Shift):
 
     id = "run_shift"
     term = "Turn-on to turn-on bias repeatability"
-    sentence = "After every switching-on the bias is a little different."
+    sentence = "After every power-on the bias is slightly different."
     origin: ClassVar[Origin] = "environment"
     needs = ("run",)
     counted = "run"
@@ -62,7 +62,7 @@ class MountingShift(_Shift):
 
     id = "mounting_shift"
     term = "Mounting repeatability"
-    sentence = "After every re-mounting the output at rest is a little different."
+    sentence = "After every re-mounting the output at rest is slightly different."
     origin: ClassVar[Origin] = "fixture"
     needs = ("mounting",)
     counted = "mounting"
@@ -77,7 +77,7 @@ class RateHysteresis(Effect):
     id = "rate_hysteresis"
     in_use = False
     term = "Rate hysteresis"
-    sentence = "The output still remembers the rate before this one."
+    sentence = "The output depends on the previous rate."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     needs = ("t_s",)
@@ -102,7 +102,7 @@ class StartTransient(Effect):
     id = "start_transient"
     in_use = False
     term = "Start transient (bandwidth, latency, spin-up)"
-    sentence = "At a new rate the output creeps the last bit over seconds."
+    sentence = "At a new rate the output settles over seconds."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     needs = ("t_s",)

@@ -50,7 +50,9 @@ class ThermalLag(Effect):
     id = "thermal_lag"
     remembers = True
     term = "Thermal lag (sensing element behind the thermometer)"
-    sentence = "The part that matters follows the thermometer late, so the correction comes for another temperature."
+    sentence = (
+        "The sensing element follows the thermometer with a delay, so the correction is made for another temperature."
+    )
     by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"

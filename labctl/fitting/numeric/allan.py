@@ -169,7 +169,8 @@ def _figure(j: int, fitted: _Fitted) -> Figure:
         return Figure(None, None, kind.unit, bound, f"no {kind.region} {span}: masked by other noise")
     if kind.letter == "K" and int(np.sum(share >= 0.5)) < PREVAILING_OCTAVES:
         why = (
-            f"slope +1/2 at fewer than {PREVAILING_OCTAVES} octaves of {span}: too short a record to tell a random walk"
+            f"slope +1/2 at fewer than {PREVAILING_OCTAVES} octaves of {span}: the record is too short to detect a "
+            "random walk"
         )
         return Figure(None, None, kind.unit, bound, why)
     if not fitted.is_followed(shown):

@@ -67,7 +67,7 @@ def list_starts(store: Store, *, ended: bool) -> list[ScheduledResponse]:
 
 
 def start_status(store: Store, start: int) -> ScheduledResponse:
-    """Return one entry of the schedule with what became of its starts. Raises NotFound."""
+    """Return one entry of the schedule with the outcome of its starts. Raises NotFound."""
     return _answer(store, store.starts.get(start))
 
 

@@ -80,7 +80,7 @@ class ErrorFigures(ResponseModel):
     rms_dps: float | None = Field(description="After compensation, on the data of the fit.")
     heldout_rms_dps: float | None = Field(description="Each temperature predicted by a fit without its data.")
     noise_floor_dps: float | None = Field(description="Root of the mean variance of a data-set mean: white and drift.")
-    noise_floor_source: str = Field(default="none", description="What the noise floor was found from.")
+    noise_floor_source: str = Field(default="none", description="How the noise floor was estimated.")
     heldout_by_leg: list[LegError] = Field(
         default_factory=list, description="Heating by a fit to cooling and so on; empty: the temperature goes one way."
     )

@@ -73,8 +73,8 @@ class StartRequest(Request):
         default=None, gt=0, allow_inf_nan=False, description="Of a simulated bench; absent: as fast as it can."
     )
     seed: int | None = Field(default=None, ge=0, description="Speed of a simulated bench: X times real time.")
-    confirmed_by: str = Field(default="", max_length=200, description="As of CampaignRequest.")
-    checks: list[BenchCheck] = Field(default_factory=list, description="As of CampaignRequest.")
+    confirmed_by: str = Field(default="", max_length=200, description="As in CampaignRequest.")
+    checks: list[BenchCheck] = Field(default_factory=list, description="As in CampaignRequest.")
 
 
 class ReasonRequest(Request):
@@ -85,7 +85,7 @@ class ReasonRequest(Request):
 
     @property
     def text(self) -> str:
-        """Reason and person in one."""
+        """Reason and person as one text."""
         return f"{self.reason} ({self.by})" if self.by else self.reason
 
 
@@ -134,7 +134,7 @@ class AdviceResponse(ResponseModel):
 
     happened: str
     done: str = Field(description="What labctl did.")
-    next: str = Field(description="What a person does next.")
+    next: str = Field(description="What the operator has to do next.")
 
 
 class DriverResponse(ResponseModel):

@@ -16,7 +16,7 @@ NO_VERDICT = (
 
 
 class RevokeRequest(Request):
-    """Who takes a version out of force, and why."""
+    """Who revokes a version, and why."""
 
     by: str = Field(min_length=1)
     reason: str = Field(min_length=1)
@@ -24,7 +24,7 @@ class RevokeRequest(Request):
 
 
 class CertifyRequest(RevokeRequest):
-    """Who makes a version current, and why."""
+    """Who certifies a version, and why."""
 
     override: bool = Field(default=False, description="Certify against objections; the reason must then be a sentence.")
 
@@ -33,7 +33,7 @@ class Objection(ResponseModel):
     """One objection to certifying a version."""
 
     what: Literal["verdict", "worse", "data"]
-    text: str = Field(description="What is the case, with figures in deg/s.")
+    text: str = Field(description="The objection, with figures in deg/s.")
     do: str = Field(description="What to do instead of certifying it.")
 
 

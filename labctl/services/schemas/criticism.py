@@ -53,7 +53,7 @@ class VerificationResponse(ResponseModel):
 
 
 class CriticismResponse(ResponseModel):
-    """A model compared with a recording: the verdict in one of five forms, and what it stands on."""
+    """A model compared with a recording: the verdict in one of five forms, and its evidence."""
 
     serial: str
     version: int
@@ -65,20 +65,22 @@ class CriticismResponse(ResponseModel):
     lack_of_fit: LackOfFit
     where: list[FailingRange] = Field(description="Ranges of channels in which the residual is far from 0.")
     suspects: list[Suspect]
-    named: list[str] = Field(description="The effects that the verdict stands on.")
-    depends_on: list[str] = Field(description="Channels that the residual hangs on, strongest first.")
+    named: list[str] = Field(description="The effects that the verdict is based on.")
+    depends_on: list[str] = Field(description="Channels that the residual depends on, strongest first.")
     confounded_with: list[str] = Field(
         default_factory=list, description="Channels that this schedule cannot tell from the first of `depends_on`."
     )
     remainder: Remainder | None = Field(default=None, description="What remains beside all that was named.")
     not_physical: list[str] = Field(
-        default_factory=list, description="Effects that look alike in these data, at a size that the unit cannot have."
+        default_factory=list,
+        description="Effects that explain these data equally well, but at a size that the unit cannot have.",
     )
     named_axes: dict[str, list[str]] = Field(
         default_factory=dict, description="Effect -> the axes on which it was found."
     )
     further: list[list[str]] = Field(
-        default_factory=list, description="What could be tried beside an adequate model; effects that are alike in one."
+        default_factory=list,
+        description="Effects that could be tried although the model is adequate; equivalent effects are in one group.",
     )
     not_testable: list[NotTestable]
     experiments: list[Experiment]
@@ -114,11 +116,13 @@ class ResidualColumns(ResponseModel):
     )
     temperature_c: list[float] = Field(default_factory=list)
     t_s: list[float | None] = Field(default_factory=list)
-    n: list[int | None] = Field(default_factory=list, description="Readings behind the data set; null: not known.")
+    n: list[int | None] = Field(default_factory=list, description="Number of readings of the data set; null: unknown.")
     measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
     modelled_error_dps: list[float] = Field(default_factory=list)
     residual_dps: list[float] = Field(default_factory=list, description="Measured minus modelled error.")
-    floor_dps: list[float | None] = Field(default_factory=list, description="What noise alone leaves of this mean.")
+    floor_dps: list[float | None] = Field(
+        default_factory=list, description="Standard deviation of this mean from noise only, deg/s."
+    )
     over_floor: list[float | None] = Field(default_factory=list, description="Residual over floor, as in the map.")
 
 
@@ -137,11 +141,11 @@ class PictureResponse(ResponseModel):
     id: str
     title: str
     how_to_read: str
-    effects: list[str] = Field(description="Effects that would draw something there.")
+    effects: list[str] = Field(description="Effects that would be visible in this picture.")
     figure: dict[str, JsonValue] = Field(description="A figure as Plotly describes it: data and layout.")
 
 
 class PicturesResponse(ResponseModel):
-    """All of them, as they are kept: drawing takes a second."""
+    """All pictures, cached: drawing them takes a second."""
 
     pictures: list[PictureResponse]

@@ -45,7 +45,7 @@ class AttendanceResponse(ResponseModel):
     needed_at: list[datetime] = Field(description="Expected; prompts close together count as one.")
     at_night: list[datetime] = Field(description="Those of them between 20:00 and 07:00.")
     text: str = Field(description="The same in words.")
-    warning: str = Field(default="", description="Of times at night; empty when there are none.")
+    warning: str = Field(default="", description="A warning about times at night; empty when there are none.")
     better_start: datetime | None = Field(default=None, description="The next start with fewer of them at night.")
 
 
@@ -54,7 +54,7 @@ class Visibility(ResponseModel):
 
     effect: str
     visible: bool
-    share: float = Field(description="How much of the effect the model beside it does not absorb, 0 to 1.")
+    share: float = Field(description="Share of the effect that the rest of the model does not absorb, 0 to 1.")
     smallest_size: float | None = Field(default=None, description="Just detectable, in the effect's unit.")
     unit: str = ""
     why: Literal["channel", "schedule"] | None = None
@@ -120,7 +120,9 @@ class RunColumns(TimelineColumns):
     state: list[StepState]
     started_s: list[float | None] = Field(description="Campaign time.")
     ended_s: list[float | None]
-    forecast_s: list[float] = Field(description="When it began, or will if all that is left takes as expected.")
+    forecast_s: list[float] = Field(
+        description="When it began, or will begin if the remaining steps take the expected time."
+    )
 
 
 class CampaignPlanResponse(ResponseModel):

@@ -161,7 +161,7 @@ class AllanResponse(ResponseModel):
     """An overlapping Allan deviation, axis by axis, and the figures of IEEE Std 952 that it shows."""
 
     recording: int | None = Field(description="null: of a file that is not in the database.")
-    datasets: list[int] = Field(description="First and last data set of the stretch.")
+    datasets: list[int] = Field(description="First and last data set of the section at rest.")
     temperature_c: float | None
     duration_s: float | None
     axes: dict[str, AllanJson] = Field(

@@ -12,7 +12,7 @@ from labctl.services.schemas.plans import AttendanceResponse
 
 
 class StartEventResponse(ResponseModel):
-    """What became of one start that fell due."""
+    """Outcome of one past start."""
 
     at: datetime
     due_at: datetime

@@ -48,4 +48,4 @@ class UncertaintyResponse(ResponseModel):
     coverage_factor: float
     inside: bool = Field(description="Whether rate and temperature are within what was calibrated.")
     axes: dict[str, AxisUncertainty]
-    grid: UncertaintyGrid | None = Field(default=None, description="Where `grid` was asked for.")
+    grid: UncertaintyGrid | None = Field(default=None, description="Present where `grid` was requested.")

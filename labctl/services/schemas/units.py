@@ -8,7 +8,7 @@ from labctl.services.schemas.base import ResponseModel
 
 
 class ExportFormatResponse(ResponseModel):
-    """A format in which a calibration can be had."""
+    """A format in which calibrations are available."""
 
     id: str = Field(description="The value of `format`.")
     title: str
@@ -16,7 +16,7 @@ class ExportFormatResponse(ResponseModel):
 
 
 class UnitResponse(ResponseModel):
-    """Who a unit is and what is known of it."""
+    """A unit, its recordings and its calibrations."""
 
     serial: str
     model: str
@@ -24,4 +24,4 @@ class UnitResponse(ResponseModel):
     recordings: list[int]
     calibrations: list[int]
     certified_version: int | None
-    formats: list[ExportFormatResponse] = Field(description="In which formats a calibration of it can be had.")
+    formats: list[ExportFormatResponse] = Field(description="Formats in which its calibrations are available.")

@@ -7,7 +7,9 @@ from pydantic import Field
 from labctl.json_types.findings import Severity
 from labctl.services.schemas.base import ResponseModel
 
-WARNINGS = "What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is."
+WARNINGS = (
+    "Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none."
+)
 
 
 class DataWarning(ResponseModel):

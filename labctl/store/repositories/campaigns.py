@@ -167,7 +167,7 @@ class Campaigns:
             return {str(name): int(count) for name, count in rows}
 
     def steps(self, campaign: int) -> list[StepRow]:
-        """Return the whole plan with what became of each step."""
+        """Return the whole plan with the outcome of each step."""
         s = tables.steps.c
         query = (
             sa.select(s.number, s.kind, s.body, s.expected_s, s.state, s.started_s, s.ended_s, s.result)

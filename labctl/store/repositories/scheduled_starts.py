@@ -1,4 +1,4 @@
-"""Scheduled starts: campaigns that are to begin later, and what became of each start that fell due."""
+"""Scheduled starts: campaigns that are to begin later, and the outcome of each past start."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class StartRow(NewStart):
 
 @dataclass(frozen=True)
 class StartEventRow:
-    """What became of one start that fell due."""
+    """Outcome of one past start."""
 
     id: int
     start: int

@@ -1115,7 +1115,7 @@ export interface components {
             done: string;
             /**
              * Next
-             * @description What a person does next.
+             * @description What the operator has to do next.
              */
             next: string;
         };
@@ -1278,7 +1278,7 @@ export interface components {
             text: string;
             /**
              * Warning
-             * @description Of times at night; empty when there are none.
+             * @description A warning about times at night; empty when there are none.
              * @default
              */
             warning: string;
@@ -1927,7 +1927,7 @@ export interface components {
         };
         /**
          * CertifyRequest
-         * @description Who makes a version current, and why.
+         * @description Who certifies a version, and why.
          */
         CertifyRequest: {
             /** By */
@@ -2198,7 +2198,7 @@ export interface components {
         };
         /**
          * CriticismResponse
-         * @description A model compared with a recording: the verdict in one of five forms, and what it stands on.
+         * @description A model compared with a recording: the verdict in one of five forms, and its evidence.
          */
         CriticismResponse: {
             /** Serial */
@@ -2229,12 +2229,12 @@ export interface components {
             suspects: components["schemas"]["Suspect"][];
             /**
              * Named
-             * @description The effects that the verdict stands on.
+             * @description The effects that the verdict is based on.
              */
             named: string[];
             /**
              * Depends On
-             * @description Channels that the residual hangs on, strongest first.
+             * @description Channels that the residual depends on, strongest first.
              */
             depends_on: string[];
             /**
@@ -2246,7 +2246,7 @@ export interface components {
             remainder: components["schemas"]["Remainder"] | null;
             /**
              * Not Physical
-             * @description Effects that look alike in these data, at a size that the unit cannot have.
+             * @description Effects that explain these data equally well, but at a size that the unit cannot have.
              */
             not_physical: string[];
             /**
@@ -2258,7 +2258,7 @@ export interface components {
             };
             /**
              * Further
-             * @description What could be tried beside an adequate model; effects that are alike in one.
+             * @description Effects that could be tried although the model is adequate; equivalent effects are in one group.
              */
             further: string[][];
             /** Not Testable */
@@ -2283,7 +2283,7 @@ export interface components {
             readings_left_out: number;
             /**
              * Warnings
-             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /** @description The version without refitting on this recording; everything else is of a refit to it. */
@@ -2438,7 +2438,7 @@ export interface components {
             noise_floor_dps: number | null;
             /**
              * Noise Floor Source
-             * @description What the noise floor was found from.
+             * @description How the noise floor was estimated.
              * @default none
              */
             noise_floor_source: string;
@@ -2524,7 +2524,7 @@ export interface components {
         };
         /**
          * ExportFormatResponse
-         * @description A format in which a calibration can be had.
+         * @description A format in which calibrations are available.
          */
         ExportFormatResponse: {
             /**
@@ -2621,7 +2621,7 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
@@ -2750,7 +2750,7 @@ export interface components {
             suggested_model: string;
             /**
              * Warnings
-             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
         };
@@ -2810,7 +2810,7 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
@@ -2880,7 +2880,7 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
@@ -3223,7 +3223,7 @@ export interface components {
             what: "verdict" | "worse" | "data";
             /**
              * Text
-             * @description What is the case, with figures in deg/s.
+             * @description The objection, with figures in deg/s.
              */
             text: string;
             /**
@@ -3288,7 +3288,7 @@ export interface components {
             how_to_read: string;
             /**
              * Effects
-             * @description Effects that would draw something there.
+             * @description Effects that would be visible in this picture.
              */
             effects: string[];
             /**
@@ -3397,7 +3397,7 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
@@ -3715,7 +3715,7 @@ export interface components {
             t_s: (number | null)[];
             /**
              * N
-             * @description Readings behind the data set; null: not known.
+             * @description Number of readings of the data set; null: unknown.
              */
             n: (number | null)[];
             /**
@@ -3732,7 +3732,7 @@ export interface components {
             residual_dps: number[];
             /**
              * Floor Dps
-             * @description What noise alone leaves of this mean.
+             * @description Standard deviation of this mean from noise only, deg/s.
              */
             floor_dps: (number | null)[];
             /**
@@ -3803,7 +3803,7 @@ export interface components {
         };
         /**
          * RevokeRequest
-         * @description Who takes a version out of force, and why.
+         * @description Who revokes a version, and why.
          */
         RevokeRequest: {
             /** By */
@@ -3869,7 +3869,7 @@ export interface components {
             ended_s: (number | null)[];
             /**
              * Forecast S
-             * @description When it began, or will if all that is left takes as expected.
+             * @description When it began, or will begin if the remaining steps take the expected time.
              */
             forecast_s: number[];
         };
@@ -3965,7 +3965,7 @@ export interface components {
             suggested_model: string;
             /**
              * Warnings
-             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /** Recipe */
@@ -4025,7 +4025,7 @@ export interface components {
         };
         /**
          * StartEventResponse
-         * @description What became of one start that fell due.
+         * @description Outcome of one past start.
          */
         StartEventResponse: {
             /**
@@ -4366,12 +4366,12 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisUncertainty"];
             };
-            /** @description Where `grid` was asked for. */
+            /** @description Present where `grid` was requested. */
             grid: components["schemas"]["UncertaintyGrid"] | null;
         };
         /**
          * UnitResponse
-         * @description Who a unit is and what is known of it.
+         * @description A unit, its recordings and its calibrations.
          */
         UnitResponse: {
             /** Serial */
@@ -4388,7 +4388,7 @@ export interface components {
             certified_version: number | null;
             /**
              * Formats
-             * @description In which formats a calibration of it can be had.
+             * @description Formats in which its calibrations are available.
              */
             formats: components["schemas"]["ExportFormatResponse"][];
         };
@@ -4511,7 +4511,7 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
+             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
@@ -4606,7 +4606,7 @@ export interface components {
             visible: boolean;
             /**
              * Share
-             * @description How much of the effect the model beside it does not absorb, 0 to 1.
+             * @description Share of the effect that the rest of the model does not absorb, 0 to 1.
              */
             share: number;
             /**

@@ -226,7 +226,7 @@ MANY = [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0]
         ),
         (lambda _: ["certify", "OSU-FOG-2024", "9", "--by", "A", "--reason", "B"], "no calibration version 9"),
         (lambda _: ["serve", "--host", "0.0.0.0"], "no key exists yet"),
-        (lambda _: ["serve", "--require-keys"], "--require-keys, and there is no key exists yet"),
+        (lambda _: ["serve", "--require-keys"], "--require-keys, and no key exists yet"),
         (lambda _: ["serve", "--port", "99999"], "--port 99999: 1 to 65535, or 0 for a free one"),
     ],
 )

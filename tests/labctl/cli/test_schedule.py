@@ -69,8 +69,8 @@ def test_an_entry_is_kept_and_it_is_said_that_nobody_begins_it(lab: Lab) -> None
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--at", "2020-01-01T00:00Z"], "is past"),
-        (["--at", "soon"], "'soon' is not one"),
+        (["--at", "2020-01-01T00:00Z"], "is in the past"),
+        (["--at", "soon"], "'soon' cannot be read"),
         (["--at", "now", "--cron", "0 2 * * *"], "not both"),
         (["--cron", "0 2 * *"], "4 fields"),
         (["--at", "now", "--time-zone", "Moon/Sea"], "'Moon/Sea' is not known"),

@@ -88,12 +88,12 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path) -> None:
         (lambda r: [",".join(x.split(",")[:-1]) for x in r], r"samples.csv: column 'gyro_z' is missing"),
         (
             lambda r: [*r[:3], "2,5.0,20,warm,20.1", *r[4:]],
-            r"column 'temperature_c', row 3: 'warm' is not a number; correct it",
+            r"column 'temperature_c', row 3: 'warm' is not a number",
         ),
         (lambda r: [*r[:2], "1,0.1,10,nan,10.2", *r[3:]], r"column 'temperature_c', row 2: nan"),
         (lambda r: [*r[:2], "1,0.1,10,25.0,", *r[3:]], r"column 'gyro_z', row 2: nan"),
         (lambda r: [r[0], r[2], r[1], *r[3:]], r"column 't_s', row 2: 0 s does not follow 0.1 s"),
-        (lambda r: [*r, "1,6.0,10,25.0,10.0"], r"column 'dataset', row 5: number 1 returns"),
+        (lambda r: [*r, "1,6.0,10,25.0,10.0"], r"column 'dataset', row 5: number 1 is repeated"),
         (lambda r: [*r[:1], "1.5" + r[1][1:], *r[2:]], r"column 'dataset', row 1: 1.5 is not a whole number"),
         (lambda r: r[:1], r"no rows below the header"),
         (lambda r: [r[0] + ",gyro_z", *[x + ",1" for x in r[1:]]], r"column 'gyro_z' is repeated in the header"),
@@ -137,7 +137,7 @@ def test_a_truncated_parquet_file_is_named(folder: Path) -> None:
     write_recording(whole, out)
     path = out / "samples.parquet"
     path.write_bytes(path.read_bytes()[:-200])
-    with pytest.raises(BadRecording, match=r"samples.parquet: not a whole Parquet file"):
+    with pytest.raises(BadRecording, match=r"samples.parquet: not a complete Parquet file"):
         read_recording(out)
 
 

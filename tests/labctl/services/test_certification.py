@@ -171,5 +171,5 @@ def test_a_version_whose_fit_was_worse_than_none_is_refused(lab: Lab, monkeypatc
         monkeypatch.setattr(store.calibrations, "get", lambda *_: spoilt_row)
         (objection,) = assess(store, FOG, 1).objections
     assert objection.what == "worse"
-    assert "leaves 109.4 deg/s RMS" in objection.text
+    assert "residual on the data of the fit is 109.4 deg/s RMS" in objection.text
     assert "104.9 deg/s" in objection.text

@@ -153,7 +153,7 @@ def test_a_fit_that_is_worse_than_none_is_certainly_wrong() -> None:
     (little,) = worse_than_raw(figures(2.0, 2.01))
     (much,) = worse_than_raw(figures(104.9, 109.4))
     assert (little.severity, much.severity) == ("certain", "certain")
-    assert "leaves 109.4 deg/s RMS" in much.text
+    assert "residual on the data of the fit is 109.4 deg/s RMS" in much.text
 
 
 def test_a_fit_that_is_worse_than_none_is_refused_with_its_figures_and_not_kept(

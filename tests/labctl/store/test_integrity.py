@@ -124,7 +124,7 @@ def test_a_block_that_was_cut_short_under_a_new_checksum_is_found(location: str)
         ("UPDATE sample_blocks SET n = n - 1 WHERE id = 1", "readings", "recording 1 data set 1 block 0"),
         ("UPDATE calibrations SET document = replace(document, '\"z\"', '\"y\"')", "calibrations", "edited or damaged"),
         ("UPDATE calibrations SET hash = substr(hash, 2) || '0'", "calibrations", "its document was changed"),
-        ("UPDATE certifications SET version = 7", "file", "row 1 of certifications names a row of calibrations"),
+        ("UPDATE certifications SET version = 7", "file", "row 1 of certifications refers to a row of calibrations"),
         ("UPDATE audit SET actor = 'nobody' WHERE id = 3", "audit", "row 3: its content"),
         ("DELETE FROM audit WHERE id = 6", "audit", "row 6: 1 rows are missing at the end"),
         ("UPDATE alembic_version SET version_num = '0001'", "schema", "any other command migrates it"),

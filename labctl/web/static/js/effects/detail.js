@@ -181,9 +181,9 @@ function shapeCard(effect) {
       ? null
       : h("p", {}, `A polynomial up to order ${effect.max_order}; ${effect.order} by default.`);
   if (!effect.parameters.length)
-    return card("Its shape", orders ?? h("p", {}, "It has no shape parameters: one size describes it."));
+    return card("Shape of the effect", orders ?? h("p", {}, "It has no shape parameters: one size describes it."));
   return card(
-    "Its shape",
+    "Shape of the effect",
     orders,
     table(
       [
