@@ -13,7 +13,7 @@ from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.output_steps import per_reading, quantisation_of
 from labctl.services.recordings.inspection import inspect_stored
-from labctl.services.recordings.loading import points_of
+from labctl.services.recordings.loading import is_profile, points_of
 from labctl.services.schemas.warnings import RecordingInspection
 from labctl.store import RecordingRow, Store
 
@@ -49,7 +49,7 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) ->
     """
     if row.kind == "coefficients":
         raise BadInput(f"recording {row.id} is a table of coefficients: a model is held against readings or means")
-    if row.kind != "samples":
+    if row.kind != "samples" or is_profile(row):  # of a rate that changes decimated readings are those of another
         return points
     info = points.info.model_copy(update={"kind": "samples"})
     parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]

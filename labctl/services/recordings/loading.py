@@ -20,7 +20,12 @@ from labctl.store import RecordingRow, Store
 
 
 def points_of(store: Store, row: RecordingRow) -> Recording:
-    """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces."""
+    """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces.
+
+    Where the rate changes within data sets (motion "profile") every reading is returned: a fit needs the rate of each.
+    """
+    if is_profile(row):
+        return store.recordings.samples(row.id)
     points = store.recordings.points(row.id, head=row)
     if row.kind != "samples":
         return points
@@ -31,6 +36,11 @@ def points_of(store: Store, row: RecordingRow) -> Recording:
 
     pieces = with_pieces(points, readings)
     return _with_steps(pieces, inspect_stored(store, row))
+
+
+def is_profile(row: RecordingRow) -> bool:
+    """Return whether a recording holds readings whose rate changes within data sets."""
+    return row.kind == "samples" and row.info.get("motion") == "profile"
 
 
 def _with_steps(points: Recording, found: RecordingInspection) -> Recording:
