@@ -138,6 +138,7 @@ class Effect(ABC):
     experiment: ClassVar[str] = ""  #: what would distinguish it from similar effects
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
     shows_at_rest: bool = False  #: whether it is an error of the bias, at least in part: then it takes no rate to see
+    exact: ClassVar[bool] = False  #: whether its parameters are all of its shape: then fit alone tells two such apart
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 
     @abstractmethod

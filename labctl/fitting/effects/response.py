@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT
+from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT, Response
 from labctl.fitting.effects.base import Column, Effect, Law, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.models import Origin
@@ -18,6 +18,7 @@ class _Responding(Effect):
     """A part of the response. Every other effect sees the rate that has come through the whole response."""
 
     in_use = False  # what is late cannot be undone reading by reading, nor what the output does not follow
+    exact = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "own"
     name: ClassVar[str]
@@ -81,6 +82,20 @@ class Bandwidth(_Responding):
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.05)}
     experiment = "a sine sweep up to the bandwidth: a delay keeps the size of the output, a low bandwidth does not"
     draws = ("time",)
+
+
+#: The effects of which the response is made.
+IDS = frozenset({TimeDelay.id, Bandwidth.id})
+
+
+def response_of_terms(terms: Iterable[Term]) -> Response:
+    """Return the response that the terms of a model have as their parameters."""
+    found = Response()
+    for term in terms:
+        if term.effect in IDS:
+            for value in term.parameters.values():
+                found = found.with_value(DELAY if term.effect == TimeDelay.id else TIME_CONSTANT, value)
+    return found
 
 
 EFFECTS: tuple[type[Effect], ...] = (TimeDelay, Bandwidth)
