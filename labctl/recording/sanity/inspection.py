@@ -24,6 +24,9 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
     if len(summary) == 0:
         return []
     known = responses(summary)
+    if summary.info.motion == "profile":  # a rate may change, and so may the output
+        found = [*check_responses(summary, known), *check_time(summary, environment)]
+        return sorted(found, key=lambda finding: finding.severity != "certain")
     whole = summary.take(~np.any([with_two_rates(summary, axis) for axis in summary.info.axes], axis=0))
     found = [
         *check_responses(summary, known),
