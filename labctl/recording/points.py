@@ -12,6 +12,7 @@ from labctl.recording.quantisation import steps_columns
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 from labctl.recording.turn_means import turned_points
+from labctl.recording.windows import kept_windows, usual_step_s, white_std_of_profile, window_labels
 
 #: Columns that one data set has one value of: its first reading's.
 FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg")
@@ -118,16 +119,19 @@ def to_points(recording: Recording) -> Recording:
     """Return the recording with one row per data set (kind "points"); points and coefficients return as they are.
 
     A long data set through which the temperature moved, and at rest any that is longer than a window, has a row for
-    each of its pieces, under its own number. Only valid readings count. `t_s` is the middle of the data set,
-    `table_angle_deg` its start, `duration_s` its length; each gyro column gains `_std` (n - 1), where every set has
-    readings enough `_white_std`, and where its readings come in coarse steps `_quantisation_std`; every row gains `n`.
-    A data set without a valid reading is left out.
+    each of its pieces, under its own number; where the rate changes (motion "profile") there is a row for each window
+    (`in_windows`). Only valid readings count. `t_s` is the middle of the data set, `table_angle_deg` its start,
+    `duration_s` its length; each gyro column gains `_std` (n - 1), where every set has readings enough `_white_std`,
+    and where its readings come in coarse steps `_quantisation_std`; every row gains `n`. A data set without a valid
+    reading is left out.
     """
     if recording.info.kind != "samples":
         return recording
     columns = recording.columns
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     rows = {name: np.asarray(values)[valid] for name, values in columns.items() if name != "valid"}
+    if recording.info.motion == "profile":
+        return in_windows(recording, rows)
     starts = dataset_starts(pieces(rows, recording.info.motion))
     counts = np.diff(np.append(starts, len(rows["dataset"])))
     points: dict[str, NDArray[np.generic]] = {}
@@ -150,6 +154,32 @@ def to_points(recording: Recording) -> Recording:
     points["n"] = counts.astype(np.int64)
     if recording.info.motion == "turns":
         points |= turned_points(rows, points, starts, counts)
+    return Recording(recording.info.model_copy(update={"kind": "points"}), points, recording.environment)
+
+
+def in_windows(recording: Recording, rows: Columns) -> Recording:
+    """Return a recording whose rate changes, of valid readings `rows`, as one row per kept window (kind "points").
+
+    Each column is a mean over the window, of which `t_s` is the middle and `duration_s` the length. Readings scatter
+    within a window because the rate changes, so there is no `_std`: `_white_std` is the noise beside that.
+    """
+    labels = window_labels(rows)
+    starts = dataset_starts(labels)
+    counts = np.diff(np.append(starts, len(rows["dataset"])))
+    points: dict[str, NDArray[np.generic]] = {}
+    for name, values in rows.items():
+        if name in FIRST or values.dtype.kind not in "fiu":
+            points[name] = values[starts]
+        else:
+            points[name] = np.add.reduceat(values.astype(np.float64), starts) / counts
+    for axis in recording.info.axes:
+        white = white_std_of_profile(rows, np.asarray(rows[f"gyro_{axis}"], dtype=np.float64))
+        if white is not None:
+            points[f"gyro_{axis}_white_std"] = white[starts]
+    points["duration_s"] = counts * usual_step_s(rows)
+    points["n"] = counts.astype(np.int64)
+    kept = kept_windows(rows, labels)
+    points = {name: values[kept] for name, values in points.items()}
     return Recording(recording.info.model_copy(update={"kind": "points"}), points, recording.environment)
 
 

@@ -20,6 +20,8 @@ from labctl.fitting.numeric.arrays import Array
 #: Effects that contain several others: a model starts from them, and they are never what is missing.
 ONLY_BASE = frozenset({"rate_temperature_surface"})
 
+#: Rates that stand for all of a rate that changes.
+RATES_OF_PROFILE = 13
 #: Candidate that is a drift of the thermometer: it depends on the temperature as it is logged.
 THERMOMETER = "temperature_c"
 #: What is not known of a turn at each instant.
@@ -30,7 +32,12 @@ SHIFT_K = 0.25
 
 def span_of(data: ReducedRecording) -> Span:
     """Return the rates and channels that a recording covers."""
-    rates = np.unique(np.round(np.abs(data.at_sets(data.nodes.table_rate_dps())), 3))
+    if data.nodes.profile is None:
+        rates = np.unique(np.round(np.abs(data.at_sets(data.nodes.table_rate_dps())), 3))
+    else:  # every rate in between was run
+        rates = np.unique(
+            np.round(np.quantile(np.abs(data.nodes.table_rate_dps()), np.linspace(0.0, 1.0, RATES_OF_PROFILE)), 3)
+        )
     moving = rates[rates > 0]
     fastest = float(moving.max()) if len(moving) else 1.0
     return Span(

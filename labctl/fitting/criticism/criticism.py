@@ -21,7 +21,8 @@ from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.noise_floor import NoiseFloor
 from labctl.fitting.data.static_record import LONG_S, static_record
 from labctl.fitting.data.temperature_channel import with_temperature
-from labctl.fitting.effects import CATALOGUE, Effect, Term
+from labctl.fitting.effects import CATALOGUE, Effect, Term, kind_of
+from labctl.fitting.effects.response import response_of_terms
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
@@ -102,10 +103,10 @@ def criticise(
     fit_data = fit_data_of(points or recording)
     report_stage("fitting the model")
     base = fit_preset(fit_data, changed(model)) if full else None
-    forward, _ = changed(model).build(fit_data)
+    forward = _forward(fit_data, model, base)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)
-    comparison = compare_models(data, forward, catalogue)
+    comparison = compare_models(data.through(response_of_terms(forward.terms)), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
     found = Criticism(verdict, data, fit_data, base, None, comparison, final)
     if not full or found.beside_missing is None:
@@ -133,9 +134,18 @@ def best_shapes(
     """
     recording = with_temperature(recording)
     data = replace(reduce_recording(recording), static=static_record(recording))
-    forward, _ = changed(model).build(fit_data_of(points))
-    comparison = compare_models(data, forward, catalogue)
+    forward = _forward(fit_data_of(points), model, None)
+    comparison = compare_models(data.through(response_of_terms(forward.terms)), forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
+
+
+def _forward(data: FitData, model: ErrorModel, base: FitResult | None) -> ErrorModel:
+    """Return the model in its forward form, a delay and a bandwidth as they are fitted to these data sets."""
+    forward, _ = changed(model).build(data)
+    if data.channels.profile is None or not any(kind_of(term).exact for term in forward.terms):
+        return forward
+    fitted = base or fit_preset(data, changed(model))
+    return forward.with_terms(fitted.fitted.model.terms)
 
 
 def _direct_rms_dps(data: FitData, model: ErrorModel) -> float | None:

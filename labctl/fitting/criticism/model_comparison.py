@@ -19,6 +19,7 @@ from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.ranking import Candidate, rank_candidates
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.effects import CATALOGUE, Effect
+from labctl.fitting.effects.response import response_of_terms
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.numeric.arrays import Array
 from labctl.progress import report_stage
@@ -51,6 +52,7 @@ def design_of(
 ) -> Design:
     """Return the design of one axis: all that does not depend on its output."""
     base, precision = base_of(data, model, axis)
+    catalogue = {name: kind for name, kind in catalogue.items() if not (kind.exact and name in model.effect_ids)}
     nodes = data.nodes
     t_s = USUAL_SPACING_S * np.arange(len(data), dtype=np.float64)
     if "t_s" in nodes:
@@ -71,7 +73,14 @@ def compare_beside(
     catalogue: Mapping[str, Effect] = CATALOGUE,
     discrepancy: Mapping[str, Discrepancy] | None = None,
 ) -> Comparison:
-    """Compare again beside a model with other terms, and their discrepancy by axis: same candidates, another base."""
+    """Compare again beside a model with other terms, and their discrepancy by axis: same candidates, another base.
+
+    Every candidate sees the rate that comes through a delay and a bandwidth of the model: then all are made again.
+    """
+    data = comparison.data.through(response_of_terms(model.terms))
+    if data is not comparison.data:
+        designs = {axis: design_of(data, model, axis, catalogue) for axis in comparison.designs}
+        comparison = replace(comparison, data=data, designs=designs)
     return compare_models(comparison.data, model, catalogue, designs_beside(comparison, model, discrepancy or {}))
 
 

@@ -11,7 +11,7 @@ from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
 from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.plausibility import log_size_prior
-from labctl.fitting.effects import Term
+from labctl.fitting.effects import CATALOGUE, Term
 from labctl.fitting.numeric.arrays import Array
 
 #: From this evidence on, nats, a candidate that has none at a physical size is listed as not physical.
@@ -29,6 +29,12 @@ class Candidate:
     term: Term | None  #: the shape that fits all axes together best
     gain: float  #: chi2 that it removes, over all axes
     physical: bool = True  #: whether the size that it is fitted with is one that the unit's technology can have
+
+
+def are_exact(*candidates: Candidate) -> bool:
+    """Return whether each candidate is an effect of which the parameters are all of the shape."""
+    kinds = [CATALOGUE.get(candidate.id) for candidate in candidates if not candidate.smooth]
+    return len(kinds) == len(candidates) and all(kind is not None and kind.exact for kind in kinds)
 
 
 def rank_candidates(

@@ -53,7 +53,12 @@ def residuals_of(
     """
     m = len(comparison.data)
     floors = {axis: noise.floor_dps for axis, noise in floor.axes.items()}
-    if any(len(values) != m for values in floors.values()):  # long data sets in other pieces
+    if comparison.data.nodes.profile is not None:  # the floor of a fit is that of a window, and a row here is a piece
+        floors = {
+            axis: np.sqrt(comparison.white_var[axis] + found.best.noise.size_dps**2)
+            for axis, found in comparison.axes.items()
+        }
+    elif any(len(values) != m for values in floors.values()):  # long data sets in other pieces
         floors = {axis: np.full(m, np.sqrt(np.mean(values**2))) for axis, values in floors.items()}
     found = {axis: _axis(comparison, axis, floors[axis]) for axis in comparison.axes}
     if fitted is None or any(len(values) != m for values in fitted.values()):

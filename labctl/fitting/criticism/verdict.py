@@ -15,7 +15,7 @@ import numpy as np
 from labctl.fitting.criticism.channel_functions import TIMES
 from labctl.fitting.criticism.evidence.gains import reproduced_and_size, solve_option
 from labctl.fitting.criticism.model_comparison import Comparison
-from labctl.fitting.criticism.ranking import Candidate
+from labctl.fitting.criticism.ranking import Candidate, are_exact
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.derived import with_derived
 from labctl.json_types.criticism import Remainder
@@ -68,9 +68,8 @@ class Verdict:
     """The answer."""
 
     form: Form
-    groups: tuple[
-        tuple[str, ...], ...
-    ] = ()  #: one per missing effect: its id, or those that cannot be distinguished, best first
+    #: One per missing effect: its id, or those that cannot be distinguished, best first.
+    groups: tuple[tuple[str, ...], ...] = ()
     depends_on: tuple[str, ...] = ()
     reason: str = ""
     terms: Mapping[str, Term] = field(default_factory=dict)  #: effect id -> the shape that fits best
@@ -228,7 +227,8 @@ def _is_indistinguishable(comparison: Comparison, leader: Candidate, rival: Cand
     A rival with more coefficients can follow any signal: it only counts while its evidence is not far behind.
     """
     share = overlap(comparison, leader, rival)
-    if share > ALIKE and _directions(comparison, rival) <= _directions(comparison, leader):
+    same = share > ALIKE and _directions(comparison, rival) <= _directions(comparison, leader)
+    if same and not are_exact(leader, rival):
         return True
     return rival.log_bf > leader.log_bf - FAR and (1.0 - share) * leader.gain < INDISTINGUISHABLE_CHI2
 

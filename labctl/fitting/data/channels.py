@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.data.rate_profile import RateProfile, Response
 from labctl.fitting.data.temperature_channel import with_stand_in
 from labctl.fitting.data.temperature_history import TemperatureHistory, history_of
 from labctl.fitting.numeric.arrays import Array
@@ -31,6 +32,8 @@ class Channels:
     rates: Mapping[str, Array]  #: body axis -> (n,) deg/s
     history: TemperatureHistory = field(default_factory=TemperatureHistory)  #: of the whole recording
     harmonics: Mapping[Carrier, Array] = field(default_factory=dict)  #: means over each row of waves in the table angle
+    profile: RateProfile | None = None  #: the table's rate reading by reading, where it changes within a data set
+    response: Response = field(default_factory=Response)  #: what the rates have come through
 
     def __len__(self) -> int:
         return len(next(iter(self.rates.values())))
@@ -61,7 +64,17 @@ class Channels:
             {axis: values[rows] for axis, values in self.rates.items()},
             self.history,
             {carrier: values[rows] for carrier, values in self.harmonics.items()},
+            None if self.profile is None else self.profile.take(rows),
+            self.response,
         )
+
+    def through(self, response: Response) -> Channels:
+        """Return the same channels with the table's rate as it comes through a response; the Earth's has no change."""
+        if self.profile is None or response == self.response:
+            return self
+        change = self.profile.seen_dps(response) - self.profile.seen_dps(self.response)
+        moved = body_rates(change, np.asarray(self.columns["position"]))
+        return replace(self, rates={a: v + moved[a] for a, v in self.rates.items()}, response=response)
 
     def table_rate_dps(self) -> Array:
         """Return the table's rate, (n,) deg/s."""
@@ -116,14 +129,16 @@ def body_rates(table_rate_dps: Array, position: NDArray[np.generic]) -> dict[str
     return {axis: np.where(names == axis, signs * table_rate_dps, 0.0) for axis in BODY_AXES}
 
 
-def channels_of(points: Recording, up_rate_dps: float = 0.0) -> Channels:
+def channels_of(points: Recording, up_rate_dps: float = 0.0, profile: RateProfile | None = None) -> Channels:
     """Return the channels of a recording, with the true rate along each body axis.
 
-    `up_rate_dps` is added to the table's rate, deg/s: the Earth's rate along the table axis, upwards.
+    `up_rate_dps` is added to the table's rate, deg/s: the Earth's rate along the table axis, upwards. `profile` is the
+    table's rate over the same rows, where it changes; then there is no rate before a data set.
     """
     columns = with_stand_in(points.columns, len(points))
     columns.setdefault("position", np.full(len(points), points.info.axes[0]))
     true = np.asarray(columns["table_rate_dps"], dtype=np.float64) + up_rate_dps
     if "previous_rate_dps" not in columns and points.info.kind == "points":
-        columns["previous_rate_dps"] = np.concatenate([[0.0], np.asarray(columns["table_rate_dps"])[:-1]])
-    return Channels(columns, body_rates(true, np.asarray(columns["position"])), history_of(points))
+        before = np.concatenate([[0.0], np.asarray(columns["table_rate_dps"])[:-1]])
+        columns["previous_rate_dps"] = before if profile is None else np.zeros(len(points))
+    return Channels(columns, body_rates(true, np.asarray(columns["position"])), history_of(points), profile=profile)

@@ -15,6 +15,7 @@ from labctl.fitting.data.covered import Covered, covered_by_means, covered_by_re
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.mean_noise import white_var_of
 from labctl.fitting.data.noise_floor import NoiseFloor, noise_floor_of
+from labctl.fitting.data.rate_profile import RateProfile, Response, rate_profile
 from labctl.fitting.data.temperature_channel import with_temperature
 from labctl.fitting.data.temperature_levels import folds, temperature_levels
 from labctl.fitting.numeric.arrays import Array
@@ -87,6 +88,11 @@ class FitData:
             white_var=white,
         )
 
+    def through(self, response: Response) -> FitData:
+        """Return the same data sets with the true rates as they come through a response."""
+        channels = self.channels.through(response)
+        return self if channels is self.channels else replace(self, channels=channels)
+
     def white_dps(self, axis: str) -> float | None:
         """Return the white noise of a data-set mean, root mean square, deg/s; None when it is not known."""
         return None if self.white_var is None else float(np.sqrt(self.white_var[axis].mean()))
@@ -154,10 +160,20 @@ def fit_data_of(recording: Recording, covered: Covered | None = None) -> FitData
     info = points.info
     outputs: dict[str, Array] = {axis: points.gyro_dps(axis) for axis in info.axes}
     up_dps = up_rate_dps(info)
-    channels = channels_of(points, up_dps)
+    channels = channels_of(points, up_dps, profile_of(recording))
     if covered is None and recording.info.kind == "samples":
         covered = covered_by_readings(recording, up_dps)
     return FitData(info, channels, outputs, _white(points), covered or covered_by_means(channels))
+
+
+def profile_of(recording: Recording) -> RateProfile | None:
+    """Return the table's rate over the rows of `to_points`; None where each data set has one rate, or without times."""
+    columns = recording.columns
+    if recording.info.motion != "profile" or "t_s" not in columns:
+        return None
+    valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
+    known = {name: np.asarray(columns[name])[valid] for name in ("t_s", "dataset", "table_rate_dps")}
+    return rate_profile(known, windows=recording.info.kind == "samples")
 
 
 def _white(points: Recording) -> dict[str, Array] | None:

@@ -89,7 +89,9 @@ def _with_known_white(
     for axis, surface in surfaces.items():
         known = scatter[axis]
         assert known.white_var is not None
-        if enough:
+        if channels.profile is not None:
+            drift = _drift_of_many(surface, errors_dps[axis], known)
+        elif enough:
             drift = _drift(surface, with_levels_of_temperature(surface, channels, axis), errors_dps[axis], known)
         else:
             drift = Drift(DATASHEET_SHARE * float(stability or 0.0), 1.0)
@@ -98,6 +100,15 @@ def _with_known_white(
     if enough:
         return NoiseFloor(axes, "within and between data sets")
     return NoiseFloor(axes, "within data sets, and by the data sheet" if stability else "within data sets")
+
+
+def _drift_of_many(surface: NDArray[np.float64], error_dps: Array, scatter: Scatter) -> Drift:
+    """Return the drift of far more rows than columns: what the surface (m, k) leaves is taken as it is.
+
+    The k directions that are then missing from it are a share k / m of all.
+    """
+    left = error_dps - surface @ (surface.T @ error_dps)
+    return drift_beside(np.full((len(left), 1), 1.0 / np.sqrt(len(left))), left, scatter)
 
 
 def _drift(surface: NDArray[np.float64], fuller: NDArray[np.float64], error_dps: Array, scatter: Scatter) -> Drift:

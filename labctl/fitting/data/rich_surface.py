@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.levels import level_centres, rate_levels
+from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.data.temperature_levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
 
@@ -28,6 +29,11 @@ WARM_UP_S = (600.0, 3600.0)
 LAGS_S, WIDTHS_K = (150.0, 400.0, 1000.0, 2500.0), (2.0, 6.0, 15.0)
 #: A column of which those before it leave less than this share says nothing new.
 LEAST_NEW = 1e-2
+#: Delays and time constants, s, whose mixtures follow any response of a gyro: the surface of a rate that changes.
+DELAYS_S = (1e-3, -1e-3, 3e-3, 1e-2, 2e-2, 5e-2)
+TIME_CONSTANTS_S = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 1.0, 5.0)
+#: The same share for those: they are nearly alike, and what tells them apart is large beside the noise.
+LEAST_NEW_OF_RESPONSE = 1e-6
 #: What is logged and no cause of an error by itself, or is there in another form.
 NO_SURROUNDINGS = frozenset({
     "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
@@ -44,7 +50,10 @@ def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
     if "turn_deg" in channels:
         warm, rate = _chebyshev(channels.temperature_c(axis), max(DEGREES)), channels.rate_dps(axis)[:, None]
         return _orthonormal(iter([warm[:, 1:4], warm[:, 1:3] * rate]), _linear(channels), MOST_SHARE)
-    return _orthonormal(_blocks(channels, axis), np.zeros((len(channels), 0)), MOST_SHARE)
+    responses = _orthonormal(
+        iter([_of_responses(channels, axis)]), np.zeros((len(channels), 0)), MOST_SHARE, LEAST_NEW_OF_RESPONSE
+    )
+    return _orthonormal(_blocks(channels, axis), responses, MOST_SHARE)
 
 
 def with_levels_of_temperature(surface: NDArray[np.float64], channels: Channels, axis: str) -> NDArray[np.float64]:
@@ -58,7 +67,7 @@ def with_levels_of_temperature(surface: NDArray[np.float64], channels: Channels,
 
 
 def _orthonormal(
-    blocks: Iterator[NDArray[np.float64]], begin: NDArray[np.float64], share: float
+    blocks: Iterator[NDArray[np.float64]], begin: NDArray[np.float64], share: float, least_new: float = LEAST_NEW
 ) -> NDArray[np.float64]:
     m, k = begin.shape
     most = min(int(share * m), m - LEAST_FREE)
@@ -66,7 +75,7 @@ def _orthonormal(
     found[:, :k] = begin
     for block in blocks:
         for column in block.T:
-            if k < most and (new := _new_part(column, found[:, :k])) is not None:
+            if k < most and (new := _new_part(column, found[:, :k], least_new)) is not None:
                 found[:, k] = new
                 k += 1
     return found[:, :k]
@@ -77,12 +86,12 @@ def _linear(channels: Channels) -> NDArray[np.float64]:
     places = [rows.astype(np.float64) for _, rows in channels.positions()]
     found = np.zeros((len(channels), 0))
     for column in (*places, *channels.rates.values()):
-        if (new := _new_part(column, found)) is not None:
+        if (new := _new_part(column, found, LEAST_NEW)) is not None:
             found = np.column_stack([found, new])
     return found
 
 
-def _new_part(column: Array, found: NDArray[np.float64]) -> Array | None:
+def _new_part(column: Array, found: NDArray[np.float64], least_new: float) -> Array | None:
     size = float(np.linalg.norm(column))
     if size == 0:
         return None
@@ -90,7 +99,7 @@ def _new_part(column: Array, found: NDArray[np.float64]) -> Array | None:
     for _ in range(2):  # the second time takes out what rounding left
         left = left - found @ (found.T @ left)
     new = float(np.linalg.norm(left))
-    return np.asarray(left / new) if new > LEAST_NEW else None
+    return np.asarray(left / new) if new > least_new else None
 
 
 def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
@@ -105,7 +114,8 @@ def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
     yield from _of_other_axes(channels, axis, warm)
     for degree in range(1, max(DEGREES) + 1):
         yield np.column_stack([warm[:, degree] * powers[:, n] for n, most in enumerate(DEGREES) if degree <= most])
-    yield _levels_of_rate(channels)
+    if channels.profile is None:
+        yield _levels_of_rate(channels)
     yield from _history(channels, warm, rate)
     for name in sorted(set(channels.columns) - NO_SURROUNDINGS):
         values = channels[name]
@@ -114,6 +124,15 @@ def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
             yield np.column_stack([around, around * rate])
     yield np.column_stack([(place * powers[:, 1:].T).T for place in places.T])
     yield np.column_stack([(place * warm[:, 1:4].T).T for place in places.T])
+
+
+def _of_responses(channels: Channels, axis: str) -> NDArray[np.float64]:
+    """Return the rate as it comes through responses, less the rate, (m, k); none where each data set has one rate."""
+    if channels.profile is None:
+        return np.zeros((len(channels), 0))
+    responses = [Response(delay_s=delay) for delay in DELAYS_S] + [Response(0.0, tau) for tau in TIME_CONSTANTS_S]
+    rate = channels.rate_dps(axis)
+    return np.column_stack([rate, *(channels.through(each).rate_dps(axis) - rate for each in responses)])
 
 
 def _of_other_axes(channels: Channels, axis: str, warm: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:

@@ -141,6 +141,7 @@ class Effect(ABC):
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
     shows_at_rest: bool = False  #: whether it is an error of the bias, at least in part: then it takes no rate to see
     remembers: ClassVar[bool] = False  #: whether it needs the temperatures before, which a state stands for in use
+    exact: ClassVar[bool] = False  #: whether its parameters are all of its shape: then fit alone tells two such apart
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 
     @abstractmethod

@@ -20,6 +20,7 @@ from labctl.fitting.effects import (
     history,
     nonlinearity,
     rate_table,
+    response,
     scale_factor,
     surface,
     thermal,
@@ -39,6 +40,7 @@ _OWN = (
     rate_table,
     thermal,
     history,
+    response,
     environment,
 )
 #: labctl's own entry point: a family lists its effects in its EFFECTS.

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.json_types.models import Origin
 
@@ -112,7 +113,11 @@ class StartTransient(Effect):
     draws = ("time_in_set", "previous_rate")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        decay = channels.decayed(term.parameters.get("tau_s", 4.0))
+        tau_s = term.parameters.get("tau_s", 4.0)
+        if channels.profile is not None:  # the rate changes all the time, and the output creeps after it
+            crept = channels.profile.seen_dps(Response(0.0, tau_s)) - channels.profile.seen_dps(Response())
+            return [Column("start_of_rate", "1", channels.up(axis) * crept)]
+        decay = channels.decayed(tau_s)
         before = np.asarray(channels["previous_rate_dps"], dtype=np.float64) * channels.up(axis)
         return [
             Column("start_of_rate", "1", -channels.rate_dps(axis) * decay),

@@ -11,8 +11,17 @@ from numpy.typing import NDArray
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.common_turn_error import with_common_error
+from labctl.fitting.estimation.response import (
+    first_response,
+    next_response,
+    response_at,
+    response_of,
+    with_response,
+    without_response,
+)
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
@@ -47,14 +56,23 @@ def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] |
 
 
 def _converged(data: FitData, model: ErrorModel, axis: str, fixed: Solution | None) -> tuple[AxisDesign, Solution]:
-    """Return the design at the solution, and the solution: laws by Gauss-Newton steps at one drift, then once more."""
+    """Return the design at the solution, and the solution: laws by Gauss-Newton steps at one drift, then once more.
+
+    A delay and a bandwidth are laws of their own effect, and every other effect sees the rate that comes through both.
+    """
+    response = first_response(data, model, axis)
+    data = data.through(response)
     design = axis_design(data, model, axis)
     solution = _solve_axis(data, model, axis, design, fixed)
     if not design.laws:
         return design, solution
     for _ in range(GAUSS_NEWTON_STEPS):
-        before = solution.values
-        design = axis_design(data, model, axis, _law_coefficients(design, solution))
+        before, at = solution.values, _law_coefficients(design, solution)
+        if data.channels.profile is not None:
+            u_s = _axis_fit(design, solution).u_of(TIME_CONSTANT)
+            response = next_response(response, response_at(at), model, u_s)
+            data, at = data.through(response), with_response(at, response)
+        design = axis_design(data, model, axis, at)
         solution = _solve_axis(data, model, axis, design, fixed or solution)
         if np.allclose(solution.values, before, rtol=1e-7, atol=1e-14):
             break
@@ -95,10 +113,14 @@ def _axis_fit(design: AxisDesign, solution: Solution) -> AxisFit:
 
 
 def residuals(fitted: FittedModel, data: FitData, turning: Mapping[str, Array] | None = None) -> dict[str, Array]:
-    """Return corrected minus true rate, axis -> (m,) deg/s; `turning` holds the fitted once-per-turn Earth rate."""
+    """Return corrected minus true rate, axis -> (m,) deg/s; `turning` holds the fitted once-per-turn Earth rate.
+
+    No correction undoes a delay or a bandwidth, so the true rate is what comes through them.
+    """
     outputs = {a: v - _turning_dps(data, a, (turning or {}).get(a)) for a, v in data.outputs.items()}
-    corrected = fitted.compensate(outputs, data.channels)
-    return {axis: corrected[axis] - data.true_rate_dps(axis) for axis in outputs}
+    corrected = without_response(fitted).compensate(outputs, data.channels)
+    seen = {axis: data.through(response_of(fitted.axes[axis])) for axis in outputs}
+    return {axis: corrected[axis] - seen[axis].true_rate_dps(axis) for axis in outputs}
 
 
 def fit_turning(fitted: FittedModel, data: FitData) -> dict[str, Array]:

@@ -33,6 +33,10 @@ class AxisFit:
         """Standard uncertainties, (k, m); NaN where there were no more data than coefficients."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(self.values.shape)
 
+    def u_of(self, name: str) -> float:
+        """Return the standard uncertainty of a coefficient, the first of a table; NaN where there is none."""
+        return float(self.u[self.names.index(name), 0]) if name in self.names else float("nan")
+
 
 @dataclass(frozen=True)
 class FittedModel:

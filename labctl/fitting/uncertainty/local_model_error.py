@@ -16,6 +16,8 @@ LEAST_NEAR = 3.0
 FARTHEST = 2.0
 #: Of the scatter of the estimate itself this much is the least that is claimed: an error as large would not be seen.
 LEAST_SHARE = 0.25
+#: Data sets beyond this many are averaged in groups of neighbours, of temperatures in so many groups.
+MOST_KEPT, TEMPERATURES = 2000, 10
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,25 @@ class LocalModelError:
         noise = float(weight @ self.white_var[known])
         unseen = LEAST_SHARE * np.sqrt(2 / near) * max(left, noise)
         return float(np.sqrt(max(left - noise, unseen)))
+
+    def thinned(self) -> LocalModelError:
+        """Return the same with the means over groups of neighbouring data sets where there are more than are kept.
+
+        A group has neighbouring rates at neighbouring temperatures; each of its members says as much as any other.
+        """
+        known = np.flatnonzero(np.isfinite(self.left_var))
+        if len(self.left_var) <= MOST_KEPT or len(known) == 0:
+            return self
+        groups = [
+            group
+            for level in np.array_split(known[np.argsort(self.temperature_c[known], kind="stable")], TEMPERATURES)
+            for group in np.array_split(
+                level[np.argsort(self.rate_dps[level], kind="stable")], MOST_KEPT // (10 * TEMPERATURES)
+            )
+            if len(group)
+        ]
+        columns = (self.rate_dps, self.temperature_c, self.left_var, self.white_var)
+        return LocalModelError(*(np.array([column[group].mean() for group in groups]) for column in columns))
 
     def unknown_at(self, rate_dps: float, temperature_c: float) -> str | None:
         """Return why the error there is unknown, in words; None where it is known."""

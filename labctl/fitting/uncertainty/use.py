@@ -76,7 +76,7 @@ def use_evidence(
                 data.channels.temperature_c(axis),
                 left[axis],
                 data.white_var[axis] if data.white_var is not None else np.zeros(len(data)),
-            ),
+            ).thinned(),
             repeatability[axis],
         )
         for axis in data.outputs

@@ -17,6 +17,7 @@ from labctl.recording.points import dataset_starts, temperature_of
 from labctl.recording.quantisation import codes_of
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.sanity.blocks import NO_CHANGE, level_change, noise_of_reading, wander
+from labctl.recording.sanity.profile import lag_of, stretches
 from labctl.recording.turn_means import rates_as_turned
 from labctl.recording.turns import USUAL_U_DEG
 
@@ -75,10 +76,14 @@ def _of_readings(recording: Recording) -> Summary:
     starts = dataset_starts(np.asarray(rows["dataset"], dtype=np.int64))
     if recording.info.motion == "turns":
         rows["rate_as_turned_dps"] = rates_as_turned(recording)[valid]
-    sets = [
-        _one_set(recording.info, rows, outputs, slice(int(begin), int(end)))
+    whole = [
+        slice(int(begin), int(end))
         for begin, end in zip(starts, np.append(starts[1:], len(rows["dataset"])), strict=True)
     ]
+    if recording.info.motion == "profile":
+        sets = [one for here in whole for one in _stretches(recording.info, rows, outputs, here)]
+    else:
+        sets = [_one_set(recording.info, rows, outputs, here) for here in whole]
     return Summary(recording.info, {name: np.array([one[name] for one in sets]) for name in sets[0]})
 
 
@@ -106,6 +111,26 @@ def _one_set(
         figures = _output(values[here], None if warm is None else warm[here], at_rest=not rate.any())
         found |= {f"{name}_{axis}": value for name, value in figures.items()}
     return found
+
+
+def _stretches(
+    info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], whole: slice
+) -> list[dict[str, Any]]:
+    """Return stretches of a data set whose rate changes, with the output as if it were not late."""
+    rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)[whole]
+    here = {name: values[whole] for name, values in rows.items()}
+    place = _place(info, here, 0)
+    axis = place["position"].lstrip("-")
+    steps = np.diff(np.asarray(here["t_s"], dtype=np.float64))
+    lag = lag_of(
+        rate, outputs.get(axis, next(iter(outputs.values())))[whole], float(np.median(steps)) if len(steps) else 1.0
+    )
+    n = len(rate) - abs(lag)
+    early, late = max(-lag, 0), max(lag, 0)
+    here = {name: values[early : early + n] for name, values in here.items()}
+    moved = {name: values[whole][late : late + n] for name, values in outputs.items()}
+    ends = {"rate_low_dps": float(rate.min()), "rate_high_dps": float(rate.max())}
+    return [{**_one_set(info, here, moved, part), **ends} for part in stretches(n)]
 
 
 def _place(info: RecordingInfo, rows: Columns, row: int) -> dict[str, Any]:

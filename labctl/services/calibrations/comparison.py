@@ -30,17 +30,21 @@ class Errors(Protocol):
         """On temperatures left out of the fit."""
 
 
-def worse_than_raw(error: Errors) -> list[Finding]:
-    """Return a finding, a certain one, where a fit leaves more of its own data than there was without correction."""
+def worse_than_raw(error: Errors, *, late: bool = False) -> list[Finding]:
+    """Return a finding, a certain one, where a fit leaves more of its own data than there was without correction.
+
+    With `late`, of a fit without delay and bandwidth to rates that change, these are the likely cause.
+    """
     raw, left = error.raw_rms_dps, error.rms_dps
     if raw is None or left is None or not left > (1.0 + ROUNDING) * raw:
         return []
     return [
         Finding(
-            "worse", "certain", "fit",
+            "worse", "likely" if late else "certain", "fit",
             f"its residual on the data of the fit is {left:.4g} deg/s RMS, and the error without correction is "
             f"{raw:.4g} deg/s", left, "deg/s", f"less than {raw:.4g} deg/s",
-            "check sign, unit and axes of the output, or choose another model",
+            "add time_delay and bandwidth to the effects" if late
+            else "check sign, unit and axes of the output, or choose another model",
         )
     ]  # fmt: skip
 

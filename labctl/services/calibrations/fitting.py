@@ -8,6 +8,7 @@ from datetime import datetime
 from labctl.calibration import build_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
+from labctl.fitting.effects.response import IDS
 from labctl.fitting.uncertainty import evidence_of
 from labctl.json_types.models import KeptFit
 from labctl.services.calibrations.certification import certification_response, version_in_force
@@ -48,7 +49,8 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
     source = source_of(store, row)
     covered = covered_of(found, source.info) if row.kind == "samples" else None
     result = fit(source, request.model, request.effects, covered=covered)
-    warnings = [*found.warnings, *map(warning_of, worse_than_raw(result.error))]
+    late = source.info.motion == "profile" and IDS.isdisjoint(result.fitted.model.effect_ids)
+    warnings = [*found.warnings, *map(warning_of, worse_than_raw(result.error, late=late))]
     refuse_wrong(warnings, f"fit of recording {recording} of {serial}", accepted=request.accept_warnings)
     evidence = evidence_of(source, request.model, request.effects)
     run = store.campaigns.get(campaign) if campaign is not None else None

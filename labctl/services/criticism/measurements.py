@@ -14,7 +14,7 @@ from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.output_steps import per_reading, quantisation_of
 from labctl.services.recordings.inspection import inspect_stored
-from labctl.services.recordings.loading import points_of
+from labctl.services.recordings.loading import is_profile, points_of
 from labctl.services.schemas.warnings import RecordingInspection
 from labctl.store import RecordingRow, Store
 
@@ -53,7 +53,8 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) ->
             f"recording {row.id} is a table of coefficients: a model is compared with readings or means; name a "
             "recording of these"
         )
-    if row.kind != "samples" or points.info.motion == "turns":
+    # turns are integrals over all readings, and of a rate that changes decimated readings are those of another
+    if row.kind != "samples" or points.info.motion == "turns" or is_profile(row):
         return points
     refuse_poses(points.info)
     info = points.info.model_copy(update={"kind": "samples"})

@@ -22,8 +22,11 @@ from labctl.store import RecordingRow, Store
 def points_of(store: Store, row: RecordingRow) -> Recording:
     """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces.
 
-    Of turns they are integrals over the readings, which are few.
+    Of turns they are integrals over the readings, which are few. Where the rate changes within data sets (motion
+    "profile") every reading is returned: a fit needs the rate of each.
     """
+    if is_profile(row):
+        return store.recordings.samples(row.id)
     points = store.recordings.points(row.id, head=row)
     if row.kind != "samples":
         return points
@@ -48,6 +51,11 @@ def source_of(store: Store, row: RecordingRow) -> Recording:
 def motion_of(row: RecordingRow) -> str:
     """Return what moved the unit."""
     return str(row.info.get("motion", "rates"))
+
+
+def is_profile(row: RecordingRow) -> bool:
+    """Return whether a recording holds readings whose rate changes within data sets."""
+    return row.kind == "samples" and row.info.get("motion") == "profile"
 
 
 def _with_steps(points: Recording, found: RecordingInspection) -> Recording:

@@ -9,6 +9,7 @@ from labctl.fitting.criticism.reduction.basis import LEAST_INDEPENDENT_SHARE, ST
 from labctl.fitting.criticism.reduction.decimation import decimate
 from labctl.fitting.criticism.reduction.outliers import OUTLIER
 from labctl.fitting.criticism.reduction.points import reduce_points
+from labctl.fitting.criticism.reduction.profile import reduce_profile
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
 from labctl.fitting.criticism.reduction.samples import reduce_samples
 from labctl.fitting.data.temperature_channel import with_temperature
@@ -23,6 +24,8 @@ def reduce_recording(recording: Recording, *, outliers: bool = True) -> ReducedR
     Raises NotEnoughData where the recording has no temperature.
     """
     recording = with_temperature(recording)
+    if recording.info.motion == "profile" and "t_s" in recording.columns:
+        return reduce_profile(recording)
     if recording.info.kind == "points" or recording.info.motion == "turns":
         return reduce_points(recording)
     return reduce_samples(recording, outliers=outliers)

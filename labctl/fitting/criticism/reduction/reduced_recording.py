@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.data.channels import Carrier, Channels
+from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.data.static_record import StaticRecord
 from labctl.fitting.effects import Column
 from labctl.fitting.numeric.arrays import Array
@@ -32,6 +33,11 @@ class ReducedRecording:
 
     def __len__(self) -> int:
         return self.present.shape[1]
+
+    def through(self, response: Response) -> ReducedRecording:
+        """Return the same recording with the true rates as they come through a response."""
+        nodes = self.nodes.through(response)
+        return self if nodes is self.nodes else replace(self, nodes=nodes)
 
     def error_dps(self, axis: str) -> NDArray[np.float64]:
         """Return the coordinates of output minus true rate of an axis, (R, m) deg/s."""

@@ -16,6 +16,7 @@ from labctl.fitting.criticism.evidence.elimination import ScaledBase, WhitenedBa
 from labctl.fitting.criticism.evidence.gains import gains_of
 from labctl.fitting.criticism.model_comparison import Comparison, centred, compare_models, constant_coordinates
 from labctl.fitting.criticism.ranking import Candidate
+from labctl.fitting.criticism.search.exact_shapes import exact_terms, stepped_terms
 from labctl.fitting.criticism.search.steps import refined_steps
 from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.progress import report_stage
@@ -51,6 +52,8 @@ def refined_term(comparison: Comparison, candidate: Candidate) -> Term:
     assert term is not None
     if kind is None:
         return term
+    if kind.exact:
+        return stepped_terms(comparison, (*exact_terms(comparison.model.terms), term), candidate.option)[-1]
     for name in term.parameters:
         if name not in CHOICES:
             report_stage(f"refining the shape of {candidate.id}")

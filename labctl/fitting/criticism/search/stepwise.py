@@ -12,8 +12,9 @@ from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.evidence.design import Discrepancy
 from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside, on_axis
-from labctl.fitting.criticism.ranking import Candidate
+from labctl.fitting.criticism.ranking import Candidate, are_exact
 from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
+from labctl.fitting.criticism.search.exact_shapes import with_exact_terms
 from labctl.fitting.criticism.search.free_shapes import beside_terms, channels_beside_smooth, channels_of_free_shape
 from labctl.fitting.criticism.search.held_out import held_out_rises
 from labctl.fitting.criticism.search.merging import merged
@@ -100,7 +101,7 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
             findings = []
         form = _form(findings) if findings else "unexplained"
     depends = depends or step.depends_on or _driver_of(initial, step)
-    found = tuple(finding.term for finding in findings)
+    found = with_exact_terms(first, tuple(finding.term for finding in findings))
     if findings:
         wrong_by = together([finding.discrepancy for finding in findings])
         beside = beside_terms(first, found, wrong_by) if final is initial else final  # a pair is not in `final`
@@ -109,7 +110,7 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
     remainder = remainder_of(first, final, found, catalogue) if findings else None
     if remainder is not None and remainder["share"] > MOST_LEFT:
         return _unnamed(initial, tuple(remainder["depends_on"]))
-    terms = {finding.term.effect: finding.term for finding in findings}
+    terms = {term.effect: term for term in found}
     kept = depends if findings or form == "unexplained" else ()
     groups = tuple(finding.group for finding in findings)
     alike = not_physical_group(initial, step.leader) if step.leader is not None and findings else ()
@@ -200,6 +201,7 @@ def _compared_beside(
 ) -> tuple[Comparison, Step]:
     """Return the comparison beside effects that were found, and its judgement."""
     terms = (*first.model.terms, *(replace(finding.term, steady=True) for finding in findings))
+    terms = with_exact_terms(first, terms)
     discrepancy = together([finding.discrepancy for finding in findings])
     beside = compare_beside(first, first.model.with_terms(terms), catalogue, discrepancy)
     return _judged(beside, catalogue, first=False)
@@ -227,7 +229,7 @@ def _is_shape_error(before: Comparison, named: Step, after: Comparison, step: St
     Compared with what that effect did where the new one does most: the wrong shape of a wave within data sets leaves
     waves, and hardly anything between them.
     """
-    if step.leader is None or named.leader is None:
+    if step.leader is None or named.leader is None or are_exact(step.leader, named.leader):
         return False
     least = NEXT_SHARE if _is_one(before, named) else NEXT_SHARE_AMBIGUOUS
     of_new, of_old = _within_and_between(after, step.leader), _within_and_between(before, named.leader)
@@ -263,7 +265,8 @@ def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray
 def _judged(comparison: Comparison, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Comparison, Step]:
     """Return the judgement; where it is not clearly one effect, it is made again with the leaders' shapes refined."""
     step = judge(comparison, first=first)
-    clear = step.form == "missing" and not _has_rival(comparison) and not may_be_step(comparison)
+    exact = step.leader is not None and are_exact(step.leader)
+    clear = step.form == "missing" and not exact and not _has_rival(comparison) and not may_be_step(comparison)
     if step.form == "adequate" or clear:
         return comparison, step
     comparison = with_refined_leaders(comparison, catalogue, NOTICED)

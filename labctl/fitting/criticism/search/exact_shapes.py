@@ -1,0 +1,77 @@
+"""Parameters of effects whose shape follows from them alone: by Gauss-Newton steps beside the base, as a fit does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from labctl.fitting.criticism.base_columns import base_of
+from labctl.fitting.criticism.candidates import option_of
+from labctl.fitting.criticism.model_comparison import Comparison
+from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.effects import Term, kind_of
+from labctl.fitting.effects.response import response_of_terms
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.numeric.arrays import Array
+
+#: Steps, and the change, as a share of the parameters, at which they end.
+STEPS, CLOSE = 15, 1e-6
+#: Least value of a parameter, in its unit, and the share of it that one step leaves.
+LEAST, LEAST_LEFT = 1e-6, 0.25
+
+
+def exact_terms(terms: Iterable[Term]) -> tuple[Term, ...]:
+    """Return the terms of which the parameter is all of the shape."""
+    return tuple(term for term in terms if kind_of(term).exact and term.parameters)
+
+
+def stepped_terms(comparison: Comparison, terms: tuple[Term, ...], axes: Iterable[str]) -> tuple[Term, ...]:
+    """Return exact terms with the parameters that fit best together, each the mean over the axes.
+
+    At each step the rest of the model sees the rate that comes through them, so that the size of the rest, a scale
+    factor of some per cent, does not enter their parameters.
+    """
+    chosen = list(axes)
+    rest = comparison.model.with_terms(
+        tuple(term for term in comparison.model.terms if term not in exact_terms(comparison.model.terms))
+    )
+    for _ in range(STEPS):
+        data = comparison.data.through(response_of_terms(terms))
+        steps = np.mean([_steps(comparison, data, rest, axis, terms) for axis in chosen], axis=0)
+        before = np.array([next(iter(term.parameters.values())) for term in terms])
+        after = np.maximum(before + steps, np.maximum(LEAST_LEFT * before, LEAST))
+        terms = tuple(
+            replace(term, parameters={next(iter(term.parameters)): value})
+            for term, value in zip(terms, after.tolist(), strict=True)
+        )
+        if np.all(np.abs(after - before) <= CLOSE * before):
+            break
+    return terms
+
+
+def with_exact_terms(comparison: Comparison, terms: tuple[Term, ...]) -> tuple[Term, ...]:
+    """Return terms, in their order, of which several exact ones have the parameters that fit best together."""
+    if len(exact := exact_terms(terms)) < 2:
+        return terms
+    shapes = {term.effect: term for term in stepped_terms(comparison, exact, comparison.axes)}
+    return tuple(shapes.get(term.effect, term) for term in terms)
+
+
+def _steps(
+    comparison: Comparison, data: ReducedRecording, rest: ErrorModel, axis: str, terms: tuple[Term, ...]
+) -> Array:
+    """Return by how much each parameter should change on one axis, by weighted least squares beside the rest."""
+    made = [option_of(data, axis, rest.reference, kind_of(term), term) for term in terms]
+    tangents = [option.rows for option in made if option is not None]
+    if len(tangents) < len(terms):
+        return np.zeros(len(terms))
+    base, _ = base_of(data, rest, axis)
+    scale = comparison.scales[axis].copy()
+    scale[0] = np.sqrt(comparison.white_var[axis] + comparison.axes[axis].best.noise.size_dps ** 2)
+    kept = comparison.designs[axis].present
+    columns = np.concatenate([base, *tangents], axis=2)[kept] / scale[kept][:, None]
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    solution, *_ = np.linalg.lstsq(columns / size, data.error_dps(axis)[kept] / scale[kept], rcond=1e-10)
+    return np.asarray((solution / size)[base.shape[2] :])

@@ -1,0 +1,156 @@
+"""Rates that change, reading by reading, and what a gyro with a delay and a finite bandwidth sees of them.
+
+The response is linear, so it is applied as a factor on the spectrum of each even stretch of readings: exact at every
+delay and time constant for rates that are sampled fast enough, derivatives along both included. The result is averaged
+over the windows over which the output was averaged, so that both sides of the comparison lost the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+from scipy.interpolate import CubicSpline
+
+from labctl.fitting.numeric.arrays import Array
+from labctl.recording import Columns, dataset_starts
+from labctl.recording.windows import kept_windows, stretch_starts, window_labels
+
+#: Times after which a response has forgotten what was before: time constants, and steps of the readings.
+FORGOTTEN_TAUS, FORGOTTEN_STEPS = 30.0, 256
+#: Beyond the ends of a stretch a rate goes on for about this many steps with the slope that it had over as many.
+BEND_STEPS, SLOPE_STEPS = 64, 8
+#: Readings off an even spacing by more than this share of it are interpolated onto one, and back.
+EVEN_SHARE = 1e-3
+#: Means over windows that are kept for another time: 0.2 MB each.
+MOST_KNOWN = 128
+#: Names of the coefficients of a response.
+DELAY, TIME_CONSTANT = "delay", "time_constant"
+#: A factor on a spectrum: angular frequencies (k,) rad/s to complex numbers (k,).
+Factor = Callable[[Array], NDArray[np.complex128]]
+
+
+@dataclass(frozen=True)
+class Response:
+    """A delay behind a first-order response: what an output follows of the rate, exp(-i w delay) / (1 + i w T)."""
+
+    delay_s: float = 0.0
+    time_constant_s: float = 0.0
+
+    def gain(self, rad_s: Array) -> NDArray[np.complex128]:
+        """Return the gain at angular frequencies (k,) rad/s."""
+        return np.asarray(np.exp(-1j * rad_s * self.delay_s) / (1 + 1j * rad_s * self.time_constant_s))
+
+    def slope(self, name: str, rad_s: Array) -> NDArray[np.complex128]:
+        """Return the derivative of the gain along `DELAY` or `TIME_CONSTANT`, 1/s."""
+        own = -1j * rad_s
+        return np.asarray(own * self.gain(rad_s) / (1.0 if name == DELAY else 1 + 1j * rad_s * self.time_constant_s))
+
+    def value(self, name: str) -> float:
+        """Return a coefficient of the response by its name, s."""
+        return self.delay_s if name == DELAY else self.time_constant_s
+
+    def with_value(self, name: str, value: float) -> Response:
+        """Return the response with another delay or time constant, s."""
+        return replace(self, **{"delay_s" if name == DELAY else "time_constant_s": value})
+
+    @property
+    def memory_s(self) -> float:
+        """How long it takes to forget, s."""
+        return 2 * abs(self.delay_s) + FORGOTTEN_TAUS * abs(self.time_constant_s)
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """The rates of all readings (n,) deg/s, in even stretches, and the first reading of each window (m,)."""
+
+    t_s: Array
+    rate_dps: Array
+    stretches: NDArray[np.int64]
+    windows: NDArray[np.int64]
+    known: dict[tuple[str, Response], Array] = field(default_factory=dict, repr=False)
+
+    def means(self, name: str, response: Response, factor: Factor) -> Array:
+        """Return the means over all windows, (m,), of what a factor makes of the rates; kept under name and response.
+
+        Only the last ones are kept: a fit comes back to the same responses for every axis and every fold.
+        """
+        key = (name, response)
+        if key not in self.known:
+            ends = np.append(self.stretches[1:], len(self.t_s))
+            values = np.concatenate([
+                _filtered(self.t_s[begin:end], self.rate_dps[begin:end], factor, response.memory_s)
+                for begin, end in zip(self.stretches, ends, strict=True)
+            ])  # fmt: skip
+            counts = np.diff(np.append(self.windows, len(values)))
+            if len(self.known) >= MOST_KNOWN:
+                self.known.pop(next(iter(self.known)))
+            self.known[key] = np.add.reduceat(values, self.windows) / counts
+        return self.known[key]
+
+
+@dataclass(frozen=True, eq=False)
+class RateProfile:
+    """The table's rate over some windows of a recording, through any response; it knows the rates of all readings."""
+
+    motion: _Motion
+    rows: NDArray[np.int64]  #: (n,) the windows that are meant
+
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RateProfile:
+        """Return the profile of some of these windows, by index or mask."""
+        return replace(self, rows=self.rows[rows])
+
+    def seen_dps(self, response: Response) -> Array:
+        """Return the mean over each window, (n,) deg/s, of the rate as it comes through a response."""
+        return self.motion.means("", response, response.gain)[self.rows]
+
+    def slope(self, name: str, response: Response) -> Array:
+        """Return the derivative of that along `DELAY` or `TIME_CONSTANT`, (n,) deg/s^2."""
+        return self.motion.means(name, response, lambda rad_s: response.slope(name, rad_s))[self.rows]
+
+
+def rate_profile(columns: Columns, *, windows: bool) -> RateProfile:
+    """Return the rates of valid readings, (n,) each of `t_s`, `dataset` and `table_rate_dps`.
+
+    Rows are the windows that `to_points` keeps; without `windows` each reading is one.
+    """
+    labels = window_labels(columns) if windows else np.arange(len(columns["t_s"]))
+    starts = dataset_starts(labels)
+    motion = _Motion(
+        np.asarray(columns["t_s"], dtype=np.float64),
+        np.asarray(columns["table_rate_dps"], dtype=np.float64),
+        stretch_starts(columns),
+        starts,
+    )
+    return RateProfile(motion, kept_windows(columns, labels) if windows else np.arange(len(starts)))
+
+
+def _filtered(t_s: Array, rate_dps: Array, factor: Factor, memory_s: float) -> Array:
+    """Return what a factor on the spectrum makes of rates (n,); before and after them they soon stay what they are."""
+    n = len(rate_dps)
+    if n < 2:
+        return np.asarray(rate_dps * float(np.real(factor(np.zeros(1))[0])))
+    step_s = float(t_s[-1] - t_s[0]) / (n - 1)
+    even = t_s[0] + step_s * np.arange(n)
+    is_even = bool(np.max(np.abs(t_s - even)) < EVEN_SHARE * step_s)
+    values = rate_dps if is_even else CubicSpline(t_s, rate_dps)(even)
+    spare = FORGOTTEN_STEPS + int(np.ceil(memory_s / step_s))
+    total = int(next_fast_len(n + 3 * spare, real=True))
+    back = total - n - 2 * spare  # the way back from the last rate to the first, smoothly
+    bend = 0.5 - 0.5 * np.cos(np.pi * (np.arange(back) + 0.5) / back)
+    before, after = _beyond(values[::-1], spare)[::-1], _beyond(values, spare)
+    whole = np.concatenate([before, values, after, after[-1] + (before[0] - after[-1]) * bend])
+    rad_s: Array = np.asarray(2 * np.pi * np.fft.rfftfreq(total, step_s), dtype=np.float64)
+    spectrum: NDArray[np.complex128] = np.asarray(np.fft.rfft(whole), dtype=np.complex128)
+    seen = np.fft.irfft(np.multiply(spectrum, factor(rad_s)), total)[spare : spare + n]
+    return np.asarray(seen if is_even else CubicSpline(even, seen)(t_s))
+
+
+def _beyond(values: Array, number: int) -> Array:
+    """Return how values (n,) go on, (number,): with their slope at first, so that no kink rings, then constant."""
+    last = min(SLOPE_STEPS, len(values) - 1)
+    slope = float(values[-1] - values[-1 - last]) / last
+    return np.asarray(values[-1] - slope * BEND_STEPS * np.expm1(-(np.arange(number) + 1) / BEND_STEPS))

@@ -1,0 +1,101 @@
+"""What the output is late by and how fast it can follow: seen only while the rate changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT, Response
+from labctl.fitting.effects.base import Column, Effect, Law, Parameter, Reference, Rows, Span, Term, by_parameter
+from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.models import Origin
+
+
+class _Responding(Effect):
+    """A part of the response. Every other effect sees the rate that has come through the whole response."""
+
+    in_use = False  # what is late cannot be undone reading by reading, nor what the output does not follow
+    exact = True
+    origin: ClassVar[Origin] = "sensor"
+    rows: ClassVar[Rows] = "own"
+    name: ClassVar[str]
+
+    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
+        """Return the change of the rate with the delay or time constant, from that of the channels' response on."""
+        profile, here = channels.profile, channels.response
+        if profile is None:
+            return [Column(self.name, "s", np.zeros(len(channels)))]
+        up, present = channels.up(axis), here.value(self.name)
+        value = term.parameters.get(self._parameter, present)
+
+        def error_dps(coefficient: Array) -> Array:
+            then = here.with_value(self.name, float(coefficient[0]) if len(coefficient) else present)
+            return np.asarray(up * (profile.seen_dps(then) - profile.seen_dps(here)))
+
+        def slope(coefficient: Array) -> Array:
+            then = here.with_value(self.name, float(coefficient[0]) if len(coefficient) else present)
+            return np.asarray(up * profile.slope(self.name, then))
+
+        at = np.full(len(channels), value)
+        shape = slope(at) if value == present else error_dps(at) / (value - present)
+        return [Column(self.name, "s", shape, law=Law(error_dps, slope), start=value)]
+
+    @property
+    def _parameter(self) -> str:
+        return self.parameters[0].name
+
+    def shaped_by(self, term: Term, coefficients: Mapping[str, float]) -> Term:
+        if not coefficients:
+            return term
+        mean = sum(coefficients.values()) / len(coefficients)
+        return Term(term.effect, term.order, {self._parameter: mean}, term.formula, term.steady)
+
+    def options(self, span: Span) -> list[Term]:
+        (parameter,) = self.parameters
+        return by_parameter(self.id, **{parameter.name: parameter.grid(8)})
+
+
+class TimeDelay(_Responding):
+    """Delay of the output."""
+
+    id = "time_delay"
+    term = "Time delay (latency)"
+    sentence = "The output is that of a moment ago: while the rate changes it is off by delay times acceleration."
+    name = DELAY
+    parameters = (Parameter("delay_s", "s", 2e-4, 0.1, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.03), "piezo": (0.0, 0.03)}
+    experiment = "a sine sweep up to the bandwidth: a delay keeps the size of the output, a low bandwidth does not"
+    draws = ("time",)
+
+
+class Bandwidth(_Responding):
+    """Finite bandwidth of the output."""
+
+    id = "bandwidth"
+    term = "Bandwidth (first-order response)"
+    sentence = "The output follows a change of the rate like a first-order filter: late, and less the faster it is."
+    name = TIME_CONSTANT
+    parameters = (Parameter("time_constant_s", "s", 2e-4, 0.1, logarithmic=True),)
+    ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.05)}
+    experiment = "a sine sweep up to the bandwidth: a delay keeps the size of the output, a low bandwidth does not"
+    draws = ("time",)
+
+
+#: The effects of which the response is made.
+IDS = frozenset({TimeDelay.id, Bandwidth.id})
+
+
+def response_of_terms(terms: Iterable[Term]) -> Response:
+    """Return the response that the terms of a model have as their parameters."""
+    found = Response()
+    for term in terms:
+        if term.effect in IDS:
+            for value in term.parameters.values():
+                found = found.with_value(DELAY if term.effect == TimeDelay.id else TIME_CONSTANT, value)
+    return found
+
+
+EFFECTS: tuple[type[Effect], ...] = (TimeDelay, Bandwidth)
