@@ -66,7 +66,7 @@ def ardupilot(warm: Array, rate: Array) -> Law:
 
 
 def across_legs(recording: Recording) -> dict[str, float]:
-    """Return method -> root mean square of the minutes of each leg by a fit to the legs of the other direction, deg/s."""
+    """Return method -> root mean square of the minutes of each leg by a fit to the other legs, deg/s."""
     points = to_points(recording)
     data = fit_data_of(points)
     legs = legs_of(data.temperature_c, np.ones(len(data), dtype=np.int64))

@@ -49,8 +49,10 @@ class Moves:
     def take(self, rows: NDArray[np.bool_]) -> Moves:
         """Return some of the moves, by mask (m,)."""
         kept = tuple(why for why, keep in zip(self.why_not, rows, strict=True) if keep)
-        arrays = (self.before, self.t_s, self.rate_dps, self.step_s, self.share, self.jitter_s)
-        return Moves(*(values[rows] for values in arrays), self.density, kept)
+        return Moves(
+            self.before[rows], self.t_s[rows], self.rate_dps[rows], self.step_s[rows], self.share[rows],
+            self.jitter_s[rows], self.density, kept,
+        )  # fmt: skip
 
 
 def moves_between(readings: PoseReadings, rests: Rests, gyro_dps: NDArray[np.float64] | None = None) -> Moves:

@@ -88,8 +88,8 @@ def find_rests(readings: PoseReadings) -> Rests:
     begin, end = begin[long], end[long]
     if len(begin) == 0:
         raise NotEnoughData(
-            f"{readings.info.serial}: the recording has no rest of {LEAST_REST_S:g} s; lay the unit down between "
-            "turns for 2 s or more, in many poses"
+            f"{readings.info.serial}: the recording has no rest of {LEAST_REST_S:g} s; lay the unit "
+            "down between turns for 2 s or more, in many poses"
         )
     accel, gyro = _means(readings.accel_g, begin, end), _means(readings.gyro_dps, begin, end)
     still = ~_turning(gyro)
@@ -131,8 +131,8 @@ def _require_quiet(serial: str, noise: Array) -> None:
     if accel > NOISIEST_G or gyro > NOISIEST_DPS:
         raise NotEnoughData(
             f"{serial}: nothing rests in the recording: its quietest half seconds scatter by {accel:.2g} g and "
-            f"{gyro:.2g} deg/s (at rest at most {NOISIEST_G:g} g and {NOISIEST_DPS:g} deg/s); lay the unit down between "
-            "turns for 2 s or more, in many poses"
+            f"{gyro:.2g} deg/s (at rest at most {NOISIEST_G:g} g and {NOISIEST_DPS:g} deg/s); lay the unit "
+            "down between turns for 2 s or more, in many poses"
         )
 
 
