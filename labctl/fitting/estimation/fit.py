@@ -54,7 +54,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     require_enough_data(used, model)
     found = solve_axes(used, model)
     fitted = FittedModel(_with_shapes(model, found.fits), found.fits)
-    residual = residuals(fitted, data, found.turning)
+    residual = residuals(fitted, data, found.nuisance)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
     floor = data.noise_floor
     error = ErrorFigures(
