@@ -7,6 +7,7 @@ from typing import Literal, NotRequired
 from typing_extensions import TypedDict
 
 from labctl.json_types.findings import FindingJson
+from labctl.json_types.joint import JointJson
 
 Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
 
@@ -149,6 +150,7 @@ class FitResultJson(TypedDict):
     noise: dict[str, AxisNoiseJson]
     environment: FitEnvironment
     reference_temperature_c: float
+    joint: NotRequired[JointJson]
 
 
 class LeftOut(TypedDict):

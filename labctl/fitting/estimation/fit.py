@@ -16,6 +16,7 @@ from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.coefficient_tables import from_coefficients
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held_out import held_out_errors
+from labctl.fitting.estimation.joint import joint_findings
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.estimation.validity import valid_rates_dps
@@ -68,6 +69,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         {axis: _noise_json(floor.axes[axis], solution) for axis, solution in found.solutions.items()},
         _environment(data, found.turning),
         residual,
+        joint_findings(data, model, preset, found),
     )
 
 

@@ -12,6 +12,7 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import none_for_nan
+from labctl.json_types.joint import JointJson
 from labctl.json_types.models import (
     AxisNoiseJson,
     Coefficient,
@@ -33,12 +34,13 @@ class FitResult:
     noise: Mapping[str, AxisNoiseJson] = field(default_factory=dict)  #: axis -> white noise and drift, as JSON
     environment: FitEnvironment = field(default_factory=FitEnvironment)
     residual_dps: Mapping[str, Array] = field(default_factory=dict)  #: axis -> (m,) corrected minus true rate, deg/s
+    joint: JointJson | None = None  #: what several recordings say together; None for a single one
 
     def to_json(self) -> FitResultJson:
         """Return what `labctl fit --json` gives of the model, besides serial and version."""
         model = self.fitted.model
         whole = model.to_dict()
-        return {
+        found: FitResultJson = {
             "model": {
                 "name": model.name,
                 "effects": model.effect_ids,
@@ -54,6 +56,9 @@ class FitResult:
             "environment": self.environment,
             "reference_temperature_c": model.reference.temperature_c,
         }
+        if self.joint is not None:
+            found["joint"] = self.joint
+        return found
 
 
 def coefficients_json(model: ErrorModel, fit: AxisFit) -> Coefficients:
