@@ -9,6 +9,7 @@ from labctl.cli.output import console, format_number, print_warnings, table
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
 if TYPE_CHECKING:
+    from labctl.json_types.joint import JointJson
     from labctl.json_types.models import Coefficients, Entry
     from labctl.services.schemas.calibrations import FitResponse
     from labctl.services.schemas.certification import CertificationResponse
@@ -27,6 +28,7 @@ def print_fit(answer: FitResponse) -> None:
     slow, fast = answer.validity.rate_dps
     rates = "any rate" if slow is None or fast is None else f"{slow:.4g} to {fast:.4g} deg/s"
     console.print(f"  valid              {low:.1f} to {high:.1f} deg C, {rates}")
+    print_joint(answer.joint)
     for axis, content in answer.axes.items():
         coefficients = content["coefficients"]
         if isinstance(nodes := coefficients.get("temperature_c"), list):
@@ -39,6 +41,19 @@ def print_fit(answer: FitResponse) -> None:
             shown = rounded_to_uncertainty(value, u)
             rows.add_row(name, unit, shown.value + shown.power, shown.u + shown.power if shown.u else "-")
         console.print(rows)
+
+
+def print_joint(joint: JointJson | None) -> None:
+    """Print what several recordings say together, if there are several."""
+    if joint is None:
+        return
+    numbers = ", ".join(map(str, joint["recordings"]))
+    console.print(f"  recordings         {numbers}, fitted together")
+    for line in joint["held_out"]:
+        error = f"{format_number(line['rms_dps'])} deg/s RMS" if line["rms_dps"] is not None else line["why"]
+        console.print(f"  without {line['recording']:<10} {error} on it, by a fit to the others", markup=False)
+    for sentence in joint["text"]:
+        console.print(f"  {sentence}", markup=False, soft_wrap=True)
 
 
 def print_certification(answer: CertificationResponse) -> None:

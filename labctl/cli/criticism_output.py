@@ -47,7 +47,7 @@ def print_criticism(answer: CriticismResponse) -> None:
         console.print(line, style="bold" if line is answer.text[0] else None, markup=False, soft_wrap=whole)
     error = answer.error
     console.print(
-        f"{answer.serial} version {answer.version}, recording {answer.recording}: "
+        f"{answer.serial} version {answer.version}, recording {', '.join(map(str, answer.recordings or [answer.recording]))}: "
         f"left {format_number(error['rms_dps'])} deg/s, "
         f"held-out {format_number(error['heldout_rms_dps'])}, noise floor {format_number(error['noise_floor_dps'])}",
         style="dim",
@@ -135,8 +135,11 @@ def _print_map(picture: ResidualMap, columns: int = 21) -> None:
 def print_improvement(answer: ImproveResponse) -> None:
     """Print what a change brought."""
     before = answer.before
+    from labctl.cli.calibration_output import print_joint
+
     print_warnings(answer.warnings)
     console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {answer.parent}: {answer.model.name}")
+    print_joint(answer.joint)
     rows = table("", "deg/s", "before", "after", numbers=2)
     rows.add_row("RMS", format_number(before.rms_dps), format_number(answer.error.rms_dps))
     rows.add_row("held-out", format_number(before.heldout_rms_dps), format_number(answer.error.heldout_rms_dps))

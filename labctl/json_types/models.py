@@ -169,6 +169,7 @@ class ChangeFigures(FitResultJson):
     """What is said of a change of effects, whether it is kept or not."""
 
     recording: int
+    recordings: list[int]
     improved_from: int
     before: ErrorFiguresJson
     plausible: dict[str, UsualRange]
@@ -181,6 +182,7 @@ class KeptFit(FitResultJson):
     serial: str
     version: int
     recording: int
+    recordings: list[int]
     campaign: int | None
     recipe: str | None
     bench: str | None

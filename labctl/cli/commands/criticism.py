@@ -14,7 +14,7 @@ from labctl.cli.criticism_output import (
     print_verification,
 )
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
+from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, RecordingIds, Serial, recording_numbers
 from labctl.cli.output import print_json
 from labctl.cli.stage_line import stage_line
 
@@ -56,7 +56,7 @@ def verify(
 def criticise(
     serial: Serial,
     version: VersionOption = None,
-    recording: RecordingId = None,
+    recording: RecordingIds = None,
     other_unit: OtherUnit = False,
     formula: FormulaOption = None,
     next_recipe: Annotated[
@@ -68,14 +68,16 @@ def criticise(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Hold a version against a recording: what is left, where, and which effect may be missing."""
+    """Hold a version against a recording, or several together: what is left, where, and which effect may be missing."""
     from labctl.services.commands.open import open_readonly
     from labctl.services.criticism.criticise import criticise_unit, write_next
 
     with one_clear_line(), open_readonly(database) as store:
         competing = written(formula)
         with stage_line():
-            answer = criticise_unit(store, serial, version, recording, competing, other_unit=other_unit)
+            answer = criticise_unit(
+                store, serial, version, None, competing, recordings=recording_numbers(recording), other_unit=other_unit
+            )
         if next_recipe is not None:
             write_next(answer, next_recipe)
         if report is not None:
@@ -105,7 +107,7 @@ def improve(
     remove: Annotated[list[str] | None, typer.Option("--remove", metavar="EFFECT", help="Effect to take out.")] = None,
     formula: FormulaOption = None,
     version: VersionOption = None,
-    recording: RecordingId = None,
+    recording: RecordingIds = None,
     accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
     database: Database = None,
@@ -122,8 +124,8 @@ def improve(
 
     with one_clear_line():
         request = ImproveRequest(
-            add=names(add), remove=names(remove), formula=as_lines(formula or []), recording=recording,
-            accept_warnings=accept_warnings,
+            add=names(add), remove=names(remove), formula=as_lines(formula or []),
+            recordings=recording_numbers(recording), accept_warnings=accept_warnings,
         )  # fmt: skip
         answer = execute(database, IMPROVE, ToNewestOrVersion(serial, version, request))
     if as_json:

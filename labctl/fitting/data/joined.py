@@ -60,8 +60,8 @@ def joined_recording(parts: Mapping[int, Recording]) -> Recording:
         tables.append(rows)
         surroundings.append(environment)
     info = first.model_copy(update={"max_rate_dps": max((r.info.max_rate_dps or 0.0) for r in whole.values()) or None})
-    environment = _below_one_another(surroundings) if all(surroundings) else None
-    return Recording(info, _below_one_another(tables), environment)
+    around = _below_one_another(surroundings) if all(surroundings) else None
+    return Recording(info, _below_one_another(tables), around)
 
 
 def recordings_in(columns: Mapping[str, NDArray[np.generic]]) -> list[int]:

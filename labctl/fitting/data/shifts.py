@@ -35,9 +35,7 @@ class Repeatability:
 KINDS: dict[ShiftKind, Repeatability] = {
     "turn_on": Repeatability("turn_on", "bias repeatability, turn-on to turn-on", "deg/s", 5.0, "bias"),
     "day_to_day": Repeatability("day_to_day", "scale factor repeatability, day to day", "1", 0.1, "scale_factor"),
-    "mounting": Repeatability(
-        "mounting", "alignment repeatability, mounting to mounting", "rad", 0.1, "misalignment"
-    ),
+    "mounting": Repeatability("mounting", "alignment repeatability, mounting to mounting", "rad", 0.1, "misalignment"),
 }
 
 

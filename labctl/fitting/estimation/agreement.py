@@ -105,7 +105,7 @@ def _shift_columns(names: int, values: Array, effect: str) -> NDArray[np.float64
     """Return what a shift adds to the flat coefficients of an effect, (k, names): the same at every temperature."""
     if effect not in SHIFTED:
         return None
-    return np.kron(np.eye(names), np.ones((len(values) // names, 1)))
+    return np.asarray(np.kron(np.eye(names), np.ones((len(values) // names, 1))), dtype=np.float64)
 
 
 def _scatter(parts: list[tuple[Array, NDArray[np.float64]]], shift: NDArray[np.float64] | None) -> _Scatter:

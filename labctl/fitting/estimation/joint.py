@@ -23,6 +23,8 @@ from labctl.json_types.joint import EffectAgreement, HeldOutRecording, JointJson
 
 #: Probability of such shifts from noise alone below which they are said to be there.
 SEEN = 0.01
+#: A smaller probability is said to be smaller than this.
+SMALLEST = 1e-12
 
 
 def joint_findings(data: FitData, model: ErrorModel, preset: Preset, found: AxisSolutions) -> JointJson | None:
@@ -98,14 +100,22 @@ def _of_shifts(repeatability: Mapping[str, list[RepeatabilityJson]]) -> Iterator
         for line in lines:
             if not line["freedom"]:
                 continue
-            size = f"{line['value']:.2g} {line['unit']} (95 %: {line['low']:.2g} to {line['high']:.2g})"
-            if line["seen"]:
-                yield (
-                    f"Axis {axis}: the recordings are shifted against each other (p = {line['p_value']:.2g}); this is "
-                    f"{line['term']}, standard deviation {size}, and neither a drift nor part of the calibration."
-                )
-            else:
-                yield f"Axis {axis}: no {line['term']} beyond the noise; its standard deviation is at most {line['high']:.2g} {line['unit']}."
+            unit = "" if line["unit"] == "1" else f" {line['unit']}"
+            if not line["seen"]:
+                yield f"Axis {axis}: no {line['term']}, beyond the noise; at most {line['high']:.2g}{unit}."
+                continue
+            values = [shift["value"] for shift in line["shifts"]]
+            size = f"{line['value']:.2g}{unit} (95 %: {line['low']:.2g} to {line['high']:.2g})"
+            yield (
+                f"Axis {axis}: shifts of up to {max(values) - min(values):.2g}{unit} between the recordings "
+                f"({_probability(line['p_value'])}) are {line['term']}: standard deviation {size}. They are neither a "
+                "drift nor part of the calibration."
+            )
+
+
+def _probability(p_value: float | None) -> str:
+    """Return "p = 0.003", or "p < 1e-12" for one so small that its figures mean nothing."""
+    return f"p = {p_value:.2g}" if p_value is not None and p_value > SMALLEST else f"p < {SMALLEST:g}"
 
 
 def _of_agreement(agreement: list[EffectAgreement], not_compared: str, recordings: list[int]) -> Iterator[str]:
@@ -122,7 +132,7 @@ def _of_agreement(agreement: list[EffectAgreement], not_compared: str, recording
         more = " beside the shift between them" if beside else ""
         yield (
             f"Recordings {numbers} disagree on {each['effect']}{more}: chi2 {chi2:.3g} for {freedom} degrees of "
-            f"freedom, p = {p_value:.2g}; one value for all is an average of different ones."
+            f"freedom, {_probability(p_value)}; one value for all is an average of different ones."
         )
     if agreement and not apart:
         yield f"Recordings {numbers} agree on every effect of the model beside the shifts between them."

@@ -28,7 +28,7 @@ BISECTIONS = 40
 
 @dataclass(frozen=True)
 class RandomEffects:
-    """The last q columns of a design: the kind of each, (q,) from 0, and the standard deviation of their prior, (q,)."""
+    """The last q columns of a design: the kind of each from 0, and the standard deviation of its prior, (q,) each."""
 
     kind: NDArray[np.int64]
     wide: Array
@@ -89,8 +89,8 @@ def mixture(found: Triangles, random: RandomEffects) -> Mixture:
     at = [_information(found, d, k, random) for d in range(len(found.scale))]
     best = int(np.argmax(found.log_evidence))
     grid = _grid(at[best], random)
-    log_weight = np.stack([_log_likelihood(each, grid, random) for each in at])
-    wide = np.array([_log_likelihood(each, np.asarray(random.wide)[None, :], random)[0] for each in at])
+    log_weight = np.stack([_log_likelihood(each, grid) for each in at])
+    wide = np.array([_log_likelihood(each, np.asarray(random.wide)[None, :])[0] for each in at])
     log_weight += (np.asarray(found.log_evidence) - wide)[:, None]
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
@@ -166,7 +166,7 @@ def _spread(effects: Array) -> float:
     return float(np.sqrt(np.sum((effects - effects.mean()) ** 2) / max(len(effects) - 1, 1)))
 
 
-def _log_likelihood(information: _Information, grid: NDArray[np.float64], random: RandomEffects) -> Array:
+def _log_likelihood(information: _Information, grid: NDArray[np.float64]) -> Array:
     """Return the restricted log likelihood of each point of a grid (n, q), (n,), but for what all points share."""
     matrix = information.matrix + np.apply_along_axis(np.diag, 1, grid**-2.0)
     _, log_det = np.linalg.slogdet(matrix)
