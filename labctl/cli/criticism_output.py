@@ -46,8 +46,9 @@ def print_criticism(answer: CriticismResponse) -> None:
     for line in answer.text:
         console.print(line, style="bold" if line is answer.text[0] else None, markup=False, soft_wrap=whole)
     error = answer.error
+    of = ", ".join(map(str, answer.recordings or [answer.recording]))
     console.print(
-        f"{answer.serial} version {answer.version}, recording {', '.join(map(str, answer.recordings or [answer.recording]))}: "
+        f"{answer.serial} version {answer.version}, recording {of}: "
         f"left {format_number(error['rms_dps'])} deg/s, "
         f"held-out {format_number(error['heldout_rms_dps'])}, noise floor {format_number(error['noise_floor_dps'])}",
         style="dim",

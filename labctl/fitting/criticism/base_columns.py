@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.candidates import base_rows, temperature_slope
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.data.shifts import KINDS, shifts_of
+from labctl.fitting.data.shifts import shift_contrasts
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
@@ -19,11 +19,10 @@ SLOPE_ERROR = 0.5
 def base_of(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArray[np.float64], Array]:
     """Return the coordinates of the base (R, m, k), and the prior precision of each column (k,)."""
     base, _, precision = base_rows(data, model, axis)
-    shifts = shifts_of(data.nodes, axis)
-    if shifts:
-        rows = data.rows_of(np.column_stack([shift.values for shift in shifts]))
-        base = np.concatenate([base, rows], axis=2)
-        precision = np.concatenate([precision, [KINDS[shift.kind].largest ** -2.0 for shift in shifts]])
+    shifts, largest = shift_contrasts(data.nodes, axis)
+    if len(largest):
+        base = np.concatenate([base, data.rows_of(shifts)], axis=2)
+        precision = np.concatenate([precision, largest**-2.0])
     slopes = _slope_errors(data, model, axis)
     if slopes is None:
         return base, precision

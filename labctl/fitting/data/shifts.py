@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import helmert
 
 from labctl.fitting.data.channels import RECORDING, Channels
 from labctl.fitting.data.joined import recordings_in
@@ -66,6 +67,21 @@ def shift_columns(channels: Channels, axis: str) -> NDArray[np.float64]:
     """Return the regressors of the shifts of one axis, (n, q)."""
     found = [shift.values for shift in shifts_of(channels, axis)]
     return np.column_stack(found) if found else np.zeros((len(channels), 0))
+
+
+def shift_contrasts(channels: Channels, axis: str) -> tuple[NDArray[np.float64], Array]:
+    """Return what shifts of one axis differ by, (n, k), and the largest standard deviation of each, (k,).
+
+    What all recordings have in common is no shift: an error of the bias that they share stays to be found.
+    """
+    kinds: dict[tuple[ShiftKind, str], list[Array]] = {}
+    for shift in shifts_of(channels, axis):
+        kinds.setdefault((shift.kind, shift.along), []).append(shift.values)
+    columns, largest = [np.zeros((len(channels), 0))], []
+    for (kind, _), values in kinds.items():
+        columns.append(np.column_stack(values) @ helmert(len(values)).T)
+        largest += [KINDS[kind].largest] * (len(values) - 1)
+    return np.concatenate(columns, axis=1), np.array(largest)
 
 
 def _every(channels: Channels, axis: str) -> Iterator[Shift]:

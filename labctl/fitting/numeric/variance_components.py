@@ -15,10 +15,10 @@ from scipy.special import chdtrc, ndtr
 
 from labctl.fitting.numeric.arrays import Array
 
-#: Standard deviations tried for each kind, at most so many, from this share of what an effect is uncertain by ...
-SIZES, LEAST = 16, 0.1
-#: ... to this many times the effects themselves.
-MOST = 300.0
+#: Standard deviations tried for each kind: so many, from this share of what an effect is uncertain by ...
+SIZES, LEAST = 18, 0.1
+#: ... to this many times the effects themselves, of which no spread is this many times smaller than they are.
+MOST, IMPOSSIBLE = 200.0, 30.0
 #: Points that together hold less than this share of the evidence are left out.
 NEGLIGIBLE = 1e-4
 #: Of an interval, and its half width over the standard deviation of a normal distribution.
@@ -155,8 +155,9 @@ def _grid(information: _Information, random: RandomEffects) -> NDArray[np.float6
     for kind in range(random.kinds):
         here = random.kind == kind
         uncertain = float(np.median(1.0 / np.sqrt(np.maximum(np.diag(information.matrix)[here], 1e-300))))
-        largest = min(float(np.max(np.asarray(random.wide)[here])), MOST * max(_spread(effects[here]), uncertain))
-        least = min(LEAST * uncertain, largest / 10)
+        spread = _spread(effects[here])
+        largest = min(float(np.max(np.asarray(random.wide)[here])), MOST * max(spread, uncertain))
+        least = min(max(LEAST * uncertain, spread / IMPOSSIBLE), largest / 10)
         sizes.append(np.geomspace(least, largest, SIZES))
     points = np.stack(np.meshgrid(*sizes, indexing="ij"), axis=-1).reshape(-1, random.kinds)
     return np.asarray(points[:, random.kind])
