@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from labctl.cli.joint_output import print_joint
 from labctl.cli.output import console, format_number, print_warnings, table
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
@@ -31,6 +32,7 @@ def print_fit(answer: FitResponse) -> None:
     rates = "any rate" if slow is None or fast is None else f"{slow:.4g} to {fast:.4g} deg/s"
     warm = "any temperature (none was measured)" if low is None or high is None else f"{low:.1f} to {high:.1f} deg C"
     console.print(f"  valid              {warm}, {rates}")
+    print_joint(answer.joint)
     for axis, content in answer.axes.items():
         coefficients = content["coefficients"]
         if isinstance(nodes := coefficients.get("temperature_c"), list):

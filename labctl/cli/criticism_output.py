@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import log10
 from typing import TYPE_CHECKING
 
+from labctl.cli.joint_output import print_joint
 from labctl.cli.output import console, format_number, print_warnings, table
 
 if TYPE_CHECKING:
@@ -47,8 +48,9 @@ def print_criticism(answer: CriticismResponse) -> None:
     for line in answer.text:
         console.print(line, style="bold" if line is answer.text[0] else None, markup=False, soft_wrap=whole)
     error = answer.error
+    of = ", ".join(map(str, answer.recordings or [answer.recording]))
     console.print(
-        f"{answer.serial} version {answer.version}, recording {answer.recording}: residual "
+        f"{answer.serial} version {answer.version}, recording {of}: residual "
         f"{format_number(error['rms_dps'])} deg/s RMS,"
         f" "
         f"held-out {format_number(error['heldout_rms_dps'])}, noise floor {format_number(error['noise_floor_dps'])}",
@@ -144,6 +146,7 @@ def print_improvement(answer: ImproveResponse) -> None:
     before = answer.before
     print_warnings(answer.warnings)
     console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {answer.parent}: {answer.model.name}")
+    print_joint(answer.joint)
     rows = table("", "deg/s", "before", "after", numbers=2)
     rows.add_row("RMS", format_number(before.rms_dps), format_number(answer.error.rms_dps))
     rows.add_row("held-out", format_number(before.heldout_rms_dps), format_number(answer.error.heldout_rms_dps))

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from labctl.errors import BadInput
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, and nothing else.")]
 Database = Annotated[
     str | None,
@@ -27,6 +29,22 @@ BenchName = Annotated[
     typer.Option("--bench", metavar="FILE", help="Bench file, or the name of a bench that ships with labctl."),
 ]
 CampaignId = Annotated[int | None, typer.Argument(metavar="ID", help="Campaign; default: the newest.")]
+RecordingIds = Annotated[
+    str | None,
+    typer.Option(
+        "--recording", metavar="ID[,ID...]", help="Recording, or several as one: 1,2,3; default: the unit's newest."
+    ),
+]
 RecordingId = Annotated[
     int | None, typer.Option("--recording", metavar="ID", help="Recording; default: the unit's newest.")
 ]
+
+
+def recording_numbers(given: str | None) -> list[int]:
+    """Return the numbers of recordings in "3" or "1,2,3", none where nothing was given. Raises BadInput."""
+    found: list[int] = []
+    for text in (given or "").split(",") if given is not None else ():
+        if not text.strip().isdecimal() or not text.isascii():
+            raise BadInput(f"--recording {given!r}: {text!r} is no number of a recording; write 3, or several as 1,2,3")
+        found.append(int(text))
+    return found

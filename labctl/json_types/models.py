@@ -7,6 +7,7 @@ from typing import Literal, NotRequired
 from typing_extensions import TypedDict
 
 from labctl.json_types.findings import FindingJson
+from labctl.json_types.joint import JointJson
 from labctl.json_types.poses import PosesJson
 
 Origin = Literal["sensor", "package", "fixture", "bench", "environment"]
@@ -162,6 +163,7 @@ class FitResultJson(TypedDict):
     environment: FitEnvironment
     reference_temperature_c: float
     poses: NotRequired[PosesJson]
+    joint: NotRequired[JointJson]
 
 
 class LeftOut(TypedDict):
@@ -181,6 +183,7 @@ class ChangeFigures(FitResultJson):
     """What is said of a change of effects, whether it is kept or not."""
 
     recording: int
+    recordings: list[int]
     improved_from: int
     before: ErrorFiguresJson
     plausible: dict[str, UsualRange]
@@ -193,6 +196,7 @@ class KeptFit(FitResultJson):
     serial: str
     version: int
     recording: int
+    recordings: list[int]
     campaign: int | None
     recipe: str | None
     bench: str | None

@@ -15,7 +15,7 @@ from labctl.recording.turn_means import turned_points
 from labctl.recording.windows import kept_windows, usual_step_s, white_std_of_profile, window_labels
 
 #: Columns that one data set has one value of: its first reading's.
-FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg")
+FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg", "recording", "recording_dataset")
 #: A data set longer than this, through which the temperature moves by more than that, is no one point: it is taken in
 #: pieces of about a minute, as long as the data sets of the published schedules.
 LONG_S = 600.0

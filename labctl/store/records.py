@@ -142,6 +142,7 @@ class CalibrationRecord:
     hash: str
     document: bytes
     answer: KeptAnswer  #: what `labctl fit --json` said
+    recordings: tuple[int, ...] = ()  #: all that it was fitted to, rising; `recording` is the newest of them
 
 
 @dataclass(frozen=True)

@@ -55,6 +55,9 @@ from labctl.services.schemas.uncertainty import UncertaintyResponse
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 OtherUnit = Annotated[bool, Query(description="Accept a recording of another unit.")]
 RecordingNumber = Annotated[int | None, Query(description="Recording; default: the unit's newest.")]
+RecordingNumbers = Annotated[
+    list[int] | None, Query(description="Several recordings of the unit as one; instead of `recording`.")
+]
 Formulas = Annotated[
     list[str] | None, Query(description="Your own effects to include in the comparison: 'name: expr'.")
 ]
@@ -138,6 +141,7 @@ async def criticism(
     version: int,
     service: ServiceDep,
     recording: RecordingNumber = None,
+    recordings: RecordingNumbers = None,
     other_unit: OtherUnit = False,
     formula: Formulas = None,
 ) -> CriticismResponse:
@@ -147,8 +151,9 @@ async def criticism(
     """
     competing = tuple(read_formulas(formula or []))
     return await while_connected(
-        request, service, criticise_unit, serial, version, recording, competing, other_unit=other_unit
-    )
+        request, service, criticise_unit, serial, version, recording, competing, recordings=tuple(recordings or ()),
+        other_unit=other_unit,
+    )  # fmt: skip
 
 
 @router.get(
@@ -163,6 +168,7 @@ async def criticism_events(
     version: int,
     service: ServiceDep,
     recording: RecordingNumber = None,
+    recordings: RecordingNumbers = None,
     other_unit: OtherUnit = False,
     formula: Formulas = None,
 ) -> EventStream:
@@ -171,16 +177,24 @@ async def criticism_events(
     The computation is cancelled when the client leaves.
     """
     competing = tuple(read_formulas(formula or []))
-    return await follow(request, service, criticise_unit, serial, version, recording, competing, other_unit=other_unit)
+    return await follow(
+        request, service, criticise_unit, serial, version, recording, competing, recordings=tuple(recordings or ()),
+        other_unit=other_unit,
+    )  # fmt: skip
 
 
 @router.get("/calibrations/{version}/residuals", summary="Residuals of a model, by data set")
 async def residuals(
-    request: Request, serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None
+    request: Request,
+    serial: str,
+    version: int,
+    service: ServiceDep,
+    recording: RecordingNumber = None,
+    recordings: RecordingNumbers = None,
 ) -> ResidualsResponse:
     """The data of the residual map of the criticism, one row per data set and axis: measured error, modelled error
     and residual."""
-    return await while_connected(request, service, residuals_unit, serial, version, recording)
+    return await while_connected(request, service, residuals_unit, serial, version, recording, tuple(recordings or ()))
 
 
 @router.get("/calibrations/{version}/pictures", summary="The pictures of a criticism")

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
+from labctl.cli.options import AcceptWarnings, Database, Json, RecordingIds, Serial, recording_numbers
 from labctl.cli.output import console, print_json
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
@@ -23,7 +23,7 @@ Override = Annotated[
 
 def fit(
     serial: Serial,
-    recording: RecordingId = None,
+    recording: RecordingIds = None,
     model: Annotated[
         str | None, typer.Option("--model", metavar="NAME", help="A preset: `labctl effects` lists them.")
     ] = None,
@@ -34,7 +34,7 @@ def fit(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Fit a model to a recording; it becomes the unit's next calibration version."""
+    """Fit a model to a recording, or to several together; it becomes the unit's next calibration version."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import FIT
     from labctl.services.commands.requests import ToUnit
@@ -42,7 +42,9 @@ def fit(
 
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
     with one_clear_line():
-        request = FitRequest(recording=recording, model=model, effects=names, accept_warnings=accept_warnings)
+        request = FitRequest(
+            recordings=recording_numbers(recording), model=model, effects=names, accept_warnings=accept_warnings
+        )
         answer = execute(database, FIT, ToUnit(serial, request))
     if as_json:
         print_json(answer)

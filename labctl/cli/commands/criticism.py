@@ -14,7 +14,7 @@ from labctl.cli.criticism_output import (
     print_verification,
 )
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Serial
+from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, RecordingIds, Serial, recording_numbers
 from labctl.cli.output import print_json
 from labctl.cli.stage_line import stage_line
 
@@ -58,7 +58,7 @@ def verify(
 def criticise(
     serial: Serial,
     version: VersionOption = None,
-    recording: RecordingId = None,
+    recording: RecordingIds = None,
     other_unit: OtherUnit = False,
     formula: FormulaOption = None,
     next_recipe: Annotated[
@@ -70,14 +70,16 @@ def criticise(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Compare a version with a recording: the residual, where it is large, and which effects may be missing."""
+    """Compare a version with recordings: the residual, where it is large, and which effects may be missing."""
     from labctl.services.commands.open import open_readonly
     from labctl.services.criticism.criticise import criticise_unit, write_next
 
     with one_clear_line(), open_readonly(database) as store:
         competing = written(formula)
         with stage_line():
-            answer = criticise_unit(store, serial, version, recording, competing, other_unit=other_unit)
+            answer = criticise_unit(
+                store, serial, version, None, competing, recordings=recording_numbers(recording), other_unit=other_unit
+            )
         if next_recipe is not None:
             write_next(answer, next_recipe)
         if report is not None:
@@ -107,7 +109,7 @@ def improve(
     remove: Annotated[list[str] | None, typer.Option("--remove", metavar="EFFECT", help="Effect to remove.")] = None,
     formula: FormulaOption = None,
     version: VersionOption = None,
-    recording: RecordingId = None,
+    recording: RecordingIds = None,
     accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
     database: Database = None,
@@ -124,8 +126,8 @@ def improve(
 
     with one_clear_line():
         request = ImproveRequest(
-            add=names(add), remove=names(remove), formula=as_lines(formula or []), recording=recording,
-            accept_warnings=accept_warnings,
+            add=names(add), remove=names(remove), formula=as_lines(formula or []),
+            recordings=recording_numbers(recording), accept_warnings=accept_warnings,
         )  # fmt: skip
         answer = execute(database, IMPROVE, ToNewestOrVersion(serial, version, request))
     if as_json:

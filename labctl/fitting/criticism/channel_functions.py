@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.data.channels import OWN_DATASET, RECORDING, WITHIN_S
 from labctl.fitting.numeric.arrays import Array
 
 #: Knots of a smooth function of a channel: a coarse and a fine one compete.
@@ -29,6 +30,7 @@ NO_CHANNELS = frozenset(
         "dataset", "run", "mounting", "n", "valid", "duration_s", "since_begin_s", "previous_rate_dps", "status",
         "table_angle_deg", "chamber_setpoint_c", "temperature_x_c", "temperature_y_c", "temperature_z_c",
         "turn_deg", "turn_u_deg",
+        RECORDING, WITHIN_S, OWN_DATASET,
     }
 )  # fmt: skip
 TIMES = frozenset({"t_s", "power_s"})

@@ -17,6 +17,8 @@ from labctl.recording import Recording
 BODY_AXES = ("x", "y", "z")
 #: A wave, "cos" or "sin", and how often it comes per turn of the table.
 Carrier = tuple[str, int]
+#: Columns of several recordings as one: which recording a row is of, its time within it, and its data set there.
+RECORDING, WITHIN_S, OWN_DATASET = "recording", "recording_t_s", "recording_dataset"
 #: Duration of a data set, s, where the recording does not give it.
 USUAL_DURATION_S = 60.0
 
@@ -89,6 +91,17 @@ class Channels:
         """Return every position that occurs and which rows are in it, (n,)."""
         position = np.asarray(self.columns["position"]).astype(np.str_)
         return [(str(there), position == there) for there in np.unique(position)]
+
+    def by_recording(self, rows: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+        """Return rows (n,) recording by recording, those of each; as they are for a single recording."""
+        if RECORDING not in self.columns:
+            return [rows]
+        of = np.asarray(self.columns[RECORDING])
+        return [rows & (of == number) for number in np.unique(of) if np.any(rows & (of == number))]
+
+    def recording_t_s(self) -> Array:
+        """Return the time since the start of the row's recording, (n,) s."""
+        return np.asarray(self.columns[WITHIN_S if WITHIN_S in self.columns else "t_s"], dtype=np.float64)
 
     def harmonic(self, carrier: Carrier) -> Array:
         """Return the mean of a wave in the table angle over each row, (n,)."""

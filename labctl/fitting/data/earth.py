@@ -38,19 +38,29 @@ def with_known_size(
     Only the direction of north is unknown: each of cosine and sine is 0 with the standard deviation that a vector of
     the known size has along a random direction, said by one more row for each.
     """
-    extra = turning.shape[1]
-    if extra == 0 or scatter.white_var is None:
+    return with_prior(columns, turning, y, scatter, np.full(turning.shape[1], size_dps**2 / 2))
+
+
+def with_prior(
+    columns: Array, extra: Array, y: Array, scatter: Scatter, variance: Array
+) -> tuple[Array, Array, Scatter]:
+    """Return design, y and scatter with extra columns (m, e) beside the model's, each 0 with a known variance (e,).
+
+    What is known of a column is said by one more row. Without a known noise of the rows nothing is added.
+    """
+    more = extra.shape[1]
+    if more == 0 or scatter.white_var is None:
         return columns, y, scatter
-    upper = np.column_stack([columns, turning])
-    lower = np.column_stack([np.zeros((extra, columns.shape[1])), np.eye(extra)])
-    more = replace(
+    upper = np.column_stack([columns, np.vstack([extra, np.zeros((len(columns) - len(extra), more))])])
+    lower = np.column_stack([np.zeros((more, columns.shape[1])), np.eye(more)])
+    known = replace(
         scatter,
-        t_s=np.concatenate([scatter.t_s, np.zeros(extra)]),
-        run=np.concatenate([scatter.run, -1 - np.arange(extra)]),
-        rate_dps=np.concatenate([scatter.rate_dps, np.zeros(extra)]),
-        white_var=np.concatenate([scatter.white_var, np.full(extra, size_dps**2 / 2)]),
+        t_s=np.concatenate([scatter.t_s, np.zeros(more)]),
+        run=np.concatenate([scatter.run, min(int(scatter.run.min()), 0) - 1 - np.arange(more)]),
+        rate_dps=np.concatenate([scatter.rate_dps, np.zeros(more)]),
+        white_var=np.concatenate([scatter.white_var, variance]),
     )
-    return np.vstack([upper, lower]), np.concatenate([y, np.zeros(extra)]), more
+    return np.vstack([upper, lower]), np.concatenate([y, np.zeros(more)]), known
 
 
 def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array:
@@ -68,10 +78,9 @@ def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array
     middle, half = start + turned / 2, turned / 2
     shrink = np.sinc(half / np.pi)  # the mean of a cosine over what was turned
     cosine, sine = np.cos(middle) * shrink, np.sin(middle) * shrink
-    position = np.asarray(channels["position"]).astype(np.str_)
     found = []
-    for there in np.unique(position):
+    for there, here in channels.positions():
         if there.lstrip("-") != axis:
-            here = position == there
-            found += [np.where(here, cosine, 0.0), np.where(here, sine, 0.0)]
+            for part in channels.by_recording(here):  # the table's zero may point elsewhere on another day
+                found += [np.where(part, cosine, 0.0), np.where(part, sine, 0.0)]
     return np.column_stack(found) if found else np.zeros((len(channels), 0))

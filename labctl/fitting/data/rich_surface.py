@@ -13,9 +13,10 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.channels import OWN_DATASET, RECORDING, WITHIN_S, Channels
 from labctl.fitting.data.levels import level_centres, rate_levels
 from labctl.fitting.data.rate_profile import Response
+from labctl.fitting.data.shifts import shift_columns
 from labctl.fitting.data.temperature_levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
 
@@ -39,6 +40,7 @@ NO_SURROUNDINGS = frozenset({
     "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
     "since_begin_s", "valid", "temperature_c", "temperature_x_c", "temperature_y_c", "temperature_z_c", "power_s",
     "turn_deg", "turn_u_deg",
+    RECORDING, WITHIN_S, OWN_DATASET,
 })  # fmt: skip
 
 
@@ -111,6 +113,7 @@ def _blocks(channels: Channels, axis: str) -> Iterator[NDArray[np.float64]]:
     places = np.column_stack([rows.astype(np.float64) for _, rows in channels.positions()])
     yield places
     yield powers[:, 1:]
+    yield shift_columns(channels, axis)
     yield from _of_other_axes(channels, axis, warm)
     for degree in range(1, max(DEGREES) + 1):
         yield np.column_stack([warm[:, degree] * powers[:, n] for n, most in enumerate(DEGREES) if degree <= most])
@@ -181,10 +184,19 @@ def _history(channels: Channels, warm: NDArray[np.float64], rate: Array) -> Iter
         lags = [channels.history.lag_k(channels.columns, tau) for tau in LAGS_S]
         states = [channels.history.hysteresis_state(channels.columns, width) for width in WIDTHS_K]
         yield np.column_stack([*lags, *states])
-    since = np.asarray(channels["power_s"], dtype=np.float64) if "power_s" in channels else t_s - t_s.min()
+    since = np.asarray(channels["power_s"], dtype=np.float64) if "power_s" in channels else since_first(channels)
     since = np.maximum(since, 0.0)
     decays = np.column_stack([np.exp(-since / tau) for tau in WARM_UP_S])
     yield np.column_stack([decays, decays * rate[:, None]])
+
+
+def since_first(channels: Channels) -> Array:
+    """Return the time since the first row of the same recording, (m,) s."""
+    t_s = channels.recording_t_s()
+    found = np.empty(len(t_s))
+    for rows in channels.by_recording(np.ones(len(t_s), dtype=bool)):
+        found[rows] = t_s[rows] - t_s[rows].min()
+    return found
 
 
 def _carried(signs: Array) -> Array:

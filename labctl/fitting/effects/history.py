@@ -28,7 +28,7 @@ class BiasDrift(Effect):
     draws = ("time", "repeats", "legs")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        return [Column("bias_drift", "deg/s/h", np.asarray(channels["t_s"], dtype=np.float64) / 3600.0)]
+        return [Column("bias_drift", "deg/s/h", channels.recording_t_s() / 3600.0)]
 
 
 class _Shift(Effect):

@@ -13,6 +13,7 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.earth import turning_columns
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.shifts import Shift, shifts_of
 from labctl.fitting.effects import Column
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.numeric.arrays import Array
@@ -33,6 +34,7 @@ class AxisDesign:
     turning: NDArray[np.float64]  #: (m, e): the Earth's rate that goes round with the table
     offset_dps: Array  #: (m,): what a law at its present coefficients differs by from its tangent; 0 without laws
     laws: tuple[str, ...] = ()  #: names of the coefficients that enter by a law
+    shifts: tuple[Shift, ...] = ()  #: what differs between recordings, where there are several
 
 
 def axis_design(
@@ -77,6 +79,7 @@ def axis_design(
         turning_columns(data.info, data.channels, axis),
         offset,
         tuple(laws),
+        tuple(shifts_of(data.channels, axis)),
     )
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size
+from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size, with_prior
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
+from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.common_turn_error import with_common_error
 from labctl.fitting.estimation.response import (
@@ -25,10 +26,31 @@ from labctl.fitting.estimation.response import (
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.fitting.numeric.least_squares import Solution, rank_of, solve
+from labctl.fitting.numeric.variance_components import RandomEffects
 
 #: Steps after which a nonlinear coefficient is taken as it is.
 GAUSS_NEWTON_STEPS = 30
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """What one axis shows beside its model."""
+
+    turning: Array  #: the Earth's rate that goes round: cosine and sine per position, deg/s
+    shifts: Mapping[str, float] = field(default_factory=dict)  #: of several recordings, by name of the shift
+
+    def error_dps(self, data: FitData, axis: str) -> Array:
+        """Return what it adds to the output of data sets, (m,) deg/s; a shift that they do not show adds nothing."""
+        error = np.zeros(len(data))
+        if len(self.turning):
+            columns = turning_columns(data.info, data.channels, axis)
+            if columns.shape[1] == len(self.turning):
+                error += columns @ self.turning
+        for shift in shifts_of(data.channels, axis) if self.shifts else ():
+            error += self.shifts.get(shift.name, 0.0) * shift.values
+        return error
 
 
 @dataclass(frozen=True)
@@ -37,7 +59,12 @@ class AxisSolutions:
 
     fits: Mapping[str, AxisFit]
     solutions: Mapping[str, Solution]
-    turning: Mapping[str, Array]  #: cosine and sine per position, deg/s
+    nuisance: Mapping[str, Nuisance]  #: what is no part of the model: the Earth's rate, shifts between recordings
+
+    @property
+    def turning(self) -> dict[str, Array]:
+        """The Earth's rate that goes round with the table, axis -> cosine and sine per position, deg/s."""
+        return {axis: found.turning for axis, found in self.nuisance.items()}
 
 
 def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None = None) -> AxisSolutions:
@@ -45,14 +72,20 @@ def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] |
 
     Raises NotEnoughData where the data sets do not determine the coefficients.
     """
-    fits, solutions, turning = {}, {}, {}
+    fits, solutions, nuisance = {}, {}, {}
     for axis in data.outputs:
         design, solution = _converged(data, model, axis, fixed[axis] if fixed else None)
-        k = design.columns.shape[1]
         solution = with_common_error(data, axis, design.columns, solution)
         fits[axis] = _axis_fit(design, solution)
-        solutions[axis], turning[axis] = replace(solution, white_dps=data.white_dps(axis)), solution.values[k:]
-    return AxisSolutions(fits, solutions, turning)
+        solutions[axis], nuisance[axis] = replace(solution, white_dps=data.white_dps(axis)), _nuisance(design, solution)
+    return AxisSolutions(fits, solutions, nuisance)
+
+
+def _nuisance(design: AxisDesign, solution: Solution) -> Nuisance:
+    """Return what stands behind the model's own columns in a solution: the Earth's rate, then the shifts."""
+    beside = solution.values[design.columns.shape[1] :]
+    turning, shifts = np.split(beside, [len(beside) - len(design.shifts)])
+    return Nuisance(turning, {shift.name: float(v) for shift, v in zip(design.shifts, shifts, strict=True)})
 
 
 def _converged(data: FitData, model: ErrorModel, axis: str, fixed: Solution | None) -> tuple[AxisDesign, Solution]:
@@ -92,13 +125,33 @@ def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign,
             f"({', '.join(model.effect_ids)}); record rates about the unit's other axes too"
         )
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
-    columns, y, scatter = with_known_size(
-        design.columns, design.turning, y, data.scatter(axis), turning_size_dps(data.info)
-    )
+    known, random = data.scatter(axis), None
+    if design.shifts:
+        known = _with_white_noise(design, y, known)
+    columns, y, scatter = with_known_size(design.columns, design.turning, y, known, turning_size_dps(data.info))
+    if design.shifts:
+        wide = np.array([KINDS[shift.kind].largest for shift in design.shifts])
+        values = np.column_stack([shift.values for shift in design.shifts])
+        columns, y, scatter = with_prior(columns, values, y, scatter, wide**2)
+        kinds = np.array([shift.kind for shift in design.shifts])
+        random = RandomEffects(np.unique(kinds, return_inverse=True)[1], wide)
     try:
-        return solve(columns, y, scatter, fixed.drift if fixed else None)
+        return solve(columns, y, scatter, fixed.drift if fixed else None, random)
     except NotEnoughData as error:
         raise NotEnoughData(f"{data.info.serial}, axis {axis}, model {model.name}: {error}") from None
+
+
+def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter:
+    """Return a scatter whose white noise is known: where the readings do not say it, by what the design leaves."""
+    if scatter.white_var is not None:
+        return scatter
+    columns = np.column_stack([design.columns, *(shift.values for shift in design.shifts)])
+    rank = rank_of(columns)
+    if len(y) <= rank:
+        raise NotEnoughData(f"{len(y)} data sets leave nothing beside {rank} coefficients and shifts of recordings")
+    taken, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
+    left = y - columns @ taken
+    return replace(scatter, white_var=np.full(len(y), max(float(left @ left) / (len(y) - rank), 1e-20)))
 
 
 def _axis_fit(design: AxisDesign, solution: Solution) -> AxisFit:
@@ -112,33 +165,27 @@ def _axis_fit(design: AxisDesign, solution: Solution) -> AxisFit:
     )
 
 
-def residuals(fitted: FittedModel, data: FitData, turning: Mapping[str, Array] | None = None) -> dict[str, Array]:
-    """Return corrected minus true rate, axis -> (m,) deg/s; `turning` holds the fitted once-per-turn Earth rate.
+def residuals(fitted: FittedModel, data: FitData, nuisance: Mapping[str, Nuisance] | None = None) -> dict[str, Array]:
+    """Return corrected minus true rate, axis -> (m,) deg/s; `nuisance` is what was fitted beside the model.
 
     No correction undoes a delay or a bandwidth, so the true rate is what comes through them.
     """
-    outputs = {a: v - _turning_dps(data, a, (turning or {}).get(a)) for a, v in data.outputs.items()}
+    outputs = {a: v - nuisance[a].error_dps(data, a) if nuisance else v for a, v in data.outputs.items()}
     corrected = without_response(fitted).compensate(outputs, data.channels)
     seen = {axis: data.through(response_of(fitted.axes[axis])) for axis in outputs}
     return {axis: corrected[axis] - seen[axis].true_rate_dps(axis) for axis in outputs}
 
 
-def fit_turning(fitted: FittedModel, data: FitData) -> dict[str, Array]:
-    """Return the once-per-turn Earth rate, axis -> cosine and sine per position in deg/s, that a recording shows.
+def fit_turning(fitted: FittedModel, data: FitData) -> dict[str, Nuisance]:
+    """Return the once-per-turn Earth rate by axis that a recording shows.
 
     For judging a calibration on a recording that it was not fitted to: the direction of north is not known in advance.
     """
     left = residuals(fitted, data)
-    found: dict[str, Array] = {}
+    found: dict[str, Nuisance] = {}
     for axis, values in left.items():
         columns = turning_columns(data.info, data.channels, axis)
         independent = columns.shape[1] > 0 and rank_of(columns) == columns.shape[1]
-        found[axis] = np.asarray(np.linalg.lstsq(columns, values)[0] if independent else [], dtype=np.float64)
+        turning = np.asarray(np.linalg.lstsq(columns, values)[0] if independent else [], dtype=np.float64)
+        found[axis] = Nuisance(turning)
     return found
-
-
-def _turning_dps(data: FitData, axis: str, coefficients: Array | None) -> Array:
-    if coefficients is None or len(coefficients) == 0:
-        return np.zeros(len(data))
-    columns = turning_columns(data.info, data.channels, axis)
-    return np.asarray(columns @ coefficients if columns.shape[1] == len(coefficients) else np.zeros(len(data)))

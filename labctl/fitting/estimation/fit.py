@@ -18,6 +18,7 @@ from labctl.fitting.estimation.coefficient_tables import from_coefficients
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held_out import held_out_errors
 from labctl.fitting.estimation.held_out_legs import errors_by_leg
+from labctl.fitting.estimation.joint import joint_findings
 from labctl.fitting.estimation.of_poses import of_poses
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
@@ -61,7 +62,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     require_enough_data(used, model)
     found = solve_axes(used, model)
     fitted = FittedModel(_with_shapes(model, found.fits, data.channels.history), found.fits)
-    residual = residuals(fitted, data, found.turning)
+    residual = residuals(fitted, data, found.nuisance)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
     floor = data.noise_floor
     error = ErrorFigures(
@@ -77,6 +78,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         _environment(data, found.turning),
         residual,
         left_out_dps=_left_out_dps(fitted, data),
+        joint=joint_findings(data, model, preset, found),
     )
 
 

@@ -36,7 +36,7 @@ def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solut
         except NotEnoughData:
             return {}
         try:
-            left = residuals(FittedModel(model, found.fits), left_out, found.turning)
+            left = residuals(FittedModel(model, found.fits), left_out, found.nuisance)
         except NotConverged as error:
             at_c = float(left_out.temperature_c.mean())
             raise NotConverged(f"{error}; the model was fitted without the data sets near {at_c:.1f} deg C") from None

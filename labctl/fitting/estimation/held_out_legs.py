@@ -70,7 +70,7 @@ def _tested(
             used = seen.take(rows)
             require_enough_data(used, model)
             solved = solve_axes(used, model, solutions)
-            left = residuals(FittedModel(model, solved.fits), rest, solved.turning)
+            left = residuals(FittedModel(model, solved.fits), rest, solved.nuisance)
         except LabctlError as error:
             return _answer(names, None, 0, f"the {names[0]} alone does not determine the model: {error}")
         tested += len(rest)

@@ -12,6 +12,7 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import none_for_nan
+from labctl.json_types.joint import JointJson
 from labctl.json_types.models import (
     AxisNoiseJson,
     Coefficient,
@@ -43,6 +44,8 @@ class FitResult:
         model, left_out = self.fitted.exported()
         return model, [{**one, "rms_dps": self.left_out_dps.get(one["effect"])} for one in left_out]
 
+    joint: JointJson | None = None  #: what several recordings say together; None for a single one
+
     def to_json(self) -> FitResultJson:
         """Return what `labctl fit --json` gives of the model, besides serial and version."""
         model = self.fitted.model
@@ -65,6 +68,9 @@ class FitResult:
         }
         if self.poses is not None:
             found["poses"] = self.poses
+        return found
+        if self.joint is not None:
+            found["joint"] = self.joint
         return found
 
 

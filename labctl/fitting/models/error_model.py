@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from labctl.fitting.data.channels import Channels
+import numpy as np
+
+from labctl.fitting.data.channels import RECORDING, Channels
 from labctl.fitting.effects import Column, Reference, Term, kind_of
 from labctl.fitting.models.temperature import Constant, TemperatureBasis, basis_from_dict
 from labctl.fitting.numeric.arrays import Array
@@ -56,7 +58,7 @@ class ErrorModel:
         return [
             (term.effect, column)
             for term in self.terms
-            for column in kind_of(term).columns(channels, axis, term, self.reference)
+            for column in _by_recording(term, kind_of(term).columns(channels, axis, term, self.reference), channels)
         ]
 
     def with_terms(self, terms: tuple[Term, ...], name: str | None = None) -> ErrorModel:
@@ -90,6 +92,27 @@ class ErrorModel:
     def forward(self) -> ErrorModel:
         """Return the same effects as a law of the true rate: the form that is physics, and that criticism judges."""
         return replace(self, argument="rate")
+
+
+def _by_recording(term: Term, columns: list[Column], channels: Channels) -> list[Column]:
+    """Return the columns of an effect, those of bench, fixture and environment with a coefficient for each recording.
+
+    What belongs to the unit is common to all of its recordings; the rest is of the day. A run's or a mounting's shift
+    has a column for each anyway.
+    """
+    parts = channels.by_recording(np.ones(len(channels), dtype=bool))
+    if len(parts) < 2 or kind_of(term).origin in EXPORTED_ORIGINS:
+        return columns
+    numbers = np.asarray(channels[RECORDING])
+    found: list[Column] = []
+    for column in columns:
+        split = [
+            replace(column, name=f"{column.name}_of_{int(numbers[rows][0])}", values=np.where(rows, column.values, 0.0))
+            for rows in parts
+        ]
+        shown = [part for part in split if np.any(part.values)]
+        found += [column] if column.law is not None or len(shown) < 2 else shown
+    return found
 
 
 def _term_json(term: Term) -> TermJson:

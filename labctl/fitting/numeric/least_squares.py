@@ -7,7 +7,7 @@ unit length have about 1e1 to 1e2 (papers' trap O5), and no normal equations are
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -18,11 +18,14 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.numeric import drift_noise
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Drift, Scatter
+from labctl.fitting.numeric.variance_components import Component, RandomEffects, Triangles, mixture
 
 #: Scaled columns are taken as linearly dependent below this ratio of singular values.
 RANK_TOLERANCE = 1e-9
 #: Points of the noise grid of which the evidence is less than this share of all are not averaged over.
 NEGLIGIBLE = 1e-20
+#: The same where the spread of random effects is averaged over at each of them.
+NEGLIGIBLE_NOISE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,7 @@ class Solution:
     drift: Drift
     scale: float  #: factor on the covariance estimated from the residuals; 1 where the white noise is known;
     #: NaN, as the covariance then is, where neither the residuals nor the readings say anything about noise
+    components: tuple[Component, ...] = ()  #: spread of each kind of random effect
 
 
 @dataclass(frozen=True)
@@ -100,9 +104,16 @@ def rank_of(design: NDArray[np.float64]) -> int:
     return int(np.sum(singular > RANK_TOLERANCE * max(singular[0], 1e-300)))
 
 
-def solve(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift | None = None) -> Solution:
+def solve(
+    design: NDArray[np.float64],
+    y: Array,
+    scatter: Scatter,
+    drift: Drift | None = None,
+    random: RandomEffects | None = None,
+) -> Solution:
     """Fit y (m,) by design (m, k), weighted by the inverse of its noise; `drift` fixes the noise instead of a grid.
 
+    The last columns are `random` effects where that is given; their wide priors are rows of the design.
     Raises NotEnoughData when the columns are linearly dependent or there are fewer rows than columns.
     """
     m, k = design.shape
@@ -111,9 +122,9 @@ def solve(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift 
             f"{m} data sets at these rates and temperatures determine {min(m, rank_of(design))} of {k} coefficients; "
             "measure at other rates and temperatures, or leave effects out"
         )
-    if drift is not None:
-        return _collect(_at(design, y, scatter, [drift]), design, y, scatter)
-    return _collect(_over_grid(design, y, scatter), design, y, scatter)
+    fits = _at(design, y, scatter, [drift]) if drift is not None else _over_grid(design, y, scatter)
+    found = _collect(fits, design, y, scatter)
+    return found if random is None else _with_random_effects(found, fits, design, y, random)
 
 
 def drift_beside(columns: NDArray[np.float64], y: Array, scatter: Scatter) -> Drift:
@@ -201,4 +212,21 @@ def _collect(fits: _Fits, design: NDArray[np.float64], y: Array, scatter: Scatte
     blind = np.nan if white is None and design.shape[0] == design.shape[1] else 1.0
     return Solution(
         values, roots @ roots.T * blind, y - design @ values, white, fits.drift(), float(fits.scale[fits.best]) * blind
+    )
+
+
+def _with_random_effects(
+    found: Solution, fits: _Fits, design: NDArray[np.float64], y: Array, random: RandomEffects
+) -> Solution:
+    """Return a solution averaged also over the spread of the random effects, which so far is that of wide priors."""
+    counting = np.flatnonzero(~(fits.weights() < NEGLIGIBLE_NOISE))
+    mixed = mixture(
+        Triangles(fits.r[counting], fits.projected[counting], fits.scale[counting], fits.log_evidence[counting]), random
+    )
+    return replace(
+        found,
+        values=mixed.values,
+        covariance=mixed.covariance,
+        residual=y - design @ mixed.values,
+        components=mixed.components,
     )

@@ -32,7 +32,7 @@ def left_variance(data: FitData, preset: Preset) -> dict[str, Array]:
     """
     model, rows = preset.build(data)
     found = solve_axes(data.take(rows), model)
-    inside = residuals(FittedModel(model, found.fits), data, found.turning)
+    inside = residuals(FittedModel(model, found.fits), data, found.nuisance)
     by_temperature = data.folds
     if preset.inner_only:
         by_temperature = by_temperature[1:-1]
@@ -83,7 +83,7 @@ def _left_out(
             model, rows = preset.build(seen)
             require_enough_data(seen.take(rows), model)
             solved = solve_axes(seen.take(rows), model, solutions)
-            without = residuals(FittedModel(model, solved.fits), data.take(mask), solved.turning)
+            without = residuals(FittedModel(model, solved.fits), data.take(mask), solved.nuisance)
         except LabctlError:  # too little is left, or a law that cannot be inverted: this fold says nothing
             continue
         for axis, values in without.items():

@@ -67,7 +67,7 @@ def use_evidence(
     model, rows = preset.build(data)
     found = solve_axes(data.take(rows), model)
     left = left_variance(data, preset)
-    inside = residuals(FittedModel(model, found.fits), data, found.turning)
+    inside = residuals(FittedModel(model, found.fits), data, found.nuisance)
     repeatability = repeatability_of(data, inside, instability_dps or {})
     return {
         axis: AxisEvidence(

@@ -50,7 +50,7 @@ def _criticised(store: Store, row: CalibrationRecord) -> tuple[CriticismResponse
     if store.recordings.get(row.recording).kind == "coefficients":
         return None, f"recording {row.recording} is a table of coefficients: no measurements to judge by", []
     try:
-        return criticise_unit(store, row.serial, row.version, row.recording), "", []
+        return criticise_unit(store, row.serial, row.version, None, recordings=row.recordings), "", []
     except (BadInput, NotEnoughData, NotFound) as error:
         return None, str(error), []
     except NotConverged as error:
@@ -111,7 +111,7 @@ def _of_errors(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
         if version is None or version == row.version:
             continue
         other = store.calibrations.get(row.serial, version)
-        if other.recording != row.recording:
+        if other.recordings != row.recordings:
             continue
         worse = worse_than_version(_errors(other), own)
         if worse:
@@ -128,7 +128,9 @@ def _of_data(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
     """Yield what is certainly wrong with the data that a version was fitted to."""
     if row.recording is None:
         return
-    for warning in inspect_stored(store, store.recordings.get(row.recording)).warnings:
+    for number, warning in (
+        (n, w) for n in row.recordings for w in inspect_stored(store, store.recordings.get(n)).warnings
+    ):
         if warning.severity == "certain":
-            said = f"recording {row.recording}: {warning.where}: {warning.said} (expected {warning.expected})"
+            said = f"recording {number}: {warning.where}: {warning.said} (expected {warning.expected})"
             yield Objection(what="data", text=said, do=f"{warning.do}, and fit again")

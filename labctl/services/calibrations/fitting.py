@@ -14,9 +14,9 @@ from labctl.json_types.models import KeptFit
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
-from labctl.services.recordings.coverage import covered_of
-from labctl.services.recordings.inspection import as_json, inspect_stored, refuse_wrong, warning_of
-from labctl.services.recordings.loading import newest_row, source_of
+from labctl.services.criticism.measurements import Measurements
+from labctl.services.recordings.inspection import as_json, refuse_wrong, warning_of
+from labctl.services.recordings.loading import chosen_rows
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
@@ -42,20 +42,21 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
     Raises NotFound, BadInput for an unknown model or effect, NotEnoughData, DataRefused for data that are certainly
     wrong and for a fit that is worse than none.
     """
-    row = newest_row(store, serial, request.recording)
-    recording, campaign = row.id, row.campaign
-    found = inspect_stored(store, row)
-    refuse_wrong(found.warnings, f"fit of recording {recording} of {serial}", accepted=request.accept_warnings)
-    source = source_of(store, row)
-    covered = covered_of(found, source.info) if row.kind == "samples" else None
-    result = fit(source, request.model, request.effects, covered=covered)
+    measured = Measurements(store, chosen_rows(store, serial, request.recording, request.recordings))
+    recording, campaign, recordings = measured.row.id, measured.row.campaign, measured.recordings
+    what = f"fit of {measured.named} of {serial}"
+    refuse_wrong(measured.warnings, what, accepted=request.accept_warnings)
+    source = measured.source
+    result = fit(source, request.model, request.effects, covered=measured.covered)
     late = source.info.motion == "profile" and IDS.isdisjoint(result.fitted.model.effect_ids)
-    warnings = [*found.warnings, *map(warning_of, worse_than_raw(result.error, late=late))]
-    refuse_wrong(warnings, f"fit of recording {recording} of {serial}", accepted=request.accept_warnings)
+    warnings = [*measured.warnings, *map(warning_of, worse_than_raw(result.error, late=late))]
+    refuse_wrong(warnings, what, accepted=request.accept_warnings)
     evidence = evidence_of(source, request.model, request.effects)
     run = store.campaigns.get(campaign) if campaign is not None else None
     recipe, bench = (run.recipe_name, run.bench_name) if run is not None else (None, None)
-    made = {"recording": recording, "campaign": campaign, "recipe": recipe, "bench": bench}
+    made = {
+        "recording": recording, "campaign": campaign, "recipe": recipe, "bench": bench, **several(recordings),
+    }  # fmt: skip
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
@@ -63,15 +64,20 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
         )
         answer: KeptFit = {
             "serial": serial, "version": version, **result.to_json(), "recording": recording,
-            "campaign": campaign, "recipe": recipe, "bench": bench, "hash": calibration.hash,
-            "warnings": [as_json(warning) for warning in warnings],
+            "recordings": list(recordings), "campaign": campaign, "recipe": recipe, "bench": bench,
+            "hash": calibration.hash, "warnings": [as_json(warning) for warning in warnings],
         }  # fmt: skip
         return NewCalibration(
-            None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
+            None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer, recordings
         )
 
     kept = keep_next_version(store, serial, at, build)
     return FitResponse.model_validate(kept.answer, extra="forbid")
+
+
+def several(recordings: tuple[int, ...]) -> dict[str, list[int]]:
+    """Return what a calibration's provenance says of its recordings beside the newest, where there are several."""
+    return {"recordings": list(recordings)} if len(recordings) > 1 else {}
 
 
 def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
@@ -100,7 +106,8 @@ def one_version(store: Store, serial: str, version: int) -> VersionResponse | Im
     in_force = bool(history) and history[0].act == "certify" and history[0].version == version
     last = next((certification_response(act) for act in history if act.version == version), None)
     beside = {
-        "parent": row.parent, "recording": row.recording, "created_at": row.created_at, "hash": row.hash,
+        "parent": row.parent, "recording": row.recording, "recordings": list(row.recordings),
+        "created_at": row.created_at, "hash": row.hash,
         "in_force": in_force, "due": last.due if last is not None and in_force else None, "certification": last,
     }  # fmt: skip
     kind = ImprovedVersionResponse if "improved_from" in row.answer else VersionResponse

@@ -22,14 +22,14 @@ from labctl.json_types.models import ChangeFigures, KeptChange, UsualRange
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
+from labctl.services.calibrations.fitting import several
 from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.criticism.evaluation import model_of
-from labctl.services.criticism.measurements import Measurements, load_reduced_readings
+from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.versions import version_of
-from labctl.services.recordings.coverage import covered_of
 from labctl.services.recordings.inspection import as_json, refuse_wrong, warning_of
-from labctl.services.recordings.loading import newest_row
+from labctl.services.recordings.loading import chosen_rows
 from labctl.services.schemas.calibrations import (
     ImproveRequest,
     ImproveResponse,
@@ -37,7 +37,7 @@ from labctl.services.schemas.calibrations import (
 )
 from labctl.services.schemas.criticism import ResidualColumns
 from labctl.services.schemas.warnings import DataWarning
-from labctl.store import CalibrationRecord, NewCalibration, RecordingRow, Store
+from labctl.store import CalibrationRecord, NewCalibration, Store
 
 
 @dataclass(frozen=True)
@@ -45,23 +45,27 @@ class _Change:
     """A changed model beside the one that it was made from, both fitted in the forward form."""
 
     row: CalibrationRecord
-    recording: RecordingRow
-    points: Recording
+    measured: Measurements
     before: FitResult
     after: FitResult
-    data_warnings: list[DataWarning]
+
+    @property
+    def points(self) -> Recording:
+        """The means that it was fitted to."""
+        return self.measured.points
 
     @property
     def warnings(self) -> list[DataWarning]:
         """What is wrong with the data, and with the change."""
-        return [*self.data_warnings, *map(warning_of, worse_than_before(self.before.error, self.after.error))]
+        return [*self.measured.warnings, *map(warning_of, worse_than_before(self.before.error, self.after.error))]
 
     @property
     def figures(self) -> ChangeFigures:
         """What is said of the change, whether it is kept or not."""
         technology = self.points.info.technology or ""
         return {
-            **self.after.to_json(), "recording": self.recording.id, "improved_from": self.row.version,
+            **self.after.to_json(), "recording": self.measured.row.id,
+            "recordings": list(self.measured.recordings), "improved_from": self.row.version,
             "before": self.before.error.to_dict(), "plausible": plausible(self.after, technology),
             "warnings": [as_json(warning) for warning in self.warnings],
         }  # fmt: skip
@@ -78,7 +82,7 @@ def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetim
     worse than no correction.
     """
     change = _change(store, serial, request)
-    what = f"change of version {change.row.version} of {serial} on recording {change.recording.id}"
+    what = f"change of version {change.row.version} of {serial} on {change.measured.named}"
     refuse_wrong(change.warnings, what, accepted=request.accept_warnings)
     return _keep(store, serial, change, at)
 
@@ -89,42 +93,51 @@ def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewR
     Raises NotFound, BadInput, NotEnoughData.
     """
     row = version_of(store, serial, request.version)
-    measured = newest_row(store, serial, request.recording)
+    measured = _asked(store, serial, request, row)
 
     def work() -> PreviewResponse:
         change = _change(store, serial, request)
         _, left_out = change.after.exported()
-        said = {"serial": serial, **change.figures, "left_out": left_out, "residuals": _residuals(store, change)}
+        said = {"serial": serial, **change.figures, "left_out": left_out, "residuals": _residuals(change)}
         return PreviewResponse.model_validate(said, extra="forbid")
 
-    return cached(PreviewResponse, _question(store, row, measured, request), work)
+    return cached(PreviewResponse, _question(row, measured, request), work)
 
 
-def _question(
-    store: Store, row: CalibrationRecord, recording: RecordingRow, request: ImproveRequest
-) -> dict[str, object]:
+def _asked(store: Store, serial: str, request: ImproveRequest, row: CalibrationRecord) -> Measurements:
+    """Return the recordings that a change is fitted to: those asked for, those of a joint version, or the newest.
+
+    One that was asked for by number is what it is fitted to, whatever the version was fitted to.
+    """
+    wanted: Sequence[int] = request.recordings
+    if request.recording is None and not wanted and len(row.recordings) > 1:
+        wanted = row.recordings
+    return Measurements(store, chosen_rows(store, serial, request.recording, wanted))
+
+
+def _question(row: CalibrationRecord, measured: Measurements, request: ImproveRequest) -> dict[str, object]:
     """Return all that a change depends on."""
     return {
-        "serial": row.serial, "version": row.version, "hash": row.hash, "recording": recording.id,
-        "readings": store.recordings.fingerprint(recording.id, head=recording),
+        "serial": row.serial, "version": row.version, "hash": row.hash, **measured.question(),
         "change": request.model_dump(include={"add", "remove", "formula"}),
     }  # fmt: skip
 
 
-def _residuals(store: Store, change: _Change) -> ResidualColumns:
+def _residuals(change: _Change) -> ResidualColumns:
     """Return what a criticism of the changed model would leave, without all else that it says."""
     model = change.after.fitted.model
-    readings = load_reduced_readings(store, change.recording, change.points)
-    found = replace(criticise(readings, model, CATALOGUE, points=change.points, full=False), base=change.after)
+    found = replace(
+        criticise(change.measured.readings, model, CATALOGUE, points=change.points, full=False), base=change.after
+    )
     return residual_columns(found.data, found.residuals, change.points, change.after)
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
     """Fit a changed model, or return the fit of a moment ago."""
     row = version_of(store, serial, request.version)
-    measured = newest_row(store, serial, request.recording)
-    asked = json.dumps(_question(store, row, measured, request), sort_keys=True)
-    return _RECENT.get(asked, lambda: _fitted(row, Measurements(store, measured), request))
+    measured = _asked(store, serial, request, row)
+    asked = json.dumps(_question(row, measured, request), sort_keys=True)
+    return _RECENT.get(asked, lambda: _fitted(row, measured, request))
 
 
 def _refuse_what_changes_nothing(
@@ -144,8 +157,7 @@ def _refuse_what_changes_nothing(
 
 def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequest) -> _Change:
     model = model_of(row)
-    covered = covered_of(measured.inspection, measured.points.info) if measured.row.kind == "samples" else None
-    context = fit_data_of(measured.points, covered)
+    context = fit_data_of(measured.points, measured.covered)
     for effect_id in request.remove:
         if effect_id not in model.effect_ids:
             raise BadInput(
@@ -162,7 +174,7 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     add = tuple(_shaped(measured, base, term) for term in wanted)
     before = fit_preset(context, changed(model))
     after = fit_preset(context, with_shapes(context, changed(model, add, tuple(request.remove)), all_of_them=bool(add)))
-    return _Change(row, measured.row, measured.points, before, after, measured.inspection.warnings)
+    return _Change(row, measured, before, after)
 
 
 def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
@@ -176,7 +188,8 @@ def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
 
 def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveResponse:
     parent, after = change.row.version, change.after
-    made = {"recording": change.recording.id, "improved_from": parent}
+    recording, recordings = change.measured.row.id, change.measured.recordings
+    made = {"recording": recording, "improved_from": parent, **several(recordings)}
     evidence = use_evidence(fit_data_of(change.points), changed(after.fitted.model))
 
     def build(version: int) -> NewCalibration:
@@ -188,7 +201,7 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveRe
             "left_out": list(calibration.document["left_out"]), "hash": calibration.hash,
         }  # fmt: skip
         return NewCalibration(
-            parent, change.recording.id, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer
+            parent, recording, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer, recordings
         )
 
     return ImproveResponse.model_validate(keep_next_version(store, serial, at, build).answer, extra="forbid")

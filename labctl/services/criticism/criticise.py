@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, TypeVar
 from labctl.errors import BadInput
 from labctl.services.cache import cached_group
 from labctl.services.criticism.versions import version_of
-from labctl.services.recordings.loading import newest_row
+from labctl.services.recordings.loading import chosen_rows, readings_question
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse
-from labctl.store import Store
+from labctl.store import CalibrationRecord, RecordingRow, Store
 
 if TYPE_CHECKING:
     from labctl.fitting.effects import Formula
@@ -27,33 +27,34 @@ def criticise_unit(
     recording: int | None,
     competing: Sequence[Formula] = (),
     *,
+    recordings: Sequence[int] = (),
     other_unit: bool = False,
 ) -> CriticismResponse:
-    """Hold a version (default: the newest) against a recording (default: the unit's newest).
+    """Hold a version (default: the newest) against a recording (default: the unit's newest), or several as one.
 
     `other_unit` allows a recording of another unit. Raises NotFound, BadInput.
     """
-    return _cached_criticism(CriticismResponse, store, serial, version, recording, competing, other_unit=other_unit)
+    row = version_of(store, serial, version)
+    measured = chosen_rows(store, serial, recording, recordings, other_unit=other_unit)
+    return _cached_criticism(CriticismResponse, store, row, measured, competing)
 
 
-def residuals_unit(store: Store, serial: str, version: int | None, recording: int | None) -> ResidualsResponse:
+def residuals_unit(
+    store: Store, serial: str, version: int | None, recording: int | None, recordings: Sequence[int] = ()
+) -> ResidualsResponse:
     """Return what the same criticism leaves, data set by data set. Raises NotFound, BadInput."""
-    return _cached_criticism(ResidualsResponse, store, serial, version, recording, ())
+    row = version_of(store, serial, version)
+    return _cached_criticism(ResidualsResponse, store, row, chosen_rows(store, serial, recording, recordings), ())
 
 
 def _cached_criticism(
     kind: type[A],
     store: Store,
-    serial: str,
-    version: int | None,
-    recording: int | None,
+    row: CalibrationRecord,
+    measured: tuple[RecordingRow, ...],
     competing: Sequence[Formula],
-    *,
-    other_unit: bool = False,
 ) -> A:
     """Return one of the answers of a criticism; the first request computes and caches all of them."""
-    row = version_of(store, serial, version)
-    measured = newest_row(store, serial, recording, other_unit=other_unit)
 
     def work() -> Sequence[ResponseModel]:
         from labctl.services.criticism.evaluation import evaluate  # noqa: PLC0415  slow to import
@@ -61,9 +62,8 @@ def _cached_criticism(
         return evaluate(store, row, measured, competing)
 
     question = {
-        "serial": serial, "version": row.version, "calibration": row.hash, "model": row.answer["model"],
-        "recording": measured.id,
-        "readings": store.recordings.fingerprint(measured.id, head=measured),
+        "serial": row.serial, "version": row.version, "calibration": row.hash, "model": row.answer["model"],
+        **readings_question(store, measured),
         "formulas": [[each.id, each.text] for each in competing],
     }  # fmt: skip
     return cached_group(kind, question, work)

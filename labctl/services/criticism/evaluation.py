@@ -25,28 +25,34 @@ from labctl.store import CalibrationRecord, RecordingRow, Store
 
 
 def evaluate(
-    store: Store, calibration: CalibrationRecord, recording: RecordingRow, competing: Sequence[Formula]
+    store: Store, calibration: CalibrationRecord, recordings: tuple[RecordingRow, ...], competing: Sequence[Formula]
 ) -> tuple[CriticismResponse, ResidualsResponse]:
-    """Return the criticism of a version against a recording, and its residuals. Raises BadInput, NotEnoughData.
+    """Return the criticism of a version against recordings, and its residuals. Raises BadInput, NotEnoughData.
 
     `competing` formulas are added to the catalogue.
     """
-    catalogue, measured = catalogue_with(competing), Measurements(store, recording)
+    catalogue, measured = catalogue_with(competing), Measurements(store, recordings)
     report_stage("inspecting the recording")
-    warnings = measured.inspection.warnings
+    warnings = measured.warnings
     try:
         found = criticise(measured.readings, model_of(calibration), catalogue, points=measured.points)
     except NotConverged as error:
-        what = f"criticism of version {calibration.version} on recording {recording.id}"
-        refuse_wrong(warnings, what, accepted=False, insist=f"; without refitting,  {error}")
+        what = f"criticism of version {calibration.version} on {measured.named}"
+        refuse_wrong(warnings, what, accepted=False, insist=f"; without refitting, {error}")
         raise
     columns = residual_columns(found.data, found.residuals, measured.points, found.base)
     serial, version = calibration.serial, calibration.version
-    experiments = _experiments(store, recording.campaign, found)
-    criticism = answer_of(serial, version, recording.id, found, experiments)
+    experiments = _experiments(store, measured.row.campaign, found)
+    criticism = answer_of(serial, version, measured.recordings, found, experiments)
     return (
         with_warnings(criticism.model_copy(update={"applied": _applied(store, calibration, measured)}), warnings),
-        ResidualsResponse(serial=serial, version=version, recording=recording.id, columns=columns),
+        ResidualsResponse(
+            serial=serial,
+            version=version,
+            recording=measured.row.id,
+            recordings=list(measured.recordings),
+            columns=columns,
+        ),
     )
 
 
@@ -60,10 +66,9 @@ def _experiments(store: Store, campaign: int | None, found: Criticism) -> list[E
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:
-    """Return the version without refitting on the recording; None where it cannot be applied there: a channel is
-    missing."""
+    """Return the version without refitting on the recording, of several the newest; None where it cannot be applied."""
     try:
-        return verify(store, calibration, measured)
+        return verify(store, calibration, Measurements(store, (measured.row,)))
     except LabctlError:
         return None
 

@@ -21,8 +21,12 @@ def ladder(store: Store, serial: str, recording: int | None = None) -> LadderRes
     Raises NotFound, BadInput where the unit has no version of this recording.
     """
     rows = sorted(store.calibrations.of_unit(store.units.get(serial).serial), key=lambda row: row.version)
-    chosen = version_of(store, serial, None).recording if recording is None else recording
-    here = [row for row in rows if row.recording == chosen]
+    newest_version = version_of(store, serial, None)
+    chosen: int | None = recording
+    together: Sequence[int | None] = (recording,)
+    if recording is None:
+        chosen, together = newest_version.recording, newest_version.recordings
+    here = [row for row in rows if _is_of(row, chosen, together)]
     if not here:
         fitted = sorted({row.recording for row in rows if row.recording is not None})
         raise BadInput(
@@ -34,10 +38,16 @@ def ladder(store: Store, serial: str, recording: int | None = None) -> LadderRes
     return LadderResponse(
         serial=serial,
         recording=chosen,
+        recordings=list(here[0].recordings),
         steps=steps,
-        others=_applied_here(store, [row for row in rows if row.recording != chosen], chosen),
+        others=_applied_here(store, [row for row in rows if not _is_of(row, chosen, together)], chosen),
         noise_floor_dps=newest.noise_floor_dps,
     )
+
+
+def _is_of(row: CalibrationRecord, recording: int | None, together: Sequence[int | None]) -> bool:
+    """Return whether a version was fitted to exactly these recordings."""
+    return row.recording == recording and (recording is None or tuple(row.recordings) == tuple(together))
 
 
 def _by_parentage(rows: Sequence[CalibrationRecord]) -> Iterator[CalibrationRecord]:
@@ -61,6 +71,7 @@ def _step(row: CalibrationRecord, applied_rms_dps: float | None = None) -> Ladde
         version=row.version,
         parent=row.parent,
         recording=row.recording,
+        recordings=list(row.recordings),
         model=row.model,
         effects=list(row.answer["model"]["effects"]),
         applied_rms_dps=applied_rms_dps,
@@ -81,7 +92,7 @@ def _applied_here(store: Store, others: Sequence[CalibrationRecord], recording: 
     from labctl.services.criticism.verification import verify  # noqa: PLC0415  as above
 
     head: RecordingRow = store.recordings.get(recording)
-    measured = Measurements(store, head)
+    measured = Measurements(store, (head,))
 
     def applied(row: CalibrationRecord) -> float | None:
         try:

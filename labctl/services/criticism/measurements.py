@@ -1,7 +1,8 @@
-"""Measurements of one recording, as criticism uses them: each part is read from the store at most once."""
+"""Measurements of one recording, or of several as one, as fits and criticism use them: read from the store once."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,38 +10,101 @@ import numpy as np
 
 from labctl.errors import BadInput
 from labctl.fitting.criticism import decimate
+from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.fit_data import refuse_poses
+from labctl.fitting.data.joined import joined_coverage, joined_recording
 from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.output_steps import per_reading, quantisation_of
+from labctl.services.recordings.coverage import covered_of
 from labctl.services.recordings.inspection import inspect_stored
-from labctl.services.recordings.loading import is_profile, points_of
-from labctl.services.schemas.warnings import RecordingInspection
+from labctl.services.recordings.loading import is_profile, points_of, readings_question, source_of
+from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 
 
 @dataclass(frozen=True)
 class Measurements:
-    """One recording of the store; its means and its readings are read when they are first used."""
+    """One recording of the store, or several; means and readings are read when they are first used."""
 
     store: Store
-    row: RecordingRow
+    rows: tuple[RecordingRow, ...]  #: by number, rising
+
+    @property
+    def row(self) -> RecordingRow:
+        """The recording; of several the newest."""
+        return self.rows[-1]
+
+    @property
+    def recordings(self) -> tuple[int, ...]:
+        """The numbers of all of them, rising."""
+        return tuple(row.id for row in self.rows)
+
+    @property
+    def named(self) -> str:
+        """The recordings in words."""
+        return recordings_text(self.recordings)
+
+    @cached_property
+    def of_each(self) -> Mapping[int, Recording]:
+        """The means of each recording, by its number."""
+        return {row.id: points_of(self.store, row) for row in self.rows}
 
     @cached_property
     def points(self) -> Recording:
-        """The means as a fit takes them, one row per data set or piece of a long one."""
-        return points_of(self.store, self.row)
+        """The means as a fit takes them, one row per data set or piece of a long one. Raises BadInput."""
+        return joined_recording(self.of_each)
+
+    @property
+    def source(self) -> Recording:
+        """What a fit takes: the means, or of one recording in poses its readings. Raises BadInput."""
+        return source_of(self.store, self.row) if len(self.rows) == 1 else self.points
 
     @cached_property
-    def inspection(self) -> RecordingInspection:
-        """What is wrong with the recording, and what its readings cover."""
-        return inspect_stored(self.store, self.row)
+    def inspections(self) -> Mapping[int, RecordingInspection]:
+        """What is wrong with each recording, and what its readings cover, by its number."""
+        return {row.id: inspect_stored(self.store, row) for row in self.rows}
+
+    @cached_property
+    def warnings(self) -> list[DataWarning]:
+        """What is wrong with the data; of several recordings each says which."""
+        if len(self.rows) == 1:
+            return self.inspections[self.row.id].warnings
+        return [
+            warning.model_copy(
+                update={"where": f"recording {n}, {warning.where}", "text": f"recording {n}: {warning.text}"}
+            )
+            for n, found in self.inspections.items()
+            for warning in found.warnings
+        ]
+
+    @property
+    def covered(self) -> Covered | None:
+        """The range of the readings behind the means; None where it is not known."""
+        return joined_coverage(
+            [
+                covered_of(self.inspections[row.id], self.of_each[row.id].info) if row.kind == "samples" else None
+                for row in self.rows
+            ]
+        )
 
     @cached_property
     def readings(self) -> Recording:
         """The readings at no more than criticism needs; the means where there are no readings. Raises BadInput."""
-        report_stage("reading the recording")
-        return load_reduced_readings(self.store, self.row, self.points)
+        report_stage("reading the recording" if len(self.rows) == 1 else f"reading {self.named}")
+        return joined_recording(
+            {row.id: load_reduced_readings(self.store, row, self.of_each[row.id]) for row in self.rows}
+        )
+
+    def question(self) -> dict[str, object]:
+        """Return what an answer about these measurements depends on."""
+        return readings_question(self.store, self.rows)
+
+
+def recordings_text(recordings: tuple[int, ...]) -> str:
+    """Return "recording 3" or "recordings 1, 2 and 3"."""
+    *first, last = map(str, recordings)
+    return f"recordings {', '.join(first)} and {last}" if first else f"recording {last}"
 
 
 def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) -> Recording:

@@ -40,16 +40,18 @@ HISTORY = frozenset({"t_s", "power_s"})
 
 
 def answer_of(
-    serial: str, version: int, recording: int, found: Criticism, experiments: list[Experiment]
+    serial: str, version: int, recordings: Sequence[int], found: Criticism, experiments: list[Experiment]
 ) -> CriticismResponse:
     """Return the answer of a criticism."""
     verdict, base = found.verdict, found.base
     return CriticismResponse(
         serial=serial,
         version=version,
-        recording=recording,
+        recording=recordings[-1],
+        recordings=list(recordings),
         verdict=verdict.form,
-        text=sentences(found, experiments),
+        text=[*sentences(found, experiments), *(base.joint["text"] if base and base.joint else ())],
+        joint=base.joint if base else None,
         error={
             "rms_dps": base.error.rms_dps if base else None,
             "heldout_rms_dps": base.error.heldout_rms_dps if base else None,

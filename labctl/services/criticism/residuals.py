@@ -9,7 +9,7 @@ import numpy as np
 
 from labctl.fitting import FitResult
 from labctl.fitting.criticism import ReducedRecording, Residuals
-from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.channels import OWN_DATASET, RECORDING, Channels
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.numeric.arrays import Array, over
 from labctl.recording import Recording
@@ -64,8 +64,11 @@ def _shared(sets: Channels, dataset: np.ndarray, points: Recording) -> dict[str,
         known = dict(
             zip(np.asarray(points.columns["dataset"]).tolist(), np.asarray(points.columns["n"]).tolist(), strict=True)
         )
+    of = np.rint(np.asarray(sets[RECORDING], dtype=np.float64)).astype(int).tolist() if RECORDING in sets else []
+    own = np.rint(np.asarray(sets[OWN_DATASET], dtype=np.float64)).astype(int) if of else dataset
     return {
-        "dataset": dataset.tolist(),
+        **({"recording": of} if of else {}),
+        "dataset": own.tolist(),
         "position": [str(there) for there in sets["position"]],
         "run": np.rint(sets["run"]).astype(int).tolist() if "run" in sets else [1] * len(dataset),
         "n": [known.get(number) for number in dataset.tolist()],

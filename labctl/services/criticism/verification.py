@@ -33,7 +33,7 @@ def verify_unit(
     """
     row = version_of(store, serial, version)
     measured = newest_row(store, serial, recording, other_unit=other_unit)
-    return verify(store, row, Measurements(store, measured))
+    return verify(store, row, Measurements(store, (measured,)))
 
 
 def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> VerificationResponse:
@@ -56,7 +56,7 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
         version=row.version,
         recording=measured.row.id,
         recorded_unit=measured.row.serial,
-        seen=row.recording == measured.row.id,
+        seen=measured.row.id in row.recordings,
         datasets=len(outside),
         rms_dps=rms,
         max_dps=float(np.max(np.abs(pooled))),
@@ -110,8 +110,9 @@ def _expected_dps(row: CalibrationRecord) -> float | None:
     """
     if "poses" in row.answer:
         return row.answer["poses"]["moves"]["applied_rms_dps"]
-    error = row.answer["error"]
-    known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"]) if figure is not None]
+    error, joint = row.answer["error"], row.answer.get("joint")
+    later = joint["heldout_rms_dps"] if joint else None  # of several recordings each was predicted by the others
+    known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"], later) if figure is not None]
     return max(known, default=None)
 
 

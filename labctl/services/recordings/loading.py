@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.errors import NotEnoughData, NotFound
+from labctl.errors import BadInput, NotEnoughData, NotFound
 from labctl.recording import Recording, to_points
 from labctl.recording.output_steps import per_reading
 from labctl.recording.points import with_pieces
@@ -17,6 +17,9 @@ from labctl.services.cache import UNNAMED, compute
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.schemas.warnings import RecordingInspection
 from labctl.store import RecordingRow, Store
+
+#: Recordings that are fitted together, at most.
+MOST_TOGETHER = 32
 
 
 def points_of(store: Store, row: RecordingRow) -> Recording:
@@ -91,6 +94,31 @@ def newest_row(store: Store, serial: str, recording: int | None, *, other_unit: 
             f"recording {row.id} of unit {serial!r} holds no complete data set yet; wait for its first, or name another"
         )
     return row
+
+
+def chosen_rows(
+    store: Store, serial: str, recording: int | None, recordings: Sequence[int] = (), *, other_unit: bool = False
+) -> tuple[RecordingRow, ...]:
+    """Return the recordings asked for, several or one, rising; else the unit's newest in which something was measured.
+
+    Raises BadInput where both are given and differ, and what `newest_row` raises.
+    """
+    wanted = sorted(set(recordings))
+    if recording is not None and wanted and wanted != [recording]:
+        raise BadInput(f"recording {recording} and recordings {', '.join(map(str, wanted))}: say one of the two")
+    if len(wanted) > MOST_TOGETHER:
+        raise BadInput(f"{len(wanted)} recordings; at most {MOST_TOGETHER} are fitted together")
+    if len(wanted) < 2:
+        return (newest_row(store, serial, wanted[0] if wanted else recording, other_unit=other_unit),)
+    return tuple(newest_row(store, serial, number, other_unit=other_unit) for number in wanted)
+
+
+def readings_question(store: Store, rows: Sequence[RecordingRow]) -> dict[str, object]:
+    """Return what an answer about recordings depends on."""
+    readings = [store.recordings.fingerprint(row.id, head=row) for row in rows]
+    if len(rows) == 1:
+        return {"recording": rows[0].id, "readings": readings[0]}
+    return {"recordings": [row.id for row in rows], "readings": readings}
 
 
 def _measured(row: RecordingRow) -> bool:

@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.json_types.effects import CataloguedEffect, PresetJson
+from labctl.json_types.joint import JointJson
 from labctl.json_types.models import (
     AxisCoefficients,
     AxisNoiseJson,
@@ -27,10 +28,15 @@ from labctl.services.schemas.warnings import WARNINGS, DataWarning
 ACCEPT = "Fit also what is certainly wrong, or worse than no correction; the answer still holds the warnings."
 
 
+SEVERAL = "Several recordings of the unit, fitted together; instead of `recording`."
+FITTED_TO = "All recordings that it was fitted to; `recording` is the newest of them."
+
+
 class FitRequest(Request):
     """Which model to fit to which recording."""
 
     recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
+    recordings: list[int] = Field(default_factory=list, description=SEVERAL)
     model: str | None = Field(default=None, description="ojeda2000, yang2018, single_temperature, weiss1995 ...")
     effects: list[str] = Field(
         default_factory=list,
@@ -47,6 +53,7 @@ class ImproveRequest(Request):
     formula: list[str] = Field(default_factory=list, description="Effects of your own: 'name: expression'.")
     version: int | None = Field(default=None, description="Version to change; default: the newest.")
     recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
+    recordings: list[int] = Field(default_factory=list, description=f"{SEVERAL} Default: those of a joint version.")
     accept_warnings: bool = Field(default=False, description=ACCEPT)
 
 
@@ -119,6 +126,10 @@ class FittedResponse(ResponseModel):
     poses: PosesJson | None = Field(
         default=None, description="Of a calibration by hand: rests, the accelerometer, moves, held-out moves."
     )
+    recordings: list[int] = Field(default_factory=list, description=FITTED_TO)
+    joint: JointJson | None = Field(
+        default=None, description="Of several recordings: repeatability, agreement, each predicted by the others."
+    )
 
 
 class FitResponse(FittedResponse):
@@ -160,6 +171,7 @@ class LadderRow(ResponseModel):
     version: int
     parent: int | None
     recording: int | None = Field(description="The recording that the version was fitted to.")
+    recordings: list[int] = Field(default_factory=list, description=FITTED_TO)
     model: str
     effects: list[str]
     applied_rms_dps: float | None = Field(
@@ -176,6 +188,7 @@ class LadderResponse(ResponseModel):
 
     serial: str
     recording: int | None = Field(default=None, description="The recording of all steps.")
+    recordings: list[int] = Field(default_factory=list, description="All recordings of the steps.")
     steps: list[LadderRow]
     others: list[LadderRow] = Field(
         default_factory=list, description="Versions of other recordings, and their error on this one."

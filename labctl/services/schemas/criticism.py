@@ -18,6 +18,7 @@ from labctl.json_types.criticism import (
     Suspect,
     WorstDataSet,
 )
+from labctl.json_types.joint import JointJson
 from labctl.json_types.views import Views
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
@@ -58,6 +59,10 @@ class CriticismResponse(ResponseModel):
     serial: str
     version: int
     recording: int
+    recordings: list[int] = Field(default_factory=list, description="All recordings; `recording` is the newest.")
+    joint: JointJson | None = Field(
+        default=None, description="Of several recordings: repeatability, agreement, each predicted by the others."
+    )
     verdict: Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
     text: list[str] = Field(description="The verdict in words, the answer first.")
     error: CriticisedErrors
@@ -106,6 +111,7 @@ class StageResponse(ResponseModel):
 class ResidualColumns(ResponseModel):
     """One row per data set and axis, as lists of equal length. A data set far longer than the others is in pieces."""
 
+    recording: list[int] = Field(default_factory=list, description="Of several recordings; empty for a single one.")
     dataset: list[int] = Field(default_factory=list)
     axis: list[str] = Field(default_factory=list)
     position: list[str] = Field(default_factory=list)
@@ -132,6 +138,7 @@ class ResidualsResponse(ResponseModel):
     serial: str
     version: int
     recording: int
+    recordings: list[int] = Field(default_factory=list, description="All recordings; `recording` is the newest.")
     columns: ResidualColumns
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, Literal
 
@@ -74,6 +75,12 @@ def _next_version(connection: sa.Connection, serial: str) -> int:
     return int(connection.scalar(sa.select(sa.func.max(c.version)).where(c.serial == serial)) or 0) + 1
 
 
+def _add_recordings(connection: sa.Connection, calibration: int | None, recordings: Sequence[int]) -> None:
+    values = [{"calibration_id": calibration, "recording_id": recording} for recording in recordings]
+    if values:
+        connection.execute(sa.insert(tables.calibration_recordings), values)
+
+
 #: Made once: what every GET asks.
 _DOCUMENT = _document_query().where(tables.calibrations.c.version == sa.bindparam("version"))
 _IN_FORCE = _in_force_query()
@@ -89,6 +96,13 @@ class NewCalibration:
     document: bytes
     hash: str
     answer: KeptAnswer
+    recordings: tuple[int, ...] = ()  #: all that it was fitted to, where there are several
+
+    @property
+    def fitted_to(self) -> tuple[int, ...]:
+        """All recordings that it was fitted to, rising."""
+        one = () if self.recording is None else (self.recording,)
+        return tuple(sorted({*self.recordings, *one}))
 
 
 class Calibrations:
@@ -117,8 +131,14 @@ class Calibrations:
             with self._database.writing() as connection:
                 if _next_version(connection, serial) != version:
                     raise taken
-                connection.execute(sa.insert(tables.calibrations).values(**values))
-                detail = {"model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash}
+                c = tables.calibrations.c
+                number = connection.scalar(sa.insert(tables.calibrations).values(**values).returning(c.id))
+                _add_recordings(connection, number, new.fitted_to)
+                detail: dict[str, Any] = {
+                    "model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash,
+                }  # fmt: skip
+                if len(new.fitted_to) > 1:
+                    detail["recordings"] = list(new.fitted_to)
                 act = "fit" if new.parent is None else "improve"
                 append(connection, at, act, f"{serial} version {version}", detail)
         except exc.IntegrityError as error:  # where several processes write: after the look, before the end
@@ -126,7 +146,7 @@ class Calibrations:
                 raise
             raise taken from error
         return CalibrationRecord(
-            serial, version, new.parent, new.recording, new.model, at, new.hash, new.document, new.answer
+            serial, version, new.parent, new.recording, new.model, at, new.hash, new.document, new.answer, new.fitted_to
         )
 
     def get(self, serial: str, version: int) -> CalibrationRecord:
@@ -145,10 +165,16 @@ class Calibrations:
     def _rows(self, *conditions: sa.ColumnElement[bool]) -> list[CalibrationRecord]:
         c = tables.calibrations.c
         query = sa.select(
-            c.serial, c.version, c.parent, c.recording_id, c.model, c.created_at, c.hash, c.document, c.answer
+            c.id, c.serial, c.version, c.parent, c.recording_id, c.model, c.created_at, c.hash, c.document, c.answer
         ).where(*conditions)
+        r = tables.calibration_recordings.c
+        of = sa.select(r.calibration_id, r.recording_id).join(tables.calibrations, c.id == r.calibration_id)
+        fitted_to: dict[int, list[int]] = {}
         with self._database.reading() as connection:
-            return [CalibrationRecord(*row) for row in connection.execute(query.order_by(c.version.desc()))]
+            rows = connection.execute(query.order_by(c.version.desc())).all()
+            for number, recording in connection.execute(of.where(*conditions).order_by(r.recording_id)):
+                fitted_to.setdefault(number, []).append(recording)
+        return [replace(CalibrationRecord(*row[1:]), recordings=tuple(fitted_to.get(row.id, ()))) for row in rows]
 
     def certified_version(self, serial: str) -> int:
         """Return the version in force; raises NotCertified."""

@@ -22,6 +22,14 @@ calibrations = sa.Table(
     sa.UniqueConstraint("serial", "version"),
 )
 
+#: All recordings that a version was fitted to; `recording_id` of the version is the newest of them.
+calibration_recordings = sa.Table(
+    "calibration_recordings",
+    metadata,
+    sa.Column("calibration_id", RowId, sa.ForeignKey("calibrations.id"), primary_key=True, autoincrement=False),
+    sa.Column("recording_id", RowId, sa.ForeignKey("recordings.id"), primary_key=True, autoincrement=False),
+)
+
 certifications = sa.Table(
     "certifications",
     metadata,

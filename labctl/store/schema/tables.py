@@ -5,7 +5,7 @@ from __future__ import annotations
 from labctl.store.schema.api_keys import api_keys
 from labctl.store.schema.audit import audit, audit_head
 from labctl.store.schema.benches import benches, leases
-from labctl.store.schema.calibrations import calibrations, certifications
+from labctl.store.schema.calibrations import calibration_recordings, calibrations, certifications
 from labctl.store.schema.campaigns import campaigns, events, steps
 from labctl.store.schema.recordings import data_set_means, data_sets, environment, recordings, sample_blocks
 from labctl.store.schema.schedule import scheduled_starts, start_events
@@ -18,6 +18,7 @@ __all__ = [
     "audit",
     "audit_head",
     "benches",
+    "calibration_recordings",
     "calibrations",
     "campaigns",
     "certifications",

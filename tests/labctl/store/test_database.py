@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import sqlite3
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -236,3 +237,19 @@ def test_a_database_url_that_labctl_does_not_know_is_refused_without_its_passwor
     assert url.partition("://")[0] in str(caught.value)
     assert "secret" not in str(caught.value)
     assert "cret" not in str(caught.value)
+
+
+def test_all_recordings_of_a_version_are_kept_and_the_step_can_be_taken_back(store: Store, location: str) -> None:
+    """Versions of before step 0011 have the recording that they were fitted to; taken back, the newest stays."""
+    first = store.recordings.of_unit("G-1")[0].id
+    second = store.recordings.add_import(samples(2), AT)
+    store.calibrations.add("G-1", AT, 1, replace(_calibration(1), recording=second, recordings=(first, second)))
+    assert store.calibrations.get("G-1", 1).recordings == (first, second)
+    assert store.audit.rows()[-1].detail["recordings"] == [first, second]
+    with store.calibrations._database.writing() as connection:
+        command.downgrade(migrate.configuration(connection), "0010")
+        assert not sa.inspect(connection).has_table("calibration_recordings")
+    store.close()
+    with open_store(location, write=True) as migrated:
+        assert migrated.calibrations.get("G-1", 1).recordings == (second,)
+        assert migrated.calibrations.get("G-1", 1).recording == second

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.data.channels import OWN_DATASET, RECORDING
 from labctl.recording import Recording
 from labctl.recording.points import dataset_starts
 
@@ -48,7 +49,7 @@ def decimate(recording: Recording) -> Recording:
         unit = recording.info.output.get(axis)
         if unit is not None:
             numbers[f"gyro_{axis}"] = unit.offset + unit.scale * numbers[f"gyro_{axis}"]
-    for name in ("run", "mounting"):
+    for name in ("run", "mounting", RECORDING, OWN_DATASET):
         if name in numbers:
             texts[name] = np.rint(numbers.pop(name)).astype(np.int64)
     return Recording(recording.info, {"dataset": dataset, **numbers, **texts}, recording.environment)

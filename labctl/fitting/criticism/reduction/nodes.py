@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.reduction.decimation import FASTEST_HZ
 from labctl.fitting.criticism.reduction.rectangular import Padded
-from labctl.fitting.data.channels import Channels, body_rates
+from labctl.fitting.data.channels import OWN_DATASET, RECORDING, Channels, body_rates
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.temperature_channel import with_stand_in
 from labctl.fitting.data.temperature_history import history_of
@@ -41,12 +41,15 @@ def nodes_of(
         if not name.startswith("gyro_"):
             columns[name] = averaged(padded.of(values)).ravel()
     begin = padded.index[:, 0]
-    for name in ("run", "mounting"):
+    for name in ("run", "mounting", RECORDING, OWN_DATASET):
         if name in columns:
             columns[name] = np.repeat(numbers[name][begin], bins)
     rate = numbers["table_rate_dps"][begin]
     columns["table_rate_dps"] = np.repeat(rate, bins)
-    columns["previous_rate_dps"] = np.repeat(np.concatenate([[0.0], rate[:-1]]), bins)
+    previous = np.concatenate([[0.0], rate[:-1]])
+    if RECORDING in numbers:  # nothing is remembered from one recording to the next
+        previous[1:][np.diff(numbers[RECORDING][begin]) != 0] = 0.0
+    columns["previous_rate_dps"] = np.repeat(previous, bins)
     spacing = float(np.median(np.diff(since[0][: int(padded.there[0].sum())]))) if n > 1 else 1.0 / FASTEST_HZ
     middle = averaged(since)
     length = np.maximum(inside, 1.0) * spacing

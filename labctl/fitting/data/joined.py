@@ -1,0 +1,170 @@
+"""Several recordings of one unit as one: columns one below the other, and the column `recording` that tells them apart.
+
+What counts up in each recording (data sets, runs, mountings) goes on counting, so that nothing of two recordings has
+one number; `t_s` runs from the start of the first, and `recording_t_s` is the time within each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadInput
+from labctl.fitting.data.channels import OWN_DATASET, RECORDING, WITHIN_S
+from labctl.fitting.data.covered import Covered
+from labctl.fitting.data.temperature_channel import with_temperature
+from labctl.recording import Recording, RecordingInfo, to_points
+
+#: Numbers that go on counting from recording to recording.
+COUNTED = ("dataset", "run", "mounting")
+#: Recordings whose clocks overlap, as simulated ones do, are put this far behind one another, s.
+APART_S = 3600.0
+#: What must be the same in all of them: the document of a calibration says it once, or a fit takes it from the head.
+SAME = ("serial", "axes", "output", "latitude_deg", "tilt_deg", "tilt_azimuth_deg", "table_axis")
+#: Motions whose recordings have a rate of the table at each data set, and so go together.
+WITH_TABLE_RATE = frozenset({"rates", "rest"})
+
+Rows = dict[str, NDArray[np.generic]]
+
+
+@dataclass
+class _Counts:
+    """How far the recordings joined so far have counted."""
+
+    last: dict[str, int]
+    end_s: float = 0.0
+
+
+def joined_recording(parts: Mapping[int, Recording]) -> Recording:
+    """Return recordings, number -> recording, as one, in order of their starts; a single one as it is.
+
+    Readings stay readings where all of them have readings, else they become means. A channel that one of them lacks is
+    left out. Raises BadInput for recordings that do not go together, NotEnoughData where one has no thermometer.
+    """
+    if len(parts) == 1:
+        return next(iter(parts.values()))
+    order = sorted(parts, key=lambda number: (parts[number].info.started_at, number))
+    _require_alike(order, parts)
+    whole = {number: with_temperature(parts[number]) for number in order}
+    if any(recording.info.kind != "samples" for recording in whole.values()):
+        whole = {number: to_points(recording) for number, recording in whole.items()}
+    first = whole[order[0]].info
+    counts = _Counts(dict.fromkeys(COUNTED, 0))
+    tables: list[Rows] = []
+    surroundings: list[Rows] = []
+    for number in order:
+        rows, environment = _renumbered(number, whole[number], first, counts)
+        tables.append(rows)
+        surroundings.append(environment)
+    info = first.model_copy(update={"max_rate_dps": max((r.info.max_rate_dps or 0.0) for r in whole.values()) or None})
+    around = _below_one_another(surroundings) if all(surroundings) else None
+    return Recording(info, _below_one_another(tables), around)
+
+
+def recordings_in(columns: Mapping[str, NDArray[np.generic]]) -> list[int]:
+    """Return the numbers of the recordings that rows are of, in the order in which they were made; [] of a single one.
+
+    The order is that of time, because it is the order of their rows.
+    """
+    if RECORDING not in columns:
+        return []
+    numbers, first = np.unique(np.asarray(columns[RECORDING]), return_index=True)
+    return [int(numbers[k]) for k in np.argsort(first)]
+
+
+def joined_coverage(parts: Sequence[Covered | None]) -> Covered | None:
+    """Return what several recordings cover together; None where that is not known of one of them."""
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    axes = known[0].rate_dps
+    low, high = (
+        [end for end in ends if end is not None] for ends in zip(*(p.temperature_c for p in known), strict=True)
+    )
+    is_known = len(low) == len(high) == len(known)  # a recording at rest may be without a thermometer
+    return Covered(
+        (min(low), max(high)) if is_known else (None, None),
+        {a: (min(part.rate_dps[a][0] for part in known), max(part.rate_dps[a][1] for part in known)) for a in axes},
+    )
+
+
+def _require_alike(order: Sequence[int], parts: Mapping[int, Recording]) -> None:
+    first = parts[order[0]].info
+    for number in order:
+        info = parts[number].info
+        if info.kind == "coefficients":
+            raise BadInput(
+                f"recording {number} of {info.serial} is a table of coefficients; only readings or means go together"
+            )
+        for name in SAME:
+            if getattr(info, name) != getattr(first, name):
+                raise BadInput(
+                    f"recordings {order[0]} and {number} differ in {name} ({getattr(first, name)} and "
+                    f"{getattr(info, name)}); fit them one by one"
+                )
+        if info.motion != first.motion and not {info.motion, first.motion} <= WITH_TABLE_RATE:
+            raise BadInput(
+                f"recordings {order[0]} and {number} differ in motion ({first.motion} and {info.motion}); only "
+                f"{' and '.join(sorted(WITH_TABLE_RATE))} go together: fit them one by one"
+            )
+
+
+def _renumbered(number: int, recording: Recording, first: RecordingInfo, counts: _Counts) -> tuple[Rows, Rows]:
+    """Return the columns and the environment of a recording as they stand in the joined one."""
+    n = len(recording)
+    columns: Rows = {name: np.asarray(values) for name, values in recording.columns.items()}
+    columns[OWN_DATASET] = columns["dataset"] = np.asarray(columns["dataset"], dtype=np.int64)
+    columns[RECORDING] = np.full(n, number, dtype=np.int64)
+    columns.setdefault("position", np.full(n, recording.info.axes[0]))
+    if recording.info.kind == "points" and "previous_rate_dps" not in columns:
+        rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
+        columns["previous_rate_dps"] = np.concatenate([[0.0], rate[:-1]])[:n]
+    behind = dict(counts.last)
+    for name in COUNTED:
+        own = np.asarray(columns.get(name, np.ones(n)), dtype=np.int64)
+        columns[name] = own - int(own.min(initial=1)) + 1 + behind[name]
+        counts.last[name] = int(columns[name].max(initial=behind[name]))
+    environment = _environment(recording, columns)
+    shift_s = 0.0
+    if "t_s" in columns:
+        t_s = np.asarray(columns["t_s"], dtype=np.float64)
+        shift_s = (recording.info.started_at - first.started_at).total_seconds()
+        if counts.end_s and shift_s + t_s.min(initial=np.inf) < counts.end_s:
+            shift_s = counts.end_s + APART_S - float(t_s.min())
+        columns |= {"t_s": t_s + shift_s, WITHIN_S: t_s}
+        counts.end_s = float(t_s.max(initial=0.0)) + shift_s
+    if "t_s" in environment:
+        environment["t_s"] = np.asarray(environment["t_s"], dtype=np.float64) + shift_s
+    return columns, environment
+
+
+def _environment(recording: Recording, columns: Rows) -> Rows:
+    """Return the environment of a recording, its runs counted as in `columns`; its own data sets where it has none."""
+    source = recording.environment
+    runs = np.unique(np.asarray(columns["run"]))
+    if not source or "t_s" not in source or "temperature_c" not in source:
+        names = [name for name in ("t_s", "run", "temperature_c") if name in recording.columns]
+        return {name: np.asarray(recording.columns[name] if name != "run" else columns["run"]) for name in names} | (
+            {"run": np.asarray(columns["run"])} if "t_s" in names else {}
+        )
+    found = {name: np.asarray(values) for name, values in source.items()}
+    if "run" in found:
+        own = np.unique(np.asarray(recording.columns.get("run", np.ones(1))))
+        found["run"] = np.asarray(found["run"], dtype=np.int64) - int(own.min()) + int(runs.min())
+        return found
+    repeated = {name: np.tile(values, len(runs)) for name, values in found.items()}
+    return repeated | {"run": np.repeat(runs, len(found["t_s"]))}
+
+
+def _below_one_another(tables: Sequence[Rows]) -> Rows:
+    names = [name for name in tables[0] if all(name in table for table in tables)]
+    return {name: np.concatenate([table[name] for table in tables]) for name in names}
+
+
+def without_recordings(recording: Recording, numbers: Sequence[int]) -> Recording:
+    """Return a joined recording without some of its recordings; its environment stays whole."""
+    kept = ~np.isin(np.asarray(recording.columns[RECORDING]), numbers)
+    return replace(recording, columns={name: np.asarray(values)[kept] for name, values in recording.columns.items()})

@@ -1,0 +1,208 @@
+"""Variance components: how much what is shared by a group of data differs from group to group, beside a linear fit.
+
+Given the triangle of a fit whose last columns are random effects under a wide prior, the standard deviation of each
+kind of effect is averaged over by its restricted likelihood, with equal weight per factor of its size. For two groups
+that gives the interval of Student's t with one degree of freedom, as it must: two draws say little of a spread.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc, ndtr
+
+from labctl.fitting.numeric.arrays import Array
+
+#: Standard deviations tried for each kind: so many, from this share of what an effect is uncertain by ...
+SIZES, LEAST = 18, 0.1
+#: ... to this many times the effects themselves, of which no spread is this many times smaller than they are.
+MOST, IMPOSSIBLE = 200.0, 30.0
+#: Points that together hold less than this share of the evidence are left out.
+NEGLIGIBLE = 1e-4
+#: Of an interval, and its half width over the standard deviation of a normal distribution.
+LEVEL, FACTOR = 0.95, 1.959963984540054
+BISECTIONS = 40
+
+
+@dataclass(frozen=True)
+class RandomEffects:
+    """The last q columns of a design: the kind of each from 0, and the standard deviation of its prior, (q,) each."""
+
+    kind: NDArray[np.int64]
+    wide: Array
+
+    @property
+    def kinds(self) -> int:
+        """How many kinds there are."""
+        return int(self.kind.max(initial=-1)) + 1
+
+
+@dataclass(frozen=True)
+class Component:
+    """Standard deviation of one kind of random effect, in the unit of its coefficients."""
+
+    value: float  #: median of what is believed of it
+    u: float  #: half of its central 68 %
+    low: float  #: 95 %, from
+    high: float  #: to
+    groups: int  #: independent effects that it was estimated from, less those the fit takes up
+    p_value: float  #: of effects as large as these from noise alone
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """A linear fit at d noises, as triangles: r (d, K, K), projected data (d, K), noise scale and log evidence (d,)."""
+
+    r: NDArray[np.float64]
+    projected: NDArray[np.float64]
+    scale: Array
+    log_evidence: Array
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Coefficients of the fixed columns and of the random effects, (K,), averaged, and the spread of each kind.
+
+    The covariance (K, K) has for each coefficient the half width of its 95 % interval over 1.96 as its standard
+    uncertainty: few groups make wide tails, which a standard deviation does not tell.
+    """
+
+    values: Array
+    covariance: NDArray[np.float64]
+    components: tuple[Component, ...]
+
+
+@dataclass(frozen=True)
+class _Information:
+    """What the data of one noise say of the random effects: information (q, q) and its product with them (q,)."""
+
+    matrix: NDArray[np.float64]
+    product: Array
+
+
+def mixture(found: Triangles, random: RandomEffects) -> Mixture:
+    """Return the fit averaged over noise and over the standard deviations of the random effects."""
+    q = len(random.kind)
+    k = found.r.shape[1] - q
+    at = [_information(found, d, k, random) for d in range(len(found.scale))]
+    best = int(np.argmax(found.log_evidence))
+    grid = _grid(at[best], random)
+    log_weight = np.stack([_log_likelihood(each, grid) for each in at])
+    wide = np.array([_log_likelihood(each, np.asarray(random.wide)[None, :])[0] for each in at])
+    log_weight += (np.asarray(found.log_evidence) - wide)[:, None]
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    values, spreads, shares = [], [], []
+    covariance: NDArray[np.float64] = np.zeros((k + q, k + q))
+    for d, information in enumerate(at):
+        chosen = _counting(weight[d])
+        if not len(chosen):
+            continue
+        inverse = np.linalg.inv(information.matrix + np.apply_along_axis(np.diag, 1, grid[chosen] ** -2.0))
+        effects = inverse @ information.product
+        root = np.linalg.inv(found.r[d, :k, :k]) * np.sqrt(found.scale[d])
+        gain = np.linalg.solve(found.r[d, :k, :k], found.r[d, :k, k:])
+        fixed = np.linalg.solve(found.r[d, :k, :k], found.projected[d, :k]) - effects @ gain.T
+        lever = np.vstack([-gain, np.eye(q)])
+        own = np.zeros((k + q, k + q))
+        own[:k, :k] = root @ root.T
+        share = weight[d, chosen]
+        mean_inverse = np.tensordot(share, inverse, axes=1)
+        covariance += share.sum() * own + lever @ mean_inverse @ lever.T
+        values.append(np.column_stack([fixed, effects]))
+        variance = np.einsum("ki,nij,kj->nk", lever, inverse, lever) + np.diag(own)
+        spreads.append(np.sqrt(np.maximum(variance, 0.0)))
+        shares.append(share)
+    each, spread, share = np.concatenate(values), np.concatenate(spreads), np.concatenate(shares)
+    share = share / share.sum()
+    mean = share @ each
+    covariance += (each - mean).T @ (share[:, None] * (each - mean))
+    u = half_width(each, spread, share, mean) / FACTOR
+    stretch = u / np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    components = tuple(_component(kind, grid, weight.sum(axis=0), at[best], random) for kind in range(random.kinds))
+    return Mixture(mean, stretch[:, None] * covariance * stretch, components)
+
+
+def half_width(
+    values: NDArray[np.float64], spreads: NDArray[np.float64], share: Array, centre: Array, level: float = LEVEL
+) -> Array:
+    """Return the half width (k,) about `centre` (k,) that holds `level` of n normal distributions (n, k) by `share`."""
+    low = np.zeros(len(centre))
+    high = np.max(np.abs(values - centre) + 8.0 * spreads, axis=0)
+    off, spreads = values - centre, np.maximum(spreads, 1e-300)
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        inside = share @ (ndtr((middle - off) / spreads) - ndtr((-middle - off) / spreads))
+        enough = inside >= level
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    return np.asarray((low + high) / 2)
+
+
+def _information(found: Triangles, d: int, k: int, random: RandomEffects) -> _Information:
+    """Return the information on the random effects with the fixed coefficients eliminated and without the prior."""
+    block = found.r[d, k:, k:]
+    matrix = (block.T @ block - np.diag(np.asarray(random.wide) ** -2.0)) / found.scale[d]
+    return _Information((matrix + matrix.T) / 2, np.asarray(block.T @ found.projected[d, k:] / found.scale[d]))
+
+
+def _grid(information: _Information, random: RandomEffects) -> NDArray[np.float64]:
+    """Return standard deviations of each effect to average over, (n, q): all combinations of those of the kinds."""
+    inverse = np.linalg.inv(information.matrix + np.diag(np.asarray(random.wide) ** -2.0))
+    effects = inverse @ information.product
+    sizes = []
+    for kind in range(random.kinds):
+        here = random.kind == kind
+        uncertain = float(np.median(1.0 / np.sqrt(np.maximum(np.diag(information.matrix)[here], 1e-300))))
+        spread = _spread(effects[here])
+        largest = min(float(np.max(np.asarray(random.wide)[here])), MOST * max(spread, uncertain))
+        least = min(max(LEAST * uncertain, spread / IMPOSSIBLE), largest / 10)
+        sizes.append(np.geomspace(least, largest, SIZES))
+    points = np.stack(np.meshgrid(*sizes, indexing="ij"), axis=-1).reshape(-1, random.kinds)
+    return np.asarray(points[:, random.kind])
+
+
+def _spread(effects: Array) -> float:
+    return float(np.sqrt(np.sum((effects - effects.mean()) ** 2) / max(len(effects) - 1, 1)))
+
+
+def _log_likelihood(information: _Information, grid: NDArray[np.float64]) -> Array:
+    """Return the restricted log likelihood of each point of a grid (n, q), (n,), but for what all points share."""
+    matrix = information.matrix + np.apply_along_axis(np.diag, 1, grid**-2.0)
+    _, log_det = np.linalg.slogdet(matrix)
+    explained = np.einsum("i,ni->n", information.product, np.linalg.solve(matrix, information.product))
+    return np.asarray(-np.log(grid).sum(axis=1) - 0.5 * log_det + 0.5 * explained)
+
+
+def _counting(weight: Array) -> NDArray[np.int64]:
+    """Return the points that hold all of the evidence but a negligible share."""
+    return np.flatnonzero(weight > NEGLIGIBLE / len(weight))
+
+
+def _component(
+    kind: int, grid: NDArray[np.float64], weight: Array, information: _Information, random: RandomEffects
+) -> Component:
+    here = random.kind == kind
+    sizes, place = np.unique(grid[:, np.flatnonzero(here)[0]], return_inverse=True)
+    share = np.bincount(place, weight)
+    middles = np.cumsum(share) - share / 2
+    low, lower, value, upper, high = np.exp(np.interp([0.025, 0.16, 0.5, 0.84, 0.975], middles, np.log(sizes)))
+    chi2, groups = _scatter(information, here, random)
+    p_value = float(chdtrc(groups, chi2)) if groups else 1.0
+    return Component(float(value), float(upper - lower) / 2, float(low), float(high), groups, p_value)
+
+
+def _scatter(information: _Information, here: NDArray[np.bool_], random: RandomEffects) -> tuple[float, int]:
+    """Return chi2 of the effects of one kind with the others free, and its degrees of freedom."""
+    rest = ~here
+    matrix, product = information.matrix[np.ix_(here, here)], information.product[here]
+    if rest.any():
+        crossed = information.matrix[np.ix_(here, rest)]
+        others = information.matrix[np.ix_(rest, rest)] + np.diag(np.asarray(random.wide)[rest] ** -2.0)
+        matrix = matrix - crossed @ np.linalg.solve(others, crossed.T)
+        product = product - crossed @ np.linalg.solve(others, information.product[rest])
+    sizes, vectors = np.linalg.eigh(matrix)
+    known = sizes > 1e-6 * max(float(sizes.max()), 1e-300)
+    along = vectors[:, known].T @ product
+    return float(np.sum(along**2 / sizes[known])), int(known.sum())
