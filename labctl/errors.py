@@ -3,6 +3,7 @@
 LabctlError              exit 2, HTTP 400
 ├── BadInput             a file, an option or a request is wrong; nothing was changed
 │   ├── BadRecording     in a recording: names file, column, row and what was expected
+│   │   └── BadFile      everything that is wrong with a log file, one line each
 │   ├── StartNotConfirmed    a real bench starts only after a person has confirmed that it is clear   HTTP 422
 │   ├── DataRefused      the data are certainly wrong, or a fit makes them worse     HTTP 422
 │   ├── BadBench         in a bench file
@@ -30,6 +31,7 @@ LabctlError              exit 2, HTTP 400
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from labctl.json_types import JsonObject
 
@@ -57,6 +59,27 @@ class BadRecording(BadInput):
     """A recording is wrong; the text names file, column, row and what was expected."""
 
     slug = "bad-recording"
+
+
+class BadFile(BadRecording):
+    """A log file is wrong; nothing of it was kept. `problems`: everything that is wrong with it, one line each."""
+
+    slug = "bad-file"
+
+    def __init__(self, path: Path | str, problems: Sequence[str]) -> None:
+        self.problems = list(problems)
+        more = f" (and {len(self.problems) - 1} more)" if len(self.problems) > 1 else ""
+        super().__init__(f"{path}: {self.problems[0]}{more}")
+        self.path = str(path)
+
+    def __reduce__(self) -> tuple[type[BadFile], tuple[str, list[str]]]:
+        """A worker process sends it whole."""
+        return type(self), (self.path, self.problems)
+
+    @property
+    def members(self) -> JsonObject:
+        """The problems."""
+        return {"problems": list(self.problems)}
 
 
 class DataRefused(BadInput):
