@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
+from rich.markup import escape
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.output import console, stderr, table
@@ -76,7 +77,9 @@ class Acceptance:
         if not self.accepted and not found.problems:
             if not self.quiet:
                 show(found)
-            stderr.print(f"map -> {self.out}; nothing was imported: labctl import {self.path} --map {self.out}", style="dim")
+            stderr.print(
+                f"map -> {self.out}; nothing was imported: labctl import {self.path} --map {self.out}", style="dim"
+            )
             raise typer.Exit(0)
 
     def _refuse(self, found: MappedFile) -> None:
@@ -86,7 +89,9 @@ class Acceptance:
         if self.out is not None:
             hint = f"the map is in {self.out}: correct it and import with --map {self.out}"
         elif not self.given and any("[" in line or "sample_rate_hz" in line for line in lines):
-            hint = f"labctl import {self.path} --write-map MAP.toml writes the map so far, to correct and give with --map"
+            hint = (
+                f"labctl import {self.path} --write-map MAP.toml writes the map so far, to correct and give with --map"
+            )
         else:
             raise BadFile(self.path, lines)
         raise BadFile(self.path, [f"{lines[0]} ({hint})"] if len(lines) == 1 else [*lines, hint])
@@ -111,14 +116,16 @@ def show(found: MappedFile) -> None:
     for target, column in found.column_map.columns.items():
         raw = found.table.columns.get(str(column.source))
         unit = column.unit or (raw.unit if raw is not None else "")
-        mapped.add_row(target, str(column.source), unit or "–", "" if column.scale is None else f"{column.scale:g}")
+        mapped.add_row(
+            target, escape(str(column.source)), escape(unit) or "–", "" if column.scale is None else f"{column.scale:g}"
+        )
     console.print(mapped)
     for guess in found.guesses:
         console.print(f"guessed: {guess}", markup=False, style="yellow")
     names = list(found.table.columns)[:SHOWN_COLUMNS]
-    rows = table("first rows", *names)
+    rows = table("first rows", *(escape(name) for name in names))
     for row in found.table.shown_rows()[:SHOWN_ROWS]:
-        rows.add_row(*row[: len(names)])
+        rows.add_row(*(escape(cell) for cell in row[: len(names)]))
     console.print(rows)
     if log is not None:
         info = log.recording.info

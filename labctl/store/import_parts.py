@@ -119,7 +119,7 @@ def _head(recording: int, number: int, part: Columns, n: int) -> Row:
         "position": str(part["position"][0]),
         "run": int(part["run"][0]) if "run" in part else 1,
         "mounting": int(part["mounting"][0]) if "mounting" in part else 1,
-        "table_rate_dps": float(part["table_rate_dps"].mean()),
+        "table_rate_dps": float(part["table_rate_dps"].mean()) if "table_rate_dps" in part else 0.0,  # turned by hand
         "table_angle_deg": None if angle is None else float(angle[0]),
         "chamber_setpoint_c": None if setpoint is None else float(setpoint[0]),
         "gate_from_s": float(part["t_s"][0]) if "t_s" in part else None,

@@ -20,8 +20,8 @@ def import_(
         Path | None,
         typer.Argument(
             metavar="PATH",
-            help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file or a ROS bag; or what another "
-            "importer knows.",
+            help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file or a ROS bag; or what "
+            "another importer knows.",
         ),
     ] = None,
     importer: Annotated[
@@ -34,7 +34,9 @@ def import_(
     ] = None,
     column_map: Annotated[
         Path | None,
-        typer.Option("--map", metavar="FILE", help="What the columns of a log are, as TOML; default: proposed and asked."),
+        typer.Option(
+            "--map", metavar="FILE", help="What the columns of a log are, as TOML; default: proposed and asked."
+        ),
     ] = None,
     accept_map: Annotated[
         bool, typer.Option("--accept-map", help="Import by the proposed map without a question.")
@@ -60,7 +62,9 @@ def import_(
         print_template(template)
         return
     with one_clear_line():
-        accept = Acceptance(named(path), given=column_map is not None, accepted=accept_map, out=write_map, quiet=as_json)
+        accept = Acceptance(
+            named(path), given=column_map is not None, accepted=accept_map, out=write_map, quiet=as_json
+        )
         with as_interchange(accept.path, importer, option or [], read_given(column_map), accept.ask) as folder:
             answer = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
     if as_json:

@@ -54,7 +54,7 @@ def converted(target: str, mapped: MappedColumn, column: RawColumn, problems: Pr
     return found
 
 
-def output_of(target: str, mapped: MappedColumn, column: RawColumn) -> tuple[Array, OutputUnit | None]:
+def output_of(mapped: MappedColumn, column: RawColumn) -> tuple[Array, OutputUnit | None]:
     """Return a gyro's output as the recording keeps it, (n,), and its unit; None for deg/s.
 
     Words of a converter, rad/s and deg/h stay what they are; anything else becomes deg/s.
@@ -75,9 +75,8 @@ def output_of(target: str, mapped: MappedColumn, column: RawColumn) -> tuple[Arr
 def _unknown_unit(target: str, column: RawColumn, quantity: str, why: str) -> str:
     finite = column.values[np.isfinite(column.values)]
     span = f" ({finite.min():.4g} to {finite.max():.4g})" if len(finite) else ""
-    return (
-        f"column {column.name!r}{span} for {target}: {why}; write unit in [columns.{target}]: one of {names_of(quantity)}"
-    )
+    where = f"[units] or [columns.{target}]"
+    return f"column {column.name!r}{span} for {target}: {why}; write its unit in {where}: one of {names_of(quantity)}"
 
 
 def _refuse_impossible(target: str, column: RawColumn, values: Array, quantity: str, problems: Problems) -> None:

@@ -20,7 +20,7 @@ GAP_STEPS = 10.0
 
 
 class Division:
-    """Which data set each row is of, (n,) from 1, 0 for a row that is left out; and the name of each, where it has one."""
+    """Which data set each row is of, (n,) from 1, 0 for a row that is left out; and the names that data sets have."""
 
     def __init__(self, numbers: Numbers, names: dict[int, str] | None = None) -> None:
         self.numbers = numbers
@@ -31,9 +31,7 @@ class Division:
         return {number: column_map.parts[name] for number, name in self.names.items() if name in column_map.parts}
 
 
-def divide(
-    table: RawTable, column_map: ColumnMap, t_s: Array, found: Movement | None, problems: Problems
-) -> Division:
+def divide(table: RawTable, column_map: ColumnMap, t_s: Array, found: Movement | None, problems: Problems) -> Division:
     """Return the data sets of a log by the rule of its map."""
     rule, n = column_map.datasets, table.rows
     if column_map.kind == "points":
@@ -42,6 +40,8 @@ def divide(
         return _by_column(table, column_map, problems)
     if rule.by == "rows":
         return _by_rows(column_map, n, problems)
+    if column_map.parts:
+        problems.add(f'[parts] needs [datasets] by = "column" or by = "rows" (is {rule.by!r})')
     if rule.by == "gaps":
         steps = np.diff(t_s)
         limit = rule.gap_s or GAP_STEPS * float(np.median(steps))
@@ -80,7 +80,9 @@ def _by_rows(column_map: ColumnMap, n: int, problems: Problems) -> Division:
     for number, (name, part) in enumerate(column_map.parts.items(), start=1):
         first, last = part.rows or (0, 0)
         if not 1 <= first <= last <= n:
-            problems.add(f"[parts.{name}] rows = [{first}, {last}]: expected 1 <= first <= last <= {n} (rows of the file)")
+            problems.add(
+                f"[parts.{name}] rows = [{first}, {last}]: expected 1 <= first <= last <= {n} (rows of the file)"
+            )
             continue
         if numbers[first - 1 : last].any():
             problems.add(f"[parts.{name}] rows = [{first}, {last}] overlap with those of another part")

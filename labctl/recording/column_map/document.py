@@ -53,8 +53,12 @@ def _line(error: Any) -> str:
     return f"{place}: {text}{given}" if place else f"{text}{given}"
 
 
+def map_document(column_map: ColumnMap) -> dict[str, Any]:
+    """Return the keys and values of a map, without what is left at its default."""
+    document = column_map.model_dump(mode="json", by_alias=True, exclude_none=True, exclude_defaults=True)
+    return {"format": column_map.format, **document}
+
+
 def map_text(column_map: ColumnMap) -> str:
     """Return a map as TOML, without what is left at its default."""
-    document = column_map.model_dump(mode="json", by_alias=True, exclude_none=True, exclude_defaults=True)
-    document = {"format": column_map.format, **document}
-    return tomli_w.dumps(document)
+    return tomli_w.dumps(map_document(column_map))

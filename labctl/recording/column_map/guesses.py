@@ -18,6 +18,8 @@ _EPOCH = (1e9, 4.2e9)
 _CELSIUS, _KELVIN = (-80.0, 180.0), (193.0, 453.0)
 #: Usual steps of time, s, of which one unit makes sense.
 _STEPS = (1e-5, 0.6)
+#: Whole numbers as time: least and largest step, their unit, and how many of it are a second.
+_WHOLE_STEPS = ((2, 200, "ms", 1e3), (201, 200_000, "us", 1e6), (200_001, 1e12, "ns", 1e9))
 
 
 def time_unit(values: Array) -> tuple[str, str]:
@@ -30,14 +32,15 @@ def time_unit(values: Array) -> tuple[str, str]:
         if _EPOCH[0] * factor <= first <= _EPOCH[1] * factor and step / factor <= 86_400:
             return f"epoch {unit}", f"{first:.0f} {unit} since 1970 is a date"
     whole = bool(np.all(values == np.round(values)))
+    return _unit_of_step(step, whole=whole)
+
+
+def _unit_of_step(step: float, *, whole: bool) -> tuple[str, str]:
     if not whole and _STEPS[0] <= step <= _STEPS[1]:
         return "s", f"fractions, in steps of {step:.4g}"
-    if whole and 2 <= step <= 200:
-        return "ms", f"whole numbers in steps of {step:g}: {1e3 / step:.4g} readings a second"
-    if whole and 200 < step <= 200_000:
-        return "us", f"whole numbers in steps of {step:g}: {1e6 / step:.4g} readings a second"
-    if whole and step > 200_000:
-        return "ns", f"whole numbers in steps of {step:g}: {1e9 / step:.4g} readings a second"
+    for least, most, unit, factor in _WHOLE_STEPS:
+        if whole and least <= step <= most:
+            return unit, f"whole numbers in steps of {step:g}: {factor / step:.4g} readings a second"
     return "", ""
 
 

@@ -1,4 +1,4 @@
-"""A column map: which column of a log is which of a recording, in which unit, and how its rows divide into data sets."""
+"""A column map: which column of a log is which of a recording, in which unit, and how rows divide into data sets."""
 
 from __future__ import annotations
 
@@ -16,6 +16,12 @@ SEPARATORS = {",": ",", ";": ";", "tab": "\t", "space": " ", "|": "|"}
 #: Columns that a map may not fill: the format makes them, or they belong to means.
 _MADE = frozenset({"dataset", "axis", "scale_factor", "offset"})
 
+#: What [units] is about -> how the names of its columns begin.
+QUANTITY_COLUMNS = {
+    "gyro": "gyro_", "accel": "accel_", "field": "field_", "temperature": "temperature_", "time": "t_s",
+    "table_rate": "table_rate_dps", "table_angle": "table_angle_deg", "turn": "turn_deg", "chamber": "chamber_c",
+}  # fmt: skip
+Quantity = Literal["gyro", "accel", "field", "temperature", "time", "table_rate", "table_angle", "turn", "chamber"]
 Bits = Annotated[int, Field(ge=8, le=64)]
 
 
@@ -58,6 +64,17 @@ class MappedColumn(_Strict):
         return self
 
 
+class UnitKeys(_Strict):
+    """The unit of all columns of one quantity, with the meaning that these keys have for one column."""
+
+    unit: str
+    scale: float | None = None
+    offset: float = 0.0
+    at_zero: float = 0.0
+    signed_bits: Bits | None = None
+    wrap_bits: Bits | None = None
+
+
 class Part(_Strict):
     """What holds for all readings of one data set, or of all of one name."""
 
@@ -84,7 +101,9 @@ class DataSets(_Strict):
     @model_validator(mode="after")
     def _column_named(self) -> DataSets:
         if (self.by == "column") != (self.column is not None):
-            raise ValueError(f'by = "column" and column = NAME go together (by = {self.by!r}, column = {self.column!r})')
+            raise ValueError(
+                f'by = "column" and column = NAME go together (by = {self.by!r}, column = {self.column!r})'
+            )
         return self
 
 
@@ -98,7 +117,8 @@ class ColumnMap(_Strict):
     started_at: AwareDatetime | None = None
     sample_rate_hz: float | None = Field(default=None, gt=0)
     file: FileKeys = FileKeys()
-    columns: dict[str, MappedColumn]
+    columns: dict[str, MappedColumn] = Field(default_factory=dict)  #: none: as proposed by looking at the file
+    units: dict[Quantity, UnitKeys] = Field(default_factory=dict)
     constants: Part = Part()
     datasets: DataSets = DataSets()
     parts: dict[str, Part] = Field(default_factory=dict)
@@ -116,8 +136,21 @@ class ColumnMap(_Strict):
         return columns
 
     @model_validator(mode="after")
+    def _units_known(self) -> ColumnMap:
+        for quantity, keys in self.units.items():
+            example = QUANTITY_COLUMNS[quantity] + {
+                "gyro": "x",
+                "accel": "x_g",
+                "field": "x_ut",
+                "temperature": "c",
+            }.get(quantity, "")
+            MappedColumn.model_validate({"from": 1, **keys.model_dump(exclude_unset=True)})
+            _check_unit(example, MappedColumn(source=1, unit=keys.unit, scale=keys.scale))
+        return self
+
+    @model_validator(mode="after")
     def _parts_fit(self) -> ColumnMap:
-        if self.parts and self.datasets.by not in {"column", "rows"}:
+        if self.parts and "datasets" in self.model_fields_set and self.datasets.by not in {"column", "rows"}:
             raise ValueError('parts: [parts.NAME] needs [datasets] by = "column" or by = "rows"')
         if self.datasets.by == "rows" and not all(part.rows for part in self.parts.values()):
             raise ValueError('parts: by = "rows" needs rows = [first, last] in each [parts.NAME]')

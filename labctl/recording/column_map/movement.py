@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ def movement(rates_dps: Array, t_s: Array) -> Movement:
 def stretches(same: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
     """Return runs of equal values as (first row, row after the last, value), rows from 0."""
     edges = np.flatnonzero(np.concatenate([[True], same[1:] != same[:-1], [True]]))
-    return [(int(a), int(b), bool(same[a])) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [(int(a), int(b), bool(same[a])) for a, b in pairwise(edges)]
 
 
 def rests(found: Movement, t_s: Array) -> list[tuple[int, int]]:

@@ -11,41 +11,55 @@ from labctl.recording.columns import BY_NAME
 _BRACKETS = re.compile(r"^(.*?)[\s_.-]*[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 #: Units that stand at the end of a name without brackets, longest first.
 _ENDINGS = (
-    "rad_per_s", "deg_per_s", "rad/sec", "deg/sec", "rad_s2", "m_s2", "rad_s", "deg_s", "rad/s", "deg/s", "mdps", "m/s^2",
-    "m/s2", "m/s²", "°/s", "rads", "dps", "degc", "deg c", "celsius", "kelvin", "degf", "msec", "usec", "nsec", "sec", "°c",
-    "mg", "ms", "us", "ns", "lsb", "raw", "ut", "mt", "deg", "rad", "s", "c", "k", "f", "g", "v",
+    "rad_per_s", "deg_per_s", "rad/sec", "deg/sec", "rad_s2", "m_s2", "rad_s", "deg_s", "rad/s", "deg/s", "mdps",
+    "m/s^2", "m/s2", "m/s²", "°/s", "rads", "dps", "degc", "deg c", "celsius", "kelvin", "degf", "msec", "usec", "nsec",
+    "sec", "°c", "mg", "ms", "us", "ns", "lsb", "raw", "ut", "mt", "deg", "rad", "s", "c", "k", "f", "g", "v",
 )  # fmt: skip
 _AXIS = r"(?P<axis>[xyz])"
 _INDEX = {"0": "x", "1": "y", "2": "z"}
+_ANY = r"(?:.*[_ ])?"
+_RAW = r"[_ ]?(?:raw[_ ]?)?"
+_GYRO = "gyroscope|gyro|gyr|angularvelocity|angular velocity|angvel|angular rate|omega|rotationrate|rotation rate"
+_ACCEL = "accelerometer|acceleration|accel|acc|specific force|linear acceleration"
+_TABLE = "table|rig|turntable|stage"
+_TIME = "time ?stamp|time|clock|datetime|date|millis|micros|epoch|stamp|t|elapsed|uptime|seconds"
 
 #: Names, folded -> column of a recording; `{axis}` is the axis that the name has.
 _RULES: tuple[tuple[str, str], ...] = (
-    (rf"(?:.*[_ ])?(?:gyroscope|gyro|gyr|angularvelocity|angular velocity|angvel|angular rate|omega|rotationrate|rotation rate)[_ ]?(?:raw[_ ]?)?{_AXIS}", "gyro_{axis}"),
+    (rf"{_ANY}(?:{_GYRO}){_RAW}{_AXIS}", "gyro_{axis}"),
     (rf"(?:g|w|imu g|imu w){_AXIS}", "gyro_{axis}"),
     (rf"{_AXIS}[_ ]?(?:gyroscope|gyro|gyr|omega|angular velocity|rate)", "gyro_{axis}"),
     (rf"rate[_ ]?{_AXIS}", "gyro_{axis}"),
-    (rf"(?:.*[_ ])?(?:accelerometer|acceleration|accel|acc|specific force|linear acceleration)[_ ]?(?:raw[_ ]?)?{_AXIS}", "accel_{axis}_g"),
+    (rf"{_ANY}(?:{_ACCEL}){_RAW}{_AXIS}", "accel_{axis}_g"),
     (rf"(?:a|f|imu a){_AXIS}", "accel_{axis}_g"),
     (rf"{_AXIS}[_ ]?(?:accelerometer|acceleration|accel|acc)", "accel_{axis}_g"),
-    (rf"(?:.*[_ ])?(?:magnetometer|magnetic field|mag|field)\d?[_ ]?{_AXIS}", "field_{axis}_ut"),
-    (r"(?:.*[_ ])?(?:table|rig|turntable|stage|reference|ref|true|commanded|cmd)[_ ](?:angular )?(?:rate|speed|velocity|omega)", "table_rate_dps"),
-    (r"(?:.*[_ ])?(?:table|rig|turntable|stage|encoder)[_ ](?:angle|position|pos)", "table_angle_deg"),
+    (rf"{_ANY}(?:magnetometer|magnetic field|mag|field)\d?[_ ]?{_AXIS}", "field_{axis}_ut"),
+    (
+        rf"{_ANY}(?:{_TABLE}|reference|ref|true|commanded|cmd)[_ ](?:angular )?(?:rate|speed|velocity|omega)",
+        "table_rate_dps",
+    ),
+    (rf"{_ANY}(?:{_TABLE}|encoder)[_ ](?:angle|position|pos)", "table_angle_deg"),
     (r"(?:turn|turned|turn angle|turned angle)", "turn_deg"),
     (r"(?:chamber|oven|ambient|air|env|environment)(?:[_ ](?:temperature|temp|t|air))?", "chamber_c"),
     (r"(?:chamber|oven)?[_ ]?(?:setpoint|set point)(?:[_ ](?:temperature|temp))?", "chamber_setpoint_c"),
-    (r"(?:.*[_ ])?(?:temperature|temp|thermometer)(?:[_ ](?:imu|gyro|die|raw|1))?", "temperature_c"),
+    (rf"{_ANY}(?:temperature|temp|thermometer)(?:[_ ](?:imu|gyro|die|raw|1))?", "temperature_c"),
     (r"(?:d|die|imu|gyro|t)temp", "temperature_c"),
     (r"(?:supply|vcc|vdd|supply voltage|voltage)", "supply_v"),
-    (r"(?:.*[_ ])?(?:time ?stamp|time|clock|datetime|date|millis|micros|epoch|stamp|t|elapsed|uptime|seconds)(?:[_ ]?(?:utc|boot|sample|since boot))?", "t_s"),
+    (rf"{_ANY}(?:{_TIME})(?:[_ ]?(?:utc|boot|sample|since boot))?", "t_s"),
     (r"(?:gyro|gyroscope|angular rate|rate|angular velocity|gyro out|gyro output|gyro rate|output)", "gyro_z"),
     (r"(?:position|orientation|up|up axis)", "position"),
     (r"valid", "valid"),
-)  # fmt: skip
+)
 _COMPILED = tuple((re.compile(pattern), target) for pattern, target in _RULES)
 #: Names of columns that number or name stretches of a log.
-PARTS = re.compile(r"(?:part|data ?set|set|segment|label|phase|section|activity|step|burst)(?: ?(?:id|no|number|name))?")
+PARTS = re.compile(
+    r"(?:part|data ?set|set|segment|label|phase|section|activity|step|burst)(?: ?(?:id|no|number|name))?"
+)
 #: Names of columns that count readings.
-COUNTERS = re.compile(r"(?:n |num )?(?:samples?|index|idx|seq|sequence|counter|count|row|no|n|packet|id|frame)(?: ?(?:id|no|number|count|counter))?")
+COUNTERS = re.compile(
+    r"(?:n |num )?(?:samples?|index|idx|seq|sequence|counter|count|row|no|n|packet|id|frame)"
+    r"(?: ?(?:id|no|number|count|counter))?"
+)
 
 
 @dataclass(frozen=True)

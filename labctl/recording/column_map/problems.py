@@ -41,10 +41,7 @@ class Problems:
 
 def rows_text(wrong: NDArray[np.bool_] | Sequence[int], total: int | None = None) -> str:
     """Return rows, given as a mask or as numbers from 1, as words: `row 3`, or `rows 3, 7, 9 and 12 more`."""
-    if isinstance(wrong, np.ndarray):
-        found = (np.flatnonzero(wrong) + 1).tolist()
-    else:
-        found = list(wrong)
+    found = (np.flatnonzero(wrong) + 1).tolist() if isinstance(wrong, np.ndarray) else list(wrong)
     n = len(found) if total is None else total
     if n == 1:
         return f"row {found[0]}"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.column_map.guesses import force_unit, temperature_unit, time_unit
-from labctl.recording.column_map.model import ColumnMap, DataSets, FileKeys, MappedColumn
+from labctl.recording.column_map.model import QUANTITY_COLUMNS, ColumnMap, DataSets, FileKeys, MappedColumn
 from labctl.recording.column_map.movement import Movement, movement
 from labctl.recording.column_map.names import COUNTERS, PARTS, folded, name_says
 from labctl.recording.column_map.units import find_unit, is_lsb, unit_of_target
@@ -51,6 +51,27 @@ def propose(table: RawTable, serial: str | None = None) -> Proposal:
     return Proposal(proposed, guesses)
 
 
+def completed(table: RawTable, given: ColumnMap) -> Proposal:
+    """Return a map that was given, with what it leaves to the file: columns where it names none, units by [units]."""
+    guesses: list[str] = []
+    changes: dict[str, Any] = {}
+    columns = given.columns
+    if not columns:
+        proposal = propose(table, given.serial)
+        guesses, columns = proposal.guesses, proposal.column_map.columns
+        left = given.model_fields_set
+        kept = {"kind": proposal.column_map.kind, "datasets": proposal.column_map.datasets}
+        changes = {key: value for key, value in kept.items() if key not in left}
+    for quantity, keys in given.units.items():
+        begins = QUANTITY_COLUMNS[quantity]
+        columns = {
+            target: mapped.model_copy(update=keys.model_dump()) if target.startswith(begins) else mapped
+            for target, mapped in columns.items()
+        }
+        guesses = [guess for guess in guesses if not guess.startswith("accelerometer" if quantity == "accel" else " ")]
+    return Proposal(given.model_copy(update={**changes, "columns": columns}), guesses)
+
+
 def _by_names(table: RawTable, guesses: list[str]) -> dict[str, MappedColumn]:
     columns: dict[str, MappedColumn] = {}
     for name, column in table.columns.items():
@@ -73,7 +94,7 @@ def _with_unit(name: str, target: str, unit: str, column: RawColumn, guesses: li
     if target == "t_s" and column.is_text:
         return MappedColumn(source=name, unit="date-time") if _dates(column) else None
     if column.is_text:
-        return MappedColumn(source=name) if target in {"position"} else None
+        return MappedColumn(source=name) if target == "position" else None
     why = ""
     if target == "t_s":
         guessed, why = time_unit(column.values)
@@ -154,7 +175,7 @@ def _file_keys(table: RawTable) -> FileKeys:
 
 
 def _data_sets(table: RawTable, columns: dict[str, MappedColumn], found: dict[str, RawColumn]) -> DataSets:
-    """Return the rule for data sets: a column that numbers or names them, or a table that stands at steps of its rate."""
+    """Return the rule for data sets: a column that numbers or names them, steps of the table's rate, or bursts."""
     for name, column in table.columns.items():
         if PARTS.fullmatch(folded(name)) and _long_stretches(column):
             return DataSets(by="column", column=name)
@@ -175,4 +196,4 @@ def _data_sets(table: RawTable, columns: dict[str, MappedColumn], found: dict[st
 def _long_stretches(column: RawColumn) -> bool:
     values: Any = column.words if column.words is not None else column.values
     changes = int((values[1:] != values[:-1]).sum())
-    return 0 < changes and len(values) >= LEAST_READINGS * (changes + 1)
+    return changes > 0 and len(values) >= LEAST_READINGS * (changes + 1)

@@ -74,7 +74,13 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
 
 
 def _is_date(column_map: ColumnMap, column: RawColumn) -> bool:
-    return (column_map.columns["t_s"].unit or column.unit).lower() in {"date-time", "iso", "iso8601", "iso 8601", "datetime"}
+    return (column_map.columns["t_s"].unit or column.unit).lower() in {
+        "date-time",
+        "iso",
+        "iso8601",
+        "iso 8601",
+        "datetime",
+    }
 
 
 def _holds_text(target: str) -> bool:
@@ -118,7 +124,7 @@ def _assembled(
     output: dict[str, OutputUnit] = {}
     for axis in column_map.axes:
         name = f"gyro_{axis}"
-        columns[name], unit = output_of(name, column_map.columns[name], found[name])
+        columns[name], unit = output_of(column_map.columns[name], found[name])
         if unit is not None:
             output[axis] = unit
     info = _info(table, column_map, motion, output, times, problems)
@@ -166,7 +172,9 @@ def _info(
 ) -> RecordingInfo | None:  # fmt: skip
     taken = sorted(_TAKEN & set(column_map.info))
     if taken:
-        problems.add(f"[info] {taken[0]}: this key stands at the top of a map, or is found by itself; leave it out here")
+        problems.add(
+            f"[info] {taken[0]}: this key stands at the top of a map, or is found by itself; leave it out here"
+        )
         return None
     started = column_map.started_at or times.started_at or table.started_at
     noted = [str(column_map.info.get("notes") or table.facts.get("notes") or "")]
@@ -176,7 +184,8 @@ def _info(
     head = {
         **{key: value for key, value in table.facts.items() if key not in _TAKEN},
         **column_map.info,
-        "serial": column_map.serial or serial_of(table), "axes": column_map.axes, "kind": column_map.kind, "motion": motion,
+        "serial": column_map.serial or serial_of(table), "axes": column_map.axes, "kind": column_map.kind,
+        "motion": motion,
         "started_at": started, "output": output, "sample_rate_hz": column_map.sample_rate_hz,
         "notes": "; ".join(filter(None, noted)),
     }  # fmt: skip

@@ -54,14 +54,14 @@ def refuse_wrong_cells(column: RawColumn, target: str, problems: Problems, *, em
     """Add a problem for cells that are no numbers, and one for empty cells where none may be."""
     if column.words is not None:
         problems.add(
-            f"column {column.name!r} (for {target}) holds text, such as {str(column.words[0])[:40]!r}; expected numbers; "
-            "correct the map, or the separator and the decimal sign in [file]"
+            f"column {column.name!r} (for {target}) holds text, such as {str(column.words[0])[:40]!r}; expected "
+            "numbers; correct the map, or the separator and the decimal sign in [file]"
         )
         return
     if column.n_wrong:
         texts = ", ".join(repr(text[:40]) for _, text in column.wrong[:3])
         rows = rows_text([row for row, _ in column.wrong], column.n_wrong)
-        comma = " (a decimal comma? write decimal = \",\" in [file])" if any("," in t for _, t in column.wrong) else ""
+        comma = ' (a decimal comma? write decimal = "," in [file])' if any("," in t for _, t in column.wrong) else ""
         problems.add(f"column {column.name!r}, {rows}: {texts} is no number{comma}; correct or leave out these rows")
     missing = ~np.isfinite(column.values)
     for row, _ in column.wrong:

@@ -44,8 +44,8 @@ def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, proble
     if unit is None:
         step = float(np.median(np.diff(column.values))) if rows > 1 and not column.is_text else float("nan")
         problems.add(
-            f"column {column.name!r} for t_s: no unit is given (usual step {step:g}); write unit in [columns.t_s]: one of "
-            f"{names_of('s').rpartition(',')[0]}"
+            f"column {column.name!r} for t_s: no unit is given (usual step {step:g}); write its unit in [units] or "
+            f"[columns.t_s]: one of {names_of('s').rpartition(',')[0]}"
         )
         return None
     if unit.name == "date-time":
@@ -107,7 +107,8 @@ def _refuse_backwards(column: RawColumn, raw: Array, t_s: Array, problems: Probl
             else "rows stand in the order of measurement, each later than the one before; sort them, or leave these out"
         )
         problems.add(
-            f"column {column.name!r} (time), {rows_text(wrong)}: {raw[row]:.12g} does not follow {raw[row - 1]:.12g}; {advice}"
+            f"column {column.name!r} (time), {rows_text(wrong)}: {raw[row]:.12g} does not follow "
+            f"{raw[row - 1]:.12g}; {advice}"
         )
     usual = float(np.median(steps)) if len(steps) else 1.0
     if np.isfinite(usual) and usual > 0 and not SHORTEST_STEP_S <= usual <= LONGEST_STEP_S:

@@ -89,7 +89,7 @@ def unit_of_target(target: str) -> str:
 
 
 def find_unit(quantity: str, text: str) -> Unit | None:
-    """Return the unit that a text names among those of a quantity; None for none. A capital M is milli as little as T t."""
+    """Return the unit that a text names among those of a quantity; None for none."""
     units = QUANTITIES.get(quantity, ())
     given = text.strip()
     for unit in units:

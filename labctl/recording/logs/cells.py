@@ -23,7 +23,8 @@ LONGEST_WORD = 64
 
 def column_of(name: str, pieces: Sequence[pa.Array], decimal: str, unit: str = "") -> RawColumn:
     """Return a column from its cells as text, piece by piece in the order of the file."""
-    numbers, wrong, n_wrong, row = [], [], 0, 0
+    wrong: list[tuple[int, str]] = []
+    numbers, n_wrong, row = [], 0, 0
     for piece in pieces:
         values, found, count = _numbers(piece, decimal)
         wrong += [(row + index + 1, text) for index, text in found[: MOST_WRONG - len(wrong)]]

@@ -34,7 +34,9 @@ def lines_of(path: Path, head: bytes, encoding: str) -> list[str]:
     text = head.decode("utf-8-sig" if encoding == "utf-8" else encoding, errors="ignore")
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if max(len(line) for line in lines) > LONGEST_LINE:
-        raise BadRecording(f"{path}: a line is longer than {LONGEST_LINE} characters; expected one reading in each line")
+        raise BadRecording(
+            f"{path}: a line is longer than {LONGEST_LINE} characters; expected one reading in each line"
+        )
     whole = lines[:-1] if len(lines) > 1 and path.stat().st_size > len(head) else lines
     return whole[:LOOKED_AT]
 

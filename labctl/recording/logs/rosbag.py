@@ -53,9 +53,8 @@ def read(path: Path, options: BagOptions) -> RawTable:
     """Return time, output, specific force and temperature of one topic; raises BadRecording, BadInput."""
     for each in [path] if path.is_file() else sorted(path.iterdir()):
         refuse_large(each, MOST_LOG_BYTES)
-    if path.is_file():
-        if head_of(path).startswith(ROS1) and path.suffix != ".bag":
-            raise BadRecording(f"{path}: a ROS 1 bag whose name does not end in .bag; rename it")
+    if path.is_file() and head_of(path).startswith(ROS1) and path.suffix != ".bag":
+        raise BadRecording(f"{path}: a ROS 1 bag whose name does not end in .bag; rename it")
     with _opened(path) as bag:
         topic = _topic(path, bag, options.topic, IMU, "topic")
         assert topic is not None
@@ -81,8 +80,8 @@ def _opened(path: Path) -> Iterator[Any]:
         raise
     except Exception as error:
         raise BadRecording(
-            f"{path}: not a whole bag ({type(error).__name__}: {' '.join(str(error).split())[:200]}); run `rosbag reindex` "
-            "or `ros2 bag reindex` on it, or record again"
+            f"{path}: not a whole bag ({type(error).__name__}: {' '.join(str(error).split())[:200]}); run `rosbag "
+            "reindex` or `ros2 bag reindex` on it, or record again"
         ) from error
 
 
@@ -99,7 +98,9 @@ def _topic(path: Path, bag: Any, asked: str | None, kind: str, option: str) -> s
         return None
     if not there:
         names = ", ".join(f"{name} ({info.msgtype})" for name, info in list(bag.topics.items())[:10])
-        raise BadRecording(f"{path}: no topic of {kind} (it has {names or 'none'}); record one that has the gyro's output")
+        raise BadRecording(
+            f"{path}: no topic of {kind} (it has {names or 'none'}); record one that has the gyro's output"
+        )
     raise BadInput(f"{path}: {' and '.join(there)} are of {kind}; choose one with --option {option}=NAME")
 
 

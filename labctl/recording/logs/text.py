@@ -66,13 +66,15 @@ def read_text(path: Path, options: TextOptions) -> RawTable:
         rows,
         tuple(_ragged_lines(ragged, len(names), layout)),
         layout,
-        first_rows=_first_rows(path, head, layout, names),
+        first_rows=_first_rows(head, layout, names),
     )
 
 
 def _refuse_names(path: Path, names: list[str]) -> None:
     if len(names) > MOST_COLUMNS:
-        raise BadRecording(f"{path}: {len(names)} columns; at most {MOST_COLUMNS} are read; leave out what is not needed")
+        raise BadRecording(
+            f"{path}: {len(names)} columns; at most {MOST_COLUMNS} are read; leave out what is not needed"
+        )
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
         listed = ", ".join(repr(name[:60]) for name in doubled[:5])
@@ -112,13 +114,12 @@ def _ragged_lines(ragged: list[tuple[int, int]], width: int, layout: FileLayout)
     counts = sorted({count for _, count in ragged})
     had = ", ".join(map(str, counts[:5]))
     mark = {"\t": "tab", " ": "blanks"}.get(layout.separator, repr(layout.separator))
-    return [
-        f"{rows_text([row for row, _ in ragged])}: {had} columns where the others have {width} (separator {mark}); "
-        "correct or leave out these rows"
-    ]
+    rows = rows_text([row for row, _ in ragged])
+    advice = "correct or leave out these rows"
+    return [f"{rows}: {had} columns where the others have {width} (separator {mark}); {advice}"]
 
 
-def _first_rows(path: Path, head: bytes, layout: FileLayout, names: list[str]) -> list[list[str]]:
+def _first_rows(head: bytes, layout: FileLayout, names: list[str]) -> list[list[str]]:
     text = head.decode("utf-8-sig" if layout.encoding == "utf-8" else layout.encoding, errors="ignore")
     lines = [line for line in text.splitlines()[layout.data - 1 :] if line.strip()]
     return [split(line, layout.separator)[: len(names)] for line in lines[:SHOWN_ROWS]]

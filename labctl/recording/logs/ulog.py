@@ -1,7 +1,7 @@
 """PX4 ULog files as a table: the raw readings of one gyro, by pyulog.
 
-Topics and units: PX4 message definitions (sensor_gyro: rad/s, deg C; sensor_accel: m/s2; vehicle_imu: delta_angle rad in
-delta_angle_dt us; sensor_combined: gyro_rad rad/s). Time stamps are us since boot.
+Topics and units: PX4 message definitions (sensor_gyro: rad/s, deg C; sensor_accel: m/s2; vehicle_imu: delta_angle, rad,
+in delta_angle_dt, us; sensor_combined: gyro_rad rad/s). Time stamps are us since boot.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ def read(path: Path, options: ULogOptions) -> RawTable:
     log = _parsed(path)
     data = {(each.name, each.multi_id): each.data for each in log.data_list}
     there = sorted(key for key in data if key[0] in TOPICS)
-    topic = options.topic or next((topic for topic in TOPICS if any(name == topic for name, _ in there)), None)
+    rawest = next((topic for topic in TOPICS if any(name == topic for name, _ in there)), None)
+    topic: str | None = options.topic or rawest
     listed = ", ".join(f"{name} {instance}" for name, instance in there)
     if topic is None:
         names = ", ".join(sorted({name for name, _ in data})[:12])
@@ -87,7 +88,8 @@ def _parsed(path: Path) -> Any:
         raise
     except Exception as error:  # the parser raises whatever broken bytes lead it to
         raise BadRecording(
-            f"{path}: not a whole ULog file ({type(error).__name__}: {str(error)[:200]}); take the log off the card again"
+            f"{path}: not a whole ULog file ({type(error).__name__}: {str(error)[:200]}); take the log off the "
+            "card again"
         ) from error
 
 
@@ -110,7 +112,9 @@ def _gyro(path: Path, topic: str, data: Mapping[str, Any]) -> dict[str, Array]:
     if not len(stamps):
         raise BadRecording(f"{path}: {topic} holds no reading; take another log, or another topic")
     columns = {"timestamp": stamps}
-    columns.update({f"gyro_{axis}": np.asarray(rate, dtype=np.float64) for axis, rate in zip("xyz", rates, strict=True)})
+    columns.update(
+        {f"gyro_{axis}": np.asarray(rate, dtype=np.float64) for axis, rate in zip("xyz", rates, strict=True)}
+    )
     if topic == GYRO and "temperature" in data:
         columns["temperature"] = np.asarray(data["temperature"], dtype=np.float64)
     if topic == COMBINED and "accelerometer_m_s2[0]" in data:

@@ -23,6 +23,8 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
     """Return the findings of a summary, the certain ones first."""
     if len(summary) == 0:
         return []
+    if summary.info.motion == "poses":  # no rate is known that an output could follow
+        return sorted(check_time(summary, environment), key=lambda finding: finding.severity != "certain")
     known = responses(summary)
     whole = summary.take(~np.any([with_two_rates(summary, axis) for axis in summary.info.axes], axis=0))
     found = [

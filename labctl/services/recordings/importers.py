@@ -42,8 +42,8 @@ def as_interchange(
     """Give the folder of a recording in the interchange format: the path itself, or one made of what `path` holds.
 
     `name` is an importer's; without it the importer that is surest. `options` are KEY=VALUE. `column_map` says what the
-    columns of a log are; without it one is proposed. `accept` is shown what a log would become, and raises where that is
-    not wanted. Raises BadInput for an importer or option that there is not, BadRecording for what cannot be read.
+    columns of a log are; without it one is proposed. `accept` is shown what a log would become, and raises where that
+    is not wanted. Raises BadInput for an importer or option that there is not, BadRecording for what cannot be read.
     """
     given = parsed_options(options)
     chosen = name or surest(path)
@@ -121,9 +121,7 @@ def read_with(
     return _checked(path, found, read_by)
 
 
-def log_with_map(
-    path: Path, name: str | None, options: Mapping[str, str], column_map: ColumnMap | None
-) -> MappedFile:
+def log_with_map(path: Path, name: str | None, options: Mapping[str, str], column_map: ColumnMap | None) -> MappedFile:
     """Return what a log would become, with everything that is wrong with it; raises BadInput, BadRecording."""
     chosen = name or surest(path)
     importer, given = _importer_and_options(chosen, options)
@@ -142,9 +140,7 @@ def _mapped(
     return found.recording
 
 
-def _importer_and_options(
-    name: str, options: Mapping[str, str]
-) -> tuple[Importer[Any] | TableImporter[Any], Any]:
+def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Importer[Any] | TableImporter[Any], Any]:
     try:
         importer = IMPORTERS.get(name)
     except PluginError as error:

@@ -9,7 +9,15 @@ from typing import Any
 
 from labctl.errors import BadFile
 from labctl.recording import Recording
-from labctl.recording.column_map import ColumnMap, MappedLog, propose, recording_of
+from labctl.recording.column_map import (
+    ColumnMap,
+    MappedLog,
+    checked_map,
+    completed,
+    map_document,
+    propose,
+    recording_of,
+)
 from labctl.recording.importer import TableImporter
 from labctl.recording.raw_table import RawTable
 
@@ -46,18 +54,13 @@ def mapped_file(
     if column_map is not None and "file" in type(options).model_fields:
         options = options.model_copy(update={"file": column_map.file})
     table = importer.table(path, options)
-    guesses: list[str] = []
-    proposed = column_map is None
-    if column_map is None:
-        proposal = propose(table, options.serial)
-        column_map, guesses = proposal.column_map, proposal.guesses
-    elif options.serial is not None:
-        column_map = column_map.model_copy(update={"serial": options.serial})
-    made = MappedFile(name, importer.title, table, column_map, proposed, guesses)
+    proposal = propose(table) if column_map is None else completed(table, column_map)
+    chosen = proposal.column_map
+    if options.serial is not None:
+        chosen = checked_map({**map_document(chosen), "serial": options.serial}, "--option serial")
+    made = MappedFile(name, importer.title, table, chosen, column_map is None, proposal.guesses)
     try:
-        log = recording_of(table, column_map)
+        log = recording_of(table, chosen)
     except BadFile as error:
         return replace(made, problems=error.problems)
     return replace(made, log=log)
-
-
