@@ -52,7 +52,9 @@ def movement(rates_dps: Array, t_s: Array) -> Movement:
     usual = np.minimum(np.percentile(spread, 20, axis=0), MOST_NOISE_DPS)
     moves = (spread > np.maximum(TIMES_USUAL * usual, LEAST_SPREAD_DPS)).any(axis=1)
     if not moves.all():
-        level = np.median(means[~moves], axis=0)
+        quiet = means[~moves]
+        slowest = np.argsort(np.linalg.norm(quiet, axis=1))[: max(1, len(quiet) // 2)]
+        level = np.median(quiet[slowest], axis=0)  # also where a steady turn lasts as long as the rests do
         moves |= (np.abs(means - level) > MOST_DRIFT_DPS).any(axis=1)
     still = np.repeat(~moves, counts)
     low, high = np.percentile(rates_dps, [0.1, 99.9], axis=0)

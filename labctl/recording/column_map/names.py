@@ -87,8 +87,8 @@ def name_says(name: str) -> NameSays:
         target = _target(stem)
         if target and _is_unit_of(target, unit):
             return NameSays(target, unit)
-    stem, unit = _divided(stripped)[-1]
-    return NameSays(_target(stem), unit if _is_unit_of(_target(stem), unit) else "")
+    brackets = _BRACKETS.match(stripped)
+    return NameSays(_target(brackets[1] if brackets is not None else stripped), "")  # a unit that is not known is none
 
 
 def _divided(name: str) -> list[tuple[str, str]]:

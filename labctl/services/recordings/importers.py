@@ -17,7 +17,7 @@ from labctl.recording.checks import checked, checked_environment
 from labctl.recording.column_map import ColumnMap, FileKeys
 from labctl.recording.importer import Importer, TableImporter
 from labctl.recording.logs.layout import layout_of
-from labctl.recording.logs.recognition import head_of, refuse_other
+from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_large, refuse_other
 from labctl.services.recordings.logs import Accept, MappedFile, mapped_file
 from labctl.services.recordings.staging import staging_folder
 
@@ -78,6 +78,7 @@ def surest(path: Path) -> str:
     sure = {name: _confidence(name, importer, path) for name, importer in IMPORTERS.all().items()}
     best = max(sure.values(), default=0.0)
     if best <= 0.0 and path.is_file():
+        refuse_large(path, MOST_TEXT_BYTES)
         refuse_other(path, head_of(path))
         layout_of(path, head_of(path), FileKeys())  # says why it is no text with columns
     names = [name for name, confidence in sure.items() if confidence == best]
