@@ -31,7 +31,7 @@ export function importForm(taken) {
       type: "file",
       multiple: true,
       webkitdirectory: folder,
-            "aria-label": folder ? "Folder of a recording" : "Files of a recording",
+      "aria-label": folder ? "Folder of a recording" : "Files of a recording",
       class: "visually-hidden",
       tabindex: "-1",
       onchange: () => {
@@ -112,7 +112,14 @@ export function importForm(taken) {
     taken(made);
   }
 
-  return h("section", { class: "card stack", "aria-label": "Import" }, h("h2", {}, "Import"), zone, templates(), result);
+  return h(
+    "section",
+    { class: "card stack", "aria-label": "Import" },
+    h("h2", {}, "Import"),
+    zone,
+    templates(),
+    result,
+  );
 }
 
 /** Templates of logs to download, one for each kind of data. */

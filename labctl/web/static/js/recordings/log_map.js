@@ -25,7 +25,9 @@ export function entryOf(map, name, number) {
 export function withTarget(map, name, number, target) {
   const old = entryOf(map, name, number);
   const columns = Object.fromEntries(
-    Object.entries(map.columns ?? {}).filter(([key, entry]) => key !== target && entry.from !== name && entry.from !== number),
+    Object.entries(map.columns ?? {}).filter(
+      ([key, entry]) => key !== target && entry.from !== name && entry.from !== number,
+    ),
   );
   const sameQuantity = old && target && old[0].split("_")[0] === target.split("_")[0];
   if (target) columns[target] = sameQuantity ? old[1] : { from: name };
@@ -42,7 +44,10 @@ export function withTarget(map, name, number, target) {
 export function withUnit(map, target, unit, scale) {
   const { from, ...rest } = map.columns[target];
   const kept = Object.fromEntries(Object.entries(rest).filter(([key]) => !["unit", "scale"].includes(key)));
-  const entry = unit === "LSB" ? { from, ...kept, unit, ...(scale ? { scale } : {}) } : { from, ...kept, ...(unit ? { unit } : {}) };
+  const entry =
+    unit === "LSB"
+      ? { from, ...kept, unit, ...(scale ? { scale } : {}) }
+      : { from, ...kept, ...(unit ? { unit } : {}) };
   return { ...map, columns: { ...map.columns, [target]: entry } };
 }
 

@@ -53,7 +53,17 @@ export function logPreview(file, taken) {
     try {
       show(await sendFile("/api/recordings/logs/preview", file, fields(map)));
     } catch (error) {
-      setChildren(place, refused(error), map ? h("div", { class: "row" }, button("Propose a map again", () => look(null))) : optionField());
+      setChildren(
+        place,
+        refused(error),
+        map
+          ? h(
+              "div",
+              { class: "row" },
+              button("Propose a map again", () => look(null)),
+            )
+          : optionField(),
+      );
     }
   }
 
@@ -67,7 +77,15 @@ export function logPreview(file, taken) {
         try {
           taken(await sendFile("/api/recordings/logs", file, fields(map)));
         } catch (error) {
-          setChildren(place, refused(error), h("div", { class: "row" }, button("Look again", () => look(map))));
+          setChildren(
+            place,
+            refused(error),
+            h(
+              "div",
+              { class: "row" },
+              button("Look again", () => look(map)),
+            ),
+          );
         }
       },
       { kind: "primary" },
@@ -83,11 +101,17 @@ export function logPreview(file, taken) {
       rowTable(seen),
       plot(seen, map),
       asText(seen, look),
-      h("div", { class: "row" }, act, button("Save the map", () => saveMap(seen))),
+      h(
+        "div",
+        { class: "row" },
+        act,
+        button("Save the map", () => saveMap(seen)),
+      ),
     );
   }
 
   function optionField() {
+    /** @type {HTMLInputElement} */
     const input = h("input", { type: "text", placeholder: "topic=/imu/data" });
     return h(
       "div",
@@ -119,7 +143,11 @@ function refused(error) {
 const problemList = (problems) =>
   notice(
     "bad",
-    h("p", { class: "lead" }, problems.length === 1 ? "One thing is missing or wrong" : `${problems.length} things are missing or wrong`),
+    h(
+      "p",
+      { class: "lead" },
+      problems.length === 1 ? "One thing is missing or wrong" : `${problems.length} things are missing or wrong`,
+    ),
     problems.map((line) => h("p", {}, line)),
   );
 
@@ -142,12 +170,13 @@ const summary = (seen) =>
  * @param {(map: MapDocument) => unknown} look
  */
 function settings(seen, map, look) {
+  /** @type {HTMLInputElement} */
   const serial = h("input", {
     type: "text",
     value: map.serial ?? "",
-    maxlength: "64",
     onchange: () => look(withKey(map, "serial", serial.value.trim())),
   });
+  /** @type {HTMLInputElement} */
   const rate = h("input", {
     type: "number",
     value: String(map.sample_rate_hz ?? ""),
@@ -194,6 +223,7 @@ function columnTable(seen, map, look) {
     const [target, { unit = "", scale }] = found;
     const shown = [option("", row.unit || "not given"), ...units.map((each) => option(each, each))];
     const known = unit === "" || units.includes(unit) ? shown : [...shown, option(unit, unit)];
+    /** @type {HTMLInputElement} */
     const input = h("input", {
       type: "number",
       step: "any",
@@ -264,9 +294,14 @@ function plot(seen, map) {
       margin: { l: 70, r: 12, t: 8, b: 46 },
     },
   });
-  return figure(`Columns of ${seen.file}`, "Least and largest value in each of up to 300 stretches, as the file has them.", draw, {
-    height: "18rem",
-  });
+  return figure(
+    `Columns of ${seen.file}`,
+    "Least and largest value in each of up to 300 stretches, as the file has them.",
+    draw,
+    {
+      height: "18rem",
+    },
+  );
 }
 
 /**
@@ -274,13 +309,22 @@ function plot(seen, map) {
  * @param {(map: string) => unknown} look
  */
 function asText(seen, look) {
-  const text = h("textarea", { rows: "14", spellcheck: "false", value: seen.map_toml, "aria-label": "The map as TOML" });
+  const text = h("textarea", {
+    rows: "14",
+    spellcheck: "false",
+    value: seen.map_toml,
+    "aria-label": "The map as TOML",
+  });
   return h(
     "details",
     {},
     h("summary", {}, "The map as text: parts, constants and everything else"),
     text,
-    h("div", { class: "row" }, button("Check this map", () => look(text.value))),
+    h(
+      "div",
+      { class: "row" },
+      button("Check this map", () => look(text.value)),
+    ),
   );
 }
 
