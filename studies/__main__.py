@@ -14,6 +14,7 @@ STUDIES = (
     "process_pairs",
     "faults",
     "attacks",
+    "log_size",
 )
 
 

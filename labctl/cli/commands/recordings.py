@@ -26,11 +26,11 @@ def import_(
     ] = None,
     importer: Annotated[
         str | None,
-        typer.Option("--format", metavar="NAME", help="Importer; default: the one that is surest of the file."),
+        typer.Option("--format", metavar="NAME", help="Importer; default: the one that recognises the file best."),
     ] = None,
     option: Annotated[
         list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; as often as there are some."),
+        typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; may be repeated."),
     ] = None,
     column_map: Annotated[
         Path | None,
@@ -52,7 +52,7 @@ def import_(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Take in data made on any bench: in the interchange format, or a log, whose columns a map names."""
+    """Import data made on any bench: in the interchange format, or a log, whose columns a map names."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import IMPORT_RECORDING
     from labctl.services.commands.requests import RecordingFolder
@@ -80,7 +80,7 @@ def import_(
 @export_app.command("recording")
 def export_recording(
     recording: Annotated[int, typer.Argument(metavar="ID", help="Recording.")],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write; it may not exist yet.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder to write; it must not exist.")],
     csv: Annotated[bool, typer.Option("--csv", help="CSV instead of Parquet.")] = False,
     points: Annotated[bool, typer.Option("--points", help="One row per data set instead of every reading.")] = False,
     as_json: Json = False,
@@ -101,7 +101,7 @@ def export_recording(
 
 def simulate(
     recipe: Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped one.")],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write; it may not exist yet.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder to write; it must not exist.")],
     bench: Annotated[
         str | None, typer.Option("--bench", metavar="FILE", help="Bench; default: the recipe's own.")
     ] = None,
