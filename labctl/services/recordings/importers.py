@@ -48,6 +48,8 @@ def as_interchange(
     given = parsed_options(options)
     chosen = name or surest(path)
     if chosen == INTERCHANGE and not given:
+        if column_map is not None:
+            raise _no_map(chosen)
         yield path
         return
     recording = read_with(chosen, path, given, column_map, accept)
@@ -108,16 +110,21 @@ def read_with(
     if not path.exists():
         raise BadRecording(f"{path}: not found; name the file to import")
     if isinstance(importer, Importer) and column_map is not None:
-        raise BadInput(f"--map: importer {name} knows its columns by itself; leave the map out")
+        raise _no_map(name)
+    made: MappedFile | None = None
     try:
         if isinstance(importer, TableImporter):
-            found = _mapped(name, importer, path, given, column_map, accept)
+            made = mapped_file(name, importer, path, given, column_map)
         else:
             found = instance_of(Recording)(importer.read(path, given))
     except (LabctlError, MemoryError):
         raise
     except Exception as error:
         raise BadRecording(f"{path}: {failure(plugin, 'read it', error)}") from error
+    if made is not None:
+        if accept is not None:
+            accept(made)
+        found = made.recording
     read_by = f"read from {path.name} by importer {name} of {plugin.release}"
     return _checked(path, found, read_by)
 
@@ -131,14 +138,8 @@ def log_with_map(path: Path, name: str | None, options: Mapping[str, str], colum
     return mapped_file(chosen, importer, path, given, column_map)
 
 
-def _mapped(
-    name: str, importer: TableImporter[Any], path: Path, options: Any, column_map: ColumnMap | None,
-    accept: Accept | None,
-) -> Recording:  # fmt: skip
-    found = mapped_file(name, importer, path, options, column_map)
-    if accept is not None:
-        accept(found)
-    return found.recording
+def _no_map(name: str) -> BadInput:
+    return BadInput(f"--map: importer {name} knows its columns by itself; leave the map out")
 
 
 def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Importer[Any] | TableImporter[Any], Any]:

@@ -157,7 +157,7 @@ FILES: dict[str, tuple[Callable[[Path], Path], str]] = {
     "UTF-16 without a mark": (lambda p: raw(p / "a.csv", GOOD.encode("utf-16-le")), "UTF-16 .little-endian. without"),
     "cut-off Parquet": (
         lambda p: raw(p / "a.parquet", parquet(p / "b.parquet", gyro_x=[1.0, 2.0]).read_bytes()[:60]),
-        "not a whole Parquet file",
+        "not a complete Parquet file",
     ),
     "Parquet of lists": (lambda p: parquet(p / "a.parquet", gyro_x=[[1.0], [2.0]]), "column 'gyro_x' holds list"),
     "cut-off ULog": (lambda p: truncated_ulog(p / "a.ulg"), "none of sensor_gyro, .* is in this log"),

@@ -94,9 +94,11 @@ def bag(path: Path, topics: tuple[str, ...] = ("/imu/raw",), rows: np.ndarray = 
             none = np.zeros(9)
             no_force = np.array([-1.0, *none[1:]])
             message = t[IMU](
-                header=head, orientation=t["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0), orientation_covariance=none,
+                header=head, orientation=t["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0),
+                orientation_covariance=none,
                 angular_velocity=vector(*np.radians(row[1:4])), angular_velocity_covariance=none,
-                linear_acceleration=vector(0.0, 0.0, 9.80665), linear_acceleration_covariance=none if force else no_force,
+                linear_acceleration=vector(0.0, 0.0, 9.80665),
+                linear_acceleration_covariance=none if force else no_force,
             )  # fmt: skip
             made = t[THERMOMETER](header=head, temperature=float(row[4]), variance=0.0)
             pack = store.serialize_ros1 if ros1 else store.serialize_cdr
