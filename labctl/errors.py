@@ -66,15 +66,16 @@ class BadFile(BadRecording):
 
     slug = "bad-file"
 
-    def __init__(self, path: Path | str, problems: Sequence[str]) -> None:
+    def __init__(self, text: str, problems: Sequence[str] = (), path: str = "") -> None:
+        super().__init__(text)
         self.problems = list(problems)
-        more = f" (and {len(self.problems) - 1} more)" if len(self.problems) > 1 else ""
-        super().__init__(f"{path}: {self.problems[0]}{more}")
-        self.path = str(path)
+        self.path = path
 
-    def __reduce__(self) -> tuple[type[BadFile], tuple[str, list[str]]]:
-        """A worker process sends it whole."""
-        return type(self), (self.path, self.problems)
+    @classmethod
+    def of(cls, path: Path | str, problems: Sequence[str]) -> BadFile:
+        """Return the error about a file; its text has the first problem and says how many more there are."""
+        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+        return cls(f"{path}: {problems[0]}{more}", problems, str(path))
 
     @property
     def members(self) -> JsonObject:

@@ -93,15 +93,15 @@ class Acceptance:
                 f"labctl import {self.path} --write-map MAP.toml writes the map so far, to correct and give with --map"
             )
         else:
-            raise BadFile(self.path, lines)
-        raise BadFile(self.path, [f"{lines[0]} ({hint})"] if len(lines) == 1 else [*lines, hint])
+            raise BadFile.of(self.path, lines)
+        raise BadFile.of(self.path, [f"{lines[0]} ({hint})"] if len(lines) == 1 else [*lines, hint])
 
     def _decide(self) -> None:
         from labctl.errors import BadInput
 
         choices = "--accept-map imports by it, --write-map MAP.toml writes it, to correct and give with --map MAP.toml"
         if self.quiet or not sys.stdin.isatty():
-            raise BadInput(f"{self.path}: this map is proposed and nobody has accepted it; {choices}")
+            raise BadInput(f"{self.path}: this map is proposed and not yet accepted; {choices}")
         if not typer.confirm("import by this map?", default=False, err=True):
             stderr.print(f"nothing was imported; {choices}", style="dim")
             raise typer.Exit(1)

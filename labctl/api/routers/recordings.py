@@ -21,12 +21,12 @@ from labctl.services.recordings.log_preview import preview_log
 from labctl.services.recordings.traces import trace as trace_of
 from labctl.services.recordings.transfer import import_files, zip_recording
 from labctl.services.recordings.uploads import sent_map, with_staged
-from labctl.services.schemas.logs import LogPreview
 from labctl.services.schemas.recordings import (
     AllanResponse,
     DataSetsResponse,
     ExampleRequest,
     ImportResponse,
+    LogPreview,
     RecordingAlone,
     RecordingResponse,
     RecordingWithPoints,

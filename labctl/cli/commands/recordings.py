@@ -15,40 +15,45 @@ from labctl.cli.output import console, print_json, print_warnings
 export_app = typer.Typer(no_args_is_help=True, help="Write what the database holds to files.")
 
 
+PathToImport = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="PATH",
+        help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file or a ROS bag; or what another "
+        "importer knows.",
+    ),
+]
+ImporterName = Annotated[
+    str | None,
+    typer.Option("--format", metavar="NAME", help="Importer; default: the one that recognises the file best."),
+]
+ImporterOptions = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; may be repeated."),
+]
+MapFile = Annotated[
+    Path | None,
+    typer.Option("--map", metavar="FILE", help="What the columns of a log are, as TOML; default: proposed and asked."),
+]
+AcceptMap = Annotated[bool, typer.Option("--accept-map", help="Import by the proposed map without a question.")]
+WriteMap = Annotated[
+    Path | None,
+    typer.Option("--write-map", metavar="FILE", help="Write the map; without --accept-map nothing is imported."),
+]
+TemplateKind = Annotated[
+    str | None,
+    typer.Option("--template", metavar="KIND", help="Print a CSV template: rest, rates, turns, profile or poses."),
+]
+
+
 def import_(
-    path: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="PATH",
-            help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file or a ROS bag; or what "
-            "another importer knows.",
-        ),
-    ] = None,
-    importer: Annotated[
-        str | None,
-        typer.Option("--format", metavar="NAME", help="Importer; default: the one that recognises the file best."),
-    ] = None,
-    option: Annotated[
-        list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; may be repeated."),
-    ] = None,
-    column_map: Annotated[
-        Path | None,
-        typer.Option(
-            "--map", metavar="FILE", help="What the columns of a log are, as TOML; default: proposed and asked."
-        ),
-    ] = None,
-    accept_map: Annotated[
-        bool, typer.Option("--accept-map", help="Import by the proposed map without a question.")
-    ] = False,
-    write_map: Annotated[
-        Path | None,
-        typer.Option("--write-map", metavar="FILE", help="Write the map; without --accept-map nothing is imported."),
-    ] = None,
-    template: Annotated[
-        str | None,
-        typer.Option("--template", metavar="KIND", help="Print a CSV template: rest, rates, turns, profile or poses."),
-    ] = None,
+    path: PathToImport = None,
+    importer: ImporterName = None,
+    option: ImporterOptions = None,
+    column_map: MapFile = None,
+    accept_map: AcceptMap = False,
+    write_map: WriteMap = None,
+    template: TemplateKind = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
-from pydantic import ValidationError
+from pydantic import JsonValue, ValidationError
 
 from instruments.toml_documents import parse_toml, read_toml_text, shown
 from labctl.errors import BadInput
@@ -53,7 +53,7 @@ def _line(error: Any) -> str:
     return f"{place}: {text}{given}" if place else f"{text}{given}"
 
 
-def map_document(column_map: ColumnMap) -> dict[str, Any]:
+def map_document(column_map: ColumnMap) -> dict[str, JsonValue]:
     """Return the keys and values of a map, without what is left at its default."""
     document = column_map.model_dump(mode="json", by_alias=True, exclude_none=True, exclude_defaults=True)
     return {"format": column_map.format, **document}

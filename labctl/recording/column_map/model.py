@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Literal, get_args
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, field_validator, model_validator
 
 from labctl.recording.column_map.units import LSB, QUANTITIES, find_unit, is_lsb, names_of, unit_of_target
 from labctl.recording.columns import BY_NAME
@@ -86,7 +86,7 @@ class Part(_Strict):
     rows: tuple[int, int] | None = None  #: first and last row, from 1 (by = "rows")
     skip: bool = False  #: its rows are left out
 
-    def constants(self) -> dict[str, Any]:
+    def constants(self) -> dict[str, float | str]:
         """Return the columns that it fills, by name."""
         return self.model_dump(exclude_none=True, exclude={"rows", "skip"})
 
@@ -122,7 +122,7 @@ class ColumnMap(_Strict):
     constants: Part = Part()
     datasets: DataSets = DataSets()
     parts: dict[str, Part] = Field(default_factory=dict)
-    info: dict[str, Any] = Field(default_factory=dict)  #: further keys of recording.toml
+    info: dict[str, JsonValue] = Field(default_factory=dict)  #: further keys of recording.toml
 
     @field_validator("columns", mode="after")
     @classmethod

@@ -36,7 +36,7 @@ class Problems:
     def raise_if_any(self) -> None:
         """Raise BadFile where something is wrong."""
         if self.lines:
-            raise BadFile(self.path, self.listed())
+            raise BadFile.of(self.path, self.listed())
 
 
 def rows_text(wrong: NDArray[np.bool_] | Sequence[int], total: int | None = None) -> str:

@@ -15,7 +15,7 @@ from labctl.recording.columns import COLUMNS
 from labctl.recording.raw_table import RawTable
 from labctl.services.recordings.importers import log_with_map
 from labctl.services.recordings.logs import MappedFile
-from labctl.services.schemas.logs import LogColumn, LogPreview, LogTarget, LogTrace
+from labctl.services.schemas.recordings import LogColumn, LogPreview, LogTarget, LogTrace
 from labctl.store import Store
 
 #: Bins of a trace, and columns that have one.

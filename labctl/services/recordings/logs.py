@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from labctl.errors import BadFile
 from labctl.recording import Recording
@@ -18,7 +17,7 @@ from labctl.recording.column_map import (
     propose,
     recording_of,
 )
-from labctl.recording.importer import TableImporter
+from labctl.recording.importer import TableImporter, TableOptionsT
 from labctl.recording.raw_table import RawTable
 
 
@@ -30,7 +29,7 @@ class MappedFile:
     title: str
     table: RawTable
     column_map: ColumnMap
-    proposed: bool  #: the map is a proposal, which nobody has accepted yet
+    proposed: bool  #: the map is a proposal, not accepted yet
     guesses: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
     log: MappedLog | None = None
@@ -39,7 +38,7 @@ class MappedFile:
     def recording(self) -> Recording:
         """The recording; raises BadFile with everything that is wrong."""
         if self.log is None:
-            raise BadFile(self.table.path, self.problems)
+            raise BadFile.of(self.table.path, self.problems)
         return self.log.recording
 
 
@@ -48,7 +47,7 @@ Accept = Callable[[MappedFile], None]
 
 
 def mapped_file(
-    name: str, importer: TableImporter[Any], path: Path, options: Any, column_map: ColumnMap | None
+    name: str, importer: TableImporter[TableOptionsT], path: Path, options: TableOptionsT, column_map: ColumnMap | None
 ) -> MappedFile:
     """Return what a log becomes by a map, or by the one that is proposed; raises BadRecording for what is no log."""
     if column_map is not None and "file" in type(options).model_fields:

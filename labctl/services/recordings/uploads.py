@@ -32,7 +32,7 @@ def with_staged(name: str, content: BinaryIO, modified_ms: float | None, work: C
         try:
             return work(path)
         except BadFile as error:
-            raise BadFile(path.name, error.problems) from None
+            raise BadFile.of(path.name, error.problems) from None
         except BadRecording as error:
             raise BadRecording(str(error).replace(f"{folder}/", "")) from None
         except BadInput as error:
