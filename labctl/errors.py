@@ -3,6 +3,7 @@
 LabctlError              exit 2, HTTP 400
 ├── BadInput             a file, an option or a request is wrong; nothing was changed
 │   ├── BadRecording     in a recording: names file, column, row and what was expected
+│   │   └── BadFile      everything that is wrong with a log file, one line each
 │   ├── StartNotConfirmed    a real bench starts only after a person has confirmed that it is clear   HTTP 422
 │   ├── DataRefused      the data are certainly wrong, or a fit makes them worse     HTTP 422
 │   ├── BadBench         in a bench file
@@ -30,6 +31,7 @@ LabctlError              exit 2, HTTP 400
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from labctl.json_types import JsonObject
 
@@ -57,6 +59,28 @@ class BadRecording(BadInput):
     """A recording is wrong; the text names file, column, row and what was expected."""
 
     slug = "bad-recording"
+
+
+class BadFile(BadRecording):
+    """A log file is wrong; nothing of it was kept. `problems`: everything that is wrong with it, one line each."""
+
+    slug = "bad-file"
+
+    def __init__(self, text: str, problems: Sequence[str] = (), path: str = "") -> None:
+        super().__init__(text)
+        self.problems = list(problems)
+        self.path = path
+
+    @classmethod
+    def of(cls, path: Path | str, problems: Sequence[str]) -> BadFile:
+        """Return the error about a file; its text has the first problem and says how many more there are."""
+        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+        return cls(f"{path}: {problems[0]}{more}", problems, str(path))
+
+    @property
+    def members(self) -> JsonObject:
+        """The problems."""
+        return {"problems": list(self.problems)}
 
 
 class DataRefused(BadInput):

@@ -20,7 +20,9 @@ OPEN = frozenset({"/health", "/health/heartbeat"})
 #: Queries that are sent by POST because of what they carry: nothing changes, so a viewer may.
 ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview")
 _ASKED = re.compile("|".join(re.sub(r"{\w+}", "[^/]+", path) for path in ASKING))
+#: Where files are sent: a recording, a log, and a log to look at.
 UPLOAD = "/api/recordings"
+UPLOADS = frozenset({UPLOAD, "/api/recordings/logs", "/api/recordings/logs/preview"})
 MIB = 1 << 20
 
 
@@ -41,7 +43,7 @@ class AccessPolicy:
 
     def largest_body(self, path: str) -> int:
         """Return the largest body of a request to a path, in bytes."""
-        return self.upload_bytes if path == UPLOAD else self.body_bytes
+        return self.upload_bytes if path in UPLOADS else self.body_bytes
 
 
 def role_needed(method: str, path: str) -> Role:

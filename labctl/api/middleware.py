@@ -10,7 +10,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from labctl.acting_user import Actor, acting
-from labctl.api.access_policy import API, OPEN, READING, UPLOAD, AccessPolicy, role_needed
+from labctl.api.access_policy import API, OPEN, READING, UPLOADS, AccessPolicy, role_needed
 from labctl.api.connection_limits import RESERVED
 from labctl.api.problems import as_problem
 from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, Overloaded, TooLarge
@@ -69,7 +69,7 @@ class AccessMiddleware:
             raise Overloaded(
                 "the limit of connections that this service answers at once is reached; try again in a few seconds"
             )
-        uploads = bool(scope["path"] == UPLOAD and not reads)
+        uploads = bool(scope["path"] in UPLOADS and not reads)
         if uploads and self._uploads >= MOST_UPLOADS:
             raise Overloaded(
                 f"{MOST_UPLOADS} recordings are being received already; send this one when one of them is complete"

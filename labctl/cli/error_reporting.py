@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import typer
 from pydantic import ValidationError
 
 from labctl.cli.interrupts import INTERRUPTED, ignore_signals, signals_restored
 from labctl.cli.output import stderr
+
+if TYPE_CHECKING:
+    from labctl.errors import BadFile
 
 
 @contextmanager
@@ -25,7 +29,7 @@ def one_clear_line() -> Iterator[None]:
 @contextmanager
 def _errors_as_lines() -> Iterator[None]:
     from instruments.errors import InstrumentError
-    from labctl.errors import LabctlError, Stopped
+    from labctl.errors import BadFile, LabctlError, Stopped
     from procedures.contracts.errors import ProcedureError
 
     try:
@@ -33,6 +37,8 @@ def _errors_as_lines() -> Iterator[None]:
     except Stopped as error:
         ignore_signals()
         raise _exit(str(error), error.exit_status) from error
+    except BadFile as error:
+        raise _exit_with_all(error) from error
     except LabctlError as error:
         raise _exit(str(error), error.exit_status) from error
     except (InstrumentError, ProcedureError) as error:
@@ -56,6 +62,15 @@ def _errors_as_lines() -> Iterator[None]:
         while stopped is not None and not isinstance(stopped, Stopped):
             stopped = stopped.__context__
         raise _exit("interrupted" if stopped is None else str(stopped), INTERRUPTED) from None
+
+
+def _exit_with_all(error: BadFile) -> typer.Exit:
+    if len(error.problems) == 1:
+        return _exit(str(error), error.exit_status)
+    found = _exit(f"{error.path}: {len(error.problems)} problems, nothing of it was kept:", error.exit_status)
+    for problem in error.problems:
+        stderr.print(f"  - {' '.join(problem.split())}", markup=False)
+    return found
 
 
 def _exit(text: str, status: int) -> typer.Exit:

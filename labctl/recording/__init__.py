@@ -2,9 +2,10 @@
 
 from labctl.recording.data_set_limits import refuse_too_many_data_sets
 from labctl.recording.files import read_recording, write_recording
-from labctl.recording.importer import Importer, NoOptions
+from labctl.recording.importer import Importer, NoOptions, TableImporter, TableOptions
 from labctl.recording.info import OutputUnit, RecordingInfo
 from labctl.recording.points import dataset_starts, to_points
+from labctl.recording.raw_table import RawColumn, RawTable
 from labctl.recording.recording import Columns, Recording
 
 __all__ = [
@@ -12,8 +13,12 @@ __all__ = [
     "Importer",
     "NoOptions",
     "OutputUnit",
+    "RawColumn",
+    "RawTable",
     "Recording",
     "RecordingInfo",
+    "TableImporter",
+    "TableOptions",
     "dataset_starts",
     "read_recording",
     "refuse_too_many_data_sets",

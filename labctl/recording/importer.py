@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
+from labctl.recording.raw_table import RawTable
 from labctl.recording.recording import Recording
 
 
@@ -18,7 +19,16 @@ class NoOptions(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class TableOptions(BaseModel):
+    """Options of an importer that gives a table; its column map knows the rest."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    serial: str | None = Field(default=None, max_length=64)  #: instead of the map's or the file's
+
+
 OptionsT = TypeVar("OptionsT", bound=BaseModel)
+TableOptionsT = TypeVar("TableOptionsT", bound=TableOptions)
 
 
 @dataclass(frozen=True)
@@ -34,3 +44,17 @@ class Importer(Generic[OptionsT]):
     probe: Callable[[Path], float]
     read: Callable[[Path, OptionsT], Recording]
     options: type[OptionsT]  #: a pydantic model; NoOptions for none
+
+
+@dataclass(frozen=True)
+class TableImporter(Generic[TableOptionsT]):
+    """Reads one format of logs as a table, of which a column map then makes a recording.
+
+    `probe` is as of an Importer. `table` returns the columns under the file's own names, with the units that the
+    format itself fixes, and raises BadRecording.
+    """
+
+    title: str
+    probe: Callable[[Path], float]
+    table: Callable[[Path, TableOptionsT], RawTable]
+    options: type[TableOptionsT]

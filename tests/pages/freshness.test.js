@@ -23,7 +23,11 @@ const words = (change) => {
 };
 
 test("a page that hears service and bench is fresh", () => {
-  assert.deepEqual(words({}), { found: "no", stale: false, text: "Last answer of the service 0 s ago, bench 1 s ago." });
+  assert.deepEqual(words({}), {
+    found: "no",
+    stale: false,
+    text: "Last answer of the service 0 s ago, bench 1 s ago.",
+  });
   assert.equal(words({ bench_s: null }).text, "Last answer of the service 0 s ago.");
 });
 
@@ -45,7 +49,10 @@ test("a page that has just been opened asks first", () => {
 });
 
 test("a silent bench, an answer that does not fit and a hidden tab each say what is known", () => {
-  assert.match(words({ bench_s: BENCH_STALE_S + 0.1 }).text, /^Last answer of the bench 3 s ago; the service answers\./);
+  assert.match(
+    words({ bench_s: BENCH_STALE_S + 0.1 }).text,
+    /^Last answer of the bench 3 s ago; the service answers\./,
+  );
   assert.equal(words({ trouble: "no such path" }).found, "trouble");
   assert.match(words({ trouble: "no such path" }).text, /: no such path$/);
   assert.match(words({ paused: true }).text, /last answer of the service at 12:00:00\.$/);

@@ -4,22 +4,29 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query, Request, UploadFile
-from fastapi.responses import StreamingResponse
+from fastapi import APIRouter, Form, Query, Request, UploadFile
+from fastapi import Path as PathParameter
+from fastapi.responses import PlainTextResponse, StreamingResponse
 
 from labctl.api.computation import execute, while_connected, with_files
 from labctl.api.dependencies import ServiceDep, command_route
-from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_RECORDING, SIMULATE_RECORDING
-from labctl.services.commands.requests import RecordingFolder
+from labctl.recording.column_map.templates import template
+from labctl.recording.info import Motion
+from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_LOG, IMPORT_RECORDING, SIMULATE_RECORDING
+from labctl.services.commands.requests import LogFile, RecordingFolder
 from labctl.services.recordings import catalogue
 from labctl.services.recordings.allan import allan_unit
+from labctl.services.recordings.importers import parsed_options
+from labctl.services.recordings.log_preview import preview_log
 from labctl.services.recordings.traces import trace as trace_of
 from labctl.services.recordings.transfer import import_files, zip_recording
+from labctl.services.recordings.uploads import sent_map, with_staged
 from labctl.services.schemas.recordings import (
     AllanResponse,
     DataSetsResponse,
     ExampleRequest,
     ImportResponse,
+    LogPreview,
     RecordingAlone,
     RecordingResponse,
     RecordingWithPoints,
@@ -28,6 +35,13 @@ from labctl.services.schemas.recordings import (
     SimulatedRequest,
     TraceResponse,
 )
+
+MapField = Annotated[str, Form(max_length=1 << 20, description="Map of the columns, as JSON or TOML; empty: proposed.")]
+ImporterField = Annotated[str, Form(max_length=100, description="Importer; empty: the one that is surest.")]
+OptionField = Annotated[list[str] | None, Form(max_length=20, description="Options of the importer, as KEY=VALUE.")]
+ModifiedField = Annotated[
+    float | None, Form(ge=0, le=4e12, description="When the file was last written, ms since 1970.")
+]
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
@@ -43,6 +57,59 @@ async def import_recording(request: Request, files: list[UploadFile], service: S
         [(file.filename or "", file.file) for file in files],
         lambda folder: service.execute(IMPORT_RECORDING, RecordingFolder(folder)),
     )
+
+
+@command_route(router, IMPORT_LOG, "Import a log")
+async def import_log(
+    request: Request,
+    file: UploadFile,
+    service: ServiceDep,
+    column_map: MapField = "",
+    importer: ImporterField = "",
+    option: OptionField = None,
+    modified_ms: ModifiedField = None,
+) -> ImportResponse:
+    """Take in a file of another format (CSV, Parquet, ULog, ROS bag) by the map of its columns, or by the one that is
+    proposed. All of it or nothing; an error lists everything that is wrong as `problems`."""
+    given, options = sent_map(column_map), tuple(option or ())
+    return await with_files(
+        request,
+        with_staged,
+        file.filename or "",
+        file.file,
+        modified_ms,
+        lambda path: service.execute(IMPORT_LOG, LogFile(path, given, importer or None, options)),
+    )
+
+
+@router.post("/logs/preview", summary="Look at a log")
+async def preview(
+    request: Request,
+    file: UploadFile,
+    service: ServiceDep,
+    column_map: MapField = "",
+    importer: ImporterField = "",
+    option: OptionField = None,
+    modified_ms: ModifiedField = None,
+) -> LogPreview:
+    """The proposed map of a log, or what it becomes by the map that is sent; its first rows, traces, and everything
+    that is wrong. Nothing of it is kept."""
+    given, options = sent_map(column_map), parsed_options(option or ())
+    return await with_files(
+        request,
+        with_staged,
+        file.filename or "",
+        file.file,
+        modified_ms,
+        lambda path: service.computation.run(preview_log, path, importer or None, options, given),
+    )
+
+
+@router.get("/templates/{kind}", summary="A template", response_class=PlainTextResponse)
+def template_file(kind: Annotated[Motion, PathParameter(description="What moves the unit.")]) -> PlainTextResponse:
+    """A CSV file with the columns that a kind of data needs, units in their names."""
+    headers = {"Content-Disposition": f'attachment; filename="{kind}.csv"'}
+    return PlainTextResponse(template(kind), media_type="text/csv", headers=headers)
 
 
 @command_route(router, SIMULATE_RECORDING, "Simulate a recording")

@@ -8,38 +8,70 @@ from typing import Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.import_dialogue import Acceptance, named, print_template, read_given
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, print_warnings
 
 export_app = typer.Typer(no_args_is_help=True, help="Write what the database holds to files.")
 
 
+PathToImport = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="PATH",
+        help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file or a ROS bag; or what another "
+        "importer knows.",
+    ),
+]
+ImporterName = Annotated[
+    str | None,
+    typer.Option("--format", metavar="NAME", help="Importer; default: the one that recognises the file best."),
+]
+ImporterOptions = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; may be repeated."),
+]
+MapFile = Annotated[
+    Path | None,
+    typer.Option("--map", metavar="FILE", help="What the columns of a log are, as TOML; default: proposed and asked."),
+]
+AcceptMap = Annotated[bool, typer.Option("--accept-map", help="Import by the proposed map without a question.")]
+WriteMap = Annotated[
+    Path | None,
+    typer.Option("--write-map", metavar="FILE", help="Write the map; without --accept-map nothing is imported."),
+]
+TemplateKind = Annotated[
+    str | None,
+    typer.Option("--template", metavar="KIND", help="Print a CSV template: rest, rates, turns, profile or poses."),
+]
+
+
 def import_(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            metavar="PATH", help="Folder with recording.toml and its data file, or a file that an importer knows."
-        ),
-    ],
-    importer: Annotated[
-        str | None,
-        typer.Option("--format", metavar="NAME", help="Importer; default: the one that recognises the file best."),
-    ] = None,
-    option: Annotated[
-        list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; may be repeated."),
-    ] = None,
+    path: PathToImport = None,
+    importer: ImporterName = None,
+    option: ImporterOptions = None,
+    column_map: MapFile = None,
+    accept_map: AcceptMap = False,
+    write_map: WriteMap = None,
+    template: TemplateKind = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Import a recording made on any bench: in the interchange format, or in one that an installed importer knows."""
+    """Import data made on any bench: in the interchange format, or a log, whose columns a map names."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import IMPORT_RECORDING
     from labctl.services.commands.requests import RecordingFolder
     from labctl.services.recordings.importers import as_interchange
 
-    with one_clear_line(), as_interchange(path, importer, option or []) as folder:
-        answer = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
+    if template is not None:
+        print_template(template)
+        return
+    with one_clear_line():
+        accept = Acceptance(
+            named(path), given=column_map is not None, accepted=accept_map, out=write_map, quiet=as_json
+        )
+        with as_interchange(accept.path, importer, option or [], read_given(column_map), accept.ask) as folder:
+            answer = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
     if as_json:
         print_json(answer)
         return

@@ -24,6 +24,8 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
     """Return the findings of a summary, the certain ones first."""
     if len(summary) == 0:
         return []
+    if summary.info.motion == "poses":  # no rate is known that an output could follow
+        return sorted(check_time(summary, environment), key=lambda finding: finding.severity != "certain")
     if summary.info.motion == "profile":  # a rate may change, and so may the output
         found = [*check_responses(summary, responses(summary)), *check_time(summary, environment)]
         return sorted(found, key=lambda finding: finding.severity != "certain")

@@ -90,9 +90,11 @@ def _of_readings(recording: Recording) -> Summary:
 def _one_set(
     info: RecordingInfo, rows: Columns, outputs: Mapping[str, NDArray[np.float64]], here: slice
 ) -> dict[str, Any]:
-    rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)[here]
-    warm = temperature_of(rows)
     t_s = np.asarray(rows["t_s"], dtype=np.float64)[here]
+    rate = (
+        np.asarray(rows["table_rate_dps"], dtype=np.float64)[here] if "table_rate_dps" in rows else np.zeros(len(t_s))
+    )
+    warm = temperature_of(rows)
     found: dict[str, Any] = {
         **_place(info, rows, here.start),
         "n": len(rate),

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 
+from labctl.recording.column_map import map_text
 from labctl.recording.files import recording_parts
-from labctl.services.commands.requests import RecordingFolder
+from labctl.services.commands.requests import LogFile, RecordingFolder
 from labctl.services.schemas.base import Request
 
 
@@ -16,6 +17,17 @@ def json_body(_: ExitStack, request: object) -> Mapping[str, object]:
     if not isinstance(body, Request):
         return {}
     return {"json": body.model_dump(mode="json", exclude_unset=True)}
+
+
+def log_file(opened: ExitStack, request: LogFile) -> Mapping[str, object]:
+    """Send a log with its map as one form."""
+    content = opened.enter_context(request.path.open("rb"))
+    fields: dict[str, object] = {
+        "column_map": "" if request.column_map is None else map_text(request.column_map),
+        "importer": request.importer or "",
+        "option": list(request.options),
+    }
+    return {"files": [("file", (request.path.name, content))], "data": fields}
 
 
 def recording_files(opened: ExitStack, request: RecordingFolder) -> Mapping[str, object]:

@@ -9,10 +9,11 @@ from labctl.services.calibrations import certification, fitting, revision
 from labctl.services.campaigns.bench_status import bench_status
 from labctl.services.commands.command import Command, Newest, NoContent
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.encoding import recording_files
+from labctl.services.commands.encoding import log_file, recording_files
 from labctl.services.commands.requests import (
     CampaignResume,
     CampaignStart,
+    LogFile,
     RecordingFolder,
     ToBench,
     ToCampaign,
@@ -22,7 +23,7 @@ from labctl.services.commands.requests import (
     ToUnit,
     ToVersion,
 )
-from labctl.services.recordings import examples, transfer
+from labctl.services.recordings import examples, importers, transfer
 from labctl.services.schedule import queue
 from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
 from labctl.services.schemas.benches import BenchStatus, ClearRequest
@@ -40,6 +41,11 @@ from labctl.services.schemas.schedule import ScheduledResponse
 
 def _import_recording(context: CommandContext, asked: RecordingFolder) -> ImportResponse:
     return transfer.import_folder(context.store, asked.folder, context.now())
+
+
+def _import_log(context: CommandContext, asked: LogFile) -> ImportResponse:
+    with importers.as_interchange(asked.path, asked.importer, asked.options, asked.column_map) as folder:
+        return transfer.import_folder(context.store, folder, context.now())
 
 
 def _import_example(context: CommandContext, asked: ExampleRequest) -> ImportResponse:
@@ -122,6 +128,14 @@ IMPORT_RECORDING = Command(
     handler=_import_recording,
     responses={201: ImportResponse},
     encode=recording_files,
+    computes=True,
+)
+IMPORT_LOG = Command(
+    method="POST",
+    path="/api/recordings/logs",
+    handler=_import_log,
+    responses={201: ImportResponse},
+    encode=log_file,
     computes=True,
 )
 IMPORT_EXAMPLE = Command(

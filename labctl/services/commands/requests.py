@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import ClassVar, Generic, TypeVar
 
+from labctl.recording.column_map import ColumnMap
 from labctl.services.schemas.base import Request
 from labctl.services.schemas.campaigns import CampaignRequest, ResumeRequest
 
@@ -101,6 +102,16 @@ class CampaignResume(Addressed):
     body: ResumeRequest
     bench: str | None = None
     speed: float | None = None
+
+
+@dataclass(frozen=True)
+class LogFile:
+    """A log in a format of others, with the map of its columns; None: the one that is proposed."""
+
+    path: Path
+    column_map: ColumnMap | None = None
+    importer: str | None = None
+    options: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -14,27 +14,45 @@ from instruments.plugins import PluginError, PluginGroup, failure, instance_of
 from labctl.errors import BadInput, BadRecording, LabctlError
 from labctl.recording import Recording, write_recording
 from labctl.recording.checks import checked, checked_environment
-from labctl.recording.importer import Importer
+from labctl.recording.column_map import ColumnMap, FileKeys
+from labctl.recording.importer import Importer, TableImporter
+from labctl.recording.logs.layout import layout_of
+from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_large, refuse_other
+from labctl.services.recordings.logs import Accept, MappedFile, mapped_file
 from labctl.services.recordings.staging import staging_folder
 
-IMPORTERS: PluginGroup[Importer[Any]] = PluginGroup("labctl.importers", "importer", instance_of(Importer))
+
+def _importer(found: object) -> Importer[Any] | TableImporter[Any]:
+    return found if isinstance(found, TableImporter) else instance_of(Importer)(found)
+
+
+IMPORTERS: PluginGroup[Importer[Any] | TableImporter[Any]] = PluginGroup("labctl.importers", "importer", _importer)
 #: The importer of labctl's own format: what it reads is taken in as it is.
 INTERCHANGE = "labctl-recording"
 
 
 @contextmanager
-def as_interchange(path: Path, name: str | None = None, options: Sequence[str] = ()) -> Iterator[Path]:
+def as_interchange(
+    path: Path,
+    name: str | None = None,
+    options: Sequence[str] = (),
+    column_map: ColumnMap | None = None,
+    accept: Accept | None = None,
+) -> Iterator[Path]:
     """Give the folder of a recording in the interchange format: the path itself, or one made of what `path` holds.
 
-    `name` is an importer's; without it the importer that is surest. `options` are KEY=VALUE.
-    Raises BadInput for an importer or option that there is not, BadRecording for what cannot be read.
+    `name` is an importer's; without it the importer that is surest. `options` are KEY=VALUE. `column_map` says what the
+    columns of a log are; without it one is proposed. `accept` is shown what a log would become, and raises where that
+    is not wanted. Raises BadInput for an importer or option that there is not, BadRecording for what cannot be read.
     """
     given = parsed_options(options)
     chosen = name or surest(path)
     if chosen == INTERCHANGE and not given:
+        if column_map is not None:
+            raise _no_map(chosen)
         yield path
         return
-    recording = read_with(chosen, path, given)
+    recording = read_with(chosen, path, given, column_map, accept)
     with staging_folder() as made:
         folder = made / "recording"
         write_recording(recording, folder)
@@ -61,6 +79,10 @@ def surest(path: Path) -> str:
     """
     sure = {name: _confidence(name, importer, path) for name, importer in IMPORTERS.all().items()}
     best = max(sure.values(), default=0.0)
+    if best <= 0.0 and path.is_file():
+        refuse_large(path, MOST_TEXT_BYTES)
+        refuse_other(path, head_of(path))
+        layout_of(path, head_of(path), FileKeys())  # says why it is no text with columns
     names = [name for name, confidence in sure.items() if confidence == best]
     if best <= 0.0:
         if path.is_file():
@@ -75,33 +97,66 @@ def surest(path: Path) -> str:
     return names[0]
 
 
-def read_with(name: str, path: Path, options: Mapping[str, str]) -> Recording:
+def read_with(
+    name: str,
+    path: Path,
+    options: Mapping[str, str],
+    column_map: ColumnMap | None = None,
+    accept: Accept | None = None,
+) -> Recording:
     """Return what an importer reads, checked by the rules of the interchange format; raises BadInput, BadRecording."""
-    try:
-        importer, plugin = IMPORTERS.get(name), IMPORTERS.plugin(name)
-    except PluginError as error:
-        raise BadInput(f"--format {name}: {error}") from error
-    try:
-        given = importer.options.model_validate(dict(options))
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        known = ", ".join(importer.options.model_fields) or "none"
-        raise BadInput(f"importer {name}: option {key}: {first['msg']} (there are {known})") from error
+    importer, given = _importer_and_options(name, options)
+    plugin = IMPORTERS.plugin(name)
     if not path.exists():
         raise BadRecording(f"{path}: not found; name the file to import")
+    if isinstance(importer, Importer) and column_map is not None:
+        raise _no_map(name)
+    made: MappedFile | None = None
     try:
-        recording = importer.read(path, given)
-        found = instance_of(Recording)(recording)
-    except LabctlError:
+        if isinstance(importer, TableImporter):
+            made = mapped_file(name, importer, path, given, column_map)
+        else:
+            found = instance_of(Recording)(importer.read(path, given))
+    except (LabctlError, MemoryError):
         raise
     except Exception as error:
         raise BadRecording(f"{path}: {failure(plugin, 'read it', error)}") from error
+    if made is not None:
+        if accept is not None:
+            accept(made)
+        found = made.recording
     read_by = f"read from {path.name} by importer {name} of {plugin.release}"
     return _checked(path, found, read_by)
 
 
-def _confidence(name: str, importer: Importer[Any], path: Path) -> float:
+def log_with_map(path: Path, name: str | None, options: Mapping[str, str], column_map: ColumnMap | None) -> MappedFile:
+    """Return what a log would become, with everything that is wrong with it; raises BadInput, BadRecording."""
+    chosen = name or surest(path)
+    importer, given = _importer_and_options(chosen, options)
+    if not isinstance(importer, TableImporter):
+        raise BadInput(f"{path}: importer {chosen} knows its columns by itself; import it with `labctl import`")
+    return mapped_file(chosen, importer, path, given, column_map)
+
+
+def _no_map(name: str) -> BadInput:
+    return BadInput(f"--map: importer {name} knows its columns by itself; leave the map out")
+
+
+def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Importer[Any] | TableImporter[Any], Any]:
+    try:
+        importer = IMPORTERS.get(name)
+    except PluginError as error:
+        raise BadInput(f"--format {name}: {error}") from error
+    try:
+        return importer, importer.options.model_validate(dict(options))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        known = ", ".join(key for key in importer.options.model_fields if key != "file") or "none"
+        raise BadInput(f"importer {name}: option {key}: {first['msg']} (there are {known})") from error
+
+
+def _confidence(name: str, importer: Importer[Any] | TableImporter[Any], path: Path) -> float:
     try:
         return float(importer.probe(path))
     except Exception as error:  # noqa: BLE001  one importer's failure is no reason to ask no other

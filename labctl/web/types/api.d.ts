@@ -33,6 +33,7 @@ export type Imported = Schema<"ImportResponse">;
 export type Ladder = Schema<"LadderResponse">;
 export type LadderRow = Schema<"LadderRow">;
 export type ModelLines = Schema<"ModelLines">;
+export type LogPreview = Schema<"LogPreview">;
 export type Output = Schema<"OutputResponse">;
 export type Plan = Schema<"PlannedResponse">;
 export type Prompt = Schema<"PromptResponse">;
@@ -112,6 +113,7 @@ export interface ProblemDocument {
   title?: string;
   detail?: string;
   warnings?: Warning[];
+  problems?: string[];
 }
 
 /* Requests: path, parameters, body and answer of each operation */

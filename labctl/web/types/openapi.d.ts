@@ -852,6 +852,68 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recordings/logs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import a log
+         * @description Take in a file of another format (CSV, Parquet, ULog, ROS bag) by the map of its columns, or by the one that is
+         *     proposed. All of it or nothing; an error lists everything that is wrong as `problems`.
+         */
+        post: operations["import_log_api_recordings_logs_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/logs/preview": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Look at a log
+         * @description The proposed map of a log, or what it becomes by the map that is sent; its first rows, traces, and everything
+         *     that is wrong. Nothing of it is kept.
+         */
+        post: operations["preview_api_recordings_logs_preview_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/templates/{kind}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A template
+         * @description A CSV file with the columns that a kind of data needs, units in their names.
+         */
+        get: operations["template_file_api_recordings_templates__kind__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/recordings/simulated": {
         parameters: {
             query?: never;
@@ -1546,10 +1608,64 @@ export interface components {
             /** Noise Dps */
             noise_dps: (number | null)[];
         };
+        /** Body_import_log_api_recordings_logs_post */
+        Body_import_log_api_recordings_logs_post: {
+            /** File */
+            file: string;
+            /**
+             * Column Map
+             * @description Map of the columns, as JSON or TOML; empty: proposed.
+             * @default
+             */
+            column_map?: string;
+            /**
+             * Importer
+             * @description Importer; empty: the one that is surest.
+             * @default
+             */
+            importer?: string;
+            /**
+             * Option
+             * @description Options of the importer, as KEY=VALUE.
+             */
+            option?: string[] | null;
+            /**
+             * Modified Ms
+             * @description When the file was last written, ms since 1970.
+             */
+            modified_ms?: number | null;
+        };
         /** Body_import_recording_api_recordings_post */
         Body_import_recording_api_recordings_post: {
             /** Files */
             files: string[];
+        };
+        /** Body_preview_api_recordings_logs_preview_post */
+        Body_preview_api_recordings_logs_preview_post: {
+            /** File */
+            file: string;
+            /**
+             * Column Map
+             * @description Map of the columns, as JSON or TOML; empty: proposed.
+             * @default
+             */
+            column_map?: string;
+            /**
+             * Importer
+             * @description Importer; empty: the one that is surest.
+             * @default
+             */
+            importer?: string;
+            /**
+             * Option
+             * @description Options of the importer, as KEY=VALUE.
+             */
+            option?: string[] | null;
+            /**
+             * Modified Ms
+             * @description When the file was last written, ms since 1970.
+             */
+            modified_ms?: number | null;
         };
         /**
          * CalibrationRow
@@ -3105,6 +3221,126 @@ export interface components {
             high_dps: (number | null)[];
             /** Z */
             z: number | null;
+        };
+        /**
+         * LogColumn
+         * @description One column of a log.
+         */
+        LogColumn: {
+            /** Name */
+            name: string;
+            /**
+             * Unit
+             * @description That the format of the file states; empty: none.
+             */
+            unit: string;
+            /** Is Text */
+            is_text: boolean;
+            /**
+             * Target
+             * @description Column of the recording that it becomes; empty: it is not used.
+             */
+            target: string;
+        };
+        /**
+         * LogPreview
+         * @description A log, its column map, and the recording that it would become; nothing of it was kept.
+         */
+        LogPreview: {
+            /** File */
+            file: string;
+            /** Importer */
+            importer: string;
+            /**
+             * Title
+             * @description What the format is called.
+             */
+            title: string;
+            /** Rows */
+            rows: number;
+            /** Columns */
+            columns: components["schemas"]["LogColumn"][];
+            /** First Rows */
+            first_rows: string[][];
+            /**
+             * Column Map
+             * @description The map: keys and values of a MAP.toml.
+             */
+            column_map: {
+                [key: string]: components["schemas"]["JsonValue"];
+            };
+            /**
+             * Map Toml
+             * @description The same as TOML.
+             */
+            map_toml: string;
+            /**
+             * Guesses
+             * @description What was taken from values, because no name says it.
+             */
+            guesses: string[];
+            /**
+             * Problems
+             * @description Everything that is wrong; empty: it can be imported.
+             */
+            problems: string[];
+            /**
+             * Unused
+             * @description Columns of the file that nothing uses.
+             */
+            unused: string[];
+            /** Serial */
+            serial: string | null;
+            /**
+             * Motion
+             * @description What moved the unit; null: not known while something is wrong.
+             */
+            motion: string | null;
+            /** Datasets */
+            datasets: number | null;
+            /** Duration S */
+            duration_s: number | null;
+            /** Traces */
+            traces: components["schemas"]["LogTrace"][];
+            /** Targets */
+            targets: components["schemas"]["LogTarget"][];
+        };
+        /**
+         * LogTarget
+         * @description A column that a recording may have.
+         */
+        LogTarget: {
+            /** Name */
+            name: string;
+            /** Meaning */
+            meaning: string;
+            /**
+             * Unit
+             * @description Of the recording's column; empty: none.
+             */
+            unit: string;
+            /**
+             * Units
+             * @description Units that a log may have it in.
+             */
+            units: string[];
+        };
+        /**
+         * LogTrace
+         * @description Least and largest value of a column in bins of equal count, in the file's own unit.
+         */
+        LogTrace: {
+            /** Name */
+            name: string;
+            /**
+             * X
+             * @description Middle of each bin: time in s, or the row where time is not known.
+             */
+            x: number[];
+            /** Low */
+            low: (number | null)[];
+            /** High */
+            high: (number | null)[];
         };
         /**
          * ModelLines
@@ -6013,6 +6249,104 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ImportResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    import_log_api_recordings_logs_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "multipart/form-data": components["schemas"]["Body_import_log_api_recordings_logs_post"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    preview_api_recordings_logs_preview_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "multipart/form-data": components["schemas"]["Body_preview_api_recordings_logs_preview_post"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LogPreview"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    template_file_api_recordings_templates__kind__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description What moves the unit. */
+                kind: "rates" | "rest" | "turns" | "profile" | "poses";
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": string;
                 };
             };
             /** @description Validation Error */

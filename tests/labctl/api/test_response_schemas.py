@@ -19,6 +19,7 @@ FILES = {
 FREE = {
     "AuditResponse.detail": "the keys depend on the act",
     "Experiment.recipe": "a recipe as in its TOML; RecipeResponse.text is the form to rely on",
+    "LogPreview.column_map": "a map as in its TOML; LogPreview.map_toml is the form to rely on",
     "PictureResponse.figure": "Plotly's own form",
     "RecordingAlone.info": "recording.toml as it was imported, with keys of other benches",
     "RecordingWithPoints.info": "as of RecordingAlone",

@@ -32,6 +32,12 @@ export function recordingFiles(files) {
 }
 
 /**
+ * Whether what was chosen is one log in a format of others, and not a recording.
+ * @param {readonly { name: string }[]} files
+ */
+export const isLog = (files) => files.length === 1 && files[0].name !== "recording.toml";
+
+/**
  * @param {FileSystemEntry} entry
  * @returns {entry is FileSystemDirectoryEntry}
  */

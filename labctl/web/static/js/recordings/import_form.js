@@ -5,9 +5,12 @@ import { messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
 import { busyIndicator, notice } from "../core/components.js";
-import { droppedFiles, recordingFiles } from "./file_input.js";
+import { droppedFiles, isLog, recordingFiles } from "./file_input.js";
+import { logPreview } from "./log_preview.js";
 
 /** @import { Imported } from "../../../types/api.js" */
+
+const KINDS = ["rest", "rates", "turns", "profile", "poses"];
 
 /** @param {readonly File[]} files */
 const totalSize = (files) => {
@@ -28,7 +31,6 @@ export function importForm(taken) {
       type: "file",
       multiple: true,
       webkitdirectory: folder,
-      accept: folder ? null : ".toml,.csv,.parquet",
       "aria-label": folder ? "Folder of a recording" : "Files of a recording",
       class: "visually-hidden",
       tabindex: "-1",
@@ -68,7 +70,7 @@ export function importForm(taken) {
       "p",
       { class: "small" },
       h("code", {}, "recording.toml"),
-      ", its data as CSV or Parquet, and the environment file if there is one; or the folder that holds them.",
+      ", its data as CSV or Parquet, and the environment file if there is one; or the folder that holds them. Or a log: CSV, Parquet, PX4 ULog, ROS bag.",
     ),
     h("div", { class: "row", style: "justify-content: center" }, pick(false), pick(true)),
   );
@@ -90,19 +92,48 @@ export function importForm(taken) {
           ),
         ),
       );
+    if (isLog(files)) return setChildren(result, logPreview(files[0], accepted));
     setChildren(result, busyIndicator(`Reading ${files.map((file) => file.name).join(", ")} (${totalSize(files)})`));
     try {
       const made = await upload("/api/recordings", files);
-      setChildren(result, acceptedNotice(made, left));
-      taken(made);
+      accepted(made, left);
     } catch (error) {
       setChildren(result, refusedNotice(error));
     }
     return result;
   }
 
-  return h("section", { class: "card stack", "aria-label": "Import" }, h("h2", {}, "Import"), zone, result);
+  /**
+   * @param {Imported} made
+   * @param {readonly string[]} [left]
+   */
+  function accepted(made, left = []) {
+    setChildren(result, acceptedNotice(made, left));
+    taken(made);
+  }
+
+  return h(
+    "section",
+    { class: "card stack", "aria-label": "Import" },
+    h("h2", {}, "Import"),
+    zone,
+    templates(),
+    result,
+  );
 }
+
+/** Templates of logs to download, one for each kind of data. */
+const templates = () =>
+  h(
+    "p",
+    { class: "small" },
+    "Templates: ",
+    KINDS.flatMap((kind, k) => [
+      k ? ", " : null,
+      h("a", { href: `/api/recordings/templates/${kind}`, download: `${kind}.csv` }, kind),
+    ]),
+    ".",
+  );
 
 /**
  * @param {Imported} made

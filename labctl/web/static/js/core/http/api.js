@@ -93,6 +93,21 @@ export async function upload(path, files) {
 }
 
 /**
+ * Send one file with fields of a form; a list is sent as several fields of one name.
+ * @template {PathOf<"post">} P
+ * @param {P} path
+ * @param {File} file
+ * @param {Record<string, string | string[]>} fields
+ * @returns {Promise<AnswerOf<"post", P>>}
+ */
+export async function sendFile(path, file, fields) {
+  const form = new FormData();
+  form.append("file", file, file.name);
+  for (const [name, value] of Object.entries(fields)) for (const each of [value].flat()) form.append(name, each);
+  return (await request(path, { method: "POST", headers: headers(), body: form })).json();
+}
+
+/**
  * Fetch a file with the access key and save it as `name`.
  * @template {PathOf<"get">} P
  * @param {P} path

@@ -12,6 +12,8 @@ export class Problem extends Error {
     this.title = document.title;
     /** @type {Warning[] | undefined} */
     this.warnings = document.warnings;
+    /** @type {string[] | undefined} */
+    this.problems = document.problems;
   }
 }
 

@@ -1,0 +1,138 @@
+"""What `labctl import` shows of a log before anything is kept: its map, its first rows, and the question."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+from rich.markup import escape
+
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.output import console, stderr, table
+
+if TYPE_CHECKING:
+    from labctl.recording.column_map import ColumnMap
+    from labctl.services.recordings.logs import MappedFile
+
+#: Columns of the first rows that are shown side by side.
+SHOWN_COLUMNS = 10
+SHOWN_ROWS = 4
+
+
+def print_template(kind: str) -> None:
+    """Print the CSV template of a kind of data."""
+    with one_clear_line():
+        from labctl.recording.column_map.templates import template
+
+        sys.stdout.write(template(kind))
+
+
+def named(path: Path | None) -> Path:
+    """Return the path; raises BadInput where none was given."""
+    from labctl.errors import BadInput
+
+    if path is None:
+        raise BadInput("name the file or folder to import, or ask for a template with --template KIND")
+    return path
+
+
+def read_given(path: Path | None) -> ColumnMap | None:
+    """Return the map of a file, None where none was given; raises BadInput."""
+    from labctl.recording.column_map import read_map
+
+    return None if path is None else read_map(path)
+
+
+class Acceptance:
+    """Whether a log may be imported by a map: given, accepted beforehand, or asked at the terminal.
+
+    `out` is where the map is to be written; `quiet` prints nothing, for `--json`.
+    """
+
+    def __init__(self, path: Path, *, given: bool, accepted: bool, out: Path | None, quiet: bool) -> None:
+        self.path, self.given, self.accepted, self.out, self.quiet = path, given, accepted, out, quiet
+
+    def ask(self, found: MappedFile) -> None:
+        """Show a log with its map and get the decision; raises BadInput, typer.Exit where nothing is to be imported."""
+        if self.out is not None:
+            self._write(found)
+        if found.problems:
+            self._refuse(found)
+        if not self.quiet:
+            show(found)
+        if self.given or self.accepted:
+            return
+        self._decide()
+
+    def _write(self, found: MappedFile) -> None:
+        from labctl.errors import BadInput
+        from labctl.recording.column_map import map_text
+
+        assert self.out is not None
+        if self.out.exists():
+            raise BadInput(f"--write-map {self.out}: exists already; name a new file")
+        self.out.write_text(map_text(found.column_map), encoding="utf-8")
+        if not self.accepted and not found.problems:
+            if not self.quiet:
+                show(found)
+            stderr.print(
+                f"map -> {self.out}; nothing was imported: labctl import {self.path} --map {self.out}", style="dim"
+            )
+            raise typer.Exit(0)
+
+    def _refuse(self, found: MappedFile) -> None:
+        from labctl.errors import BadFile
+
+        lines = list(found.problems)
+        if self.out is not None:
+            hint = f"the map is in {self.out}: correct it and import with --map {self.out}"
+        elif not self.given and any("[" in line or "sample_rate_hz" in line for line in lines):
+            hint = (
+                f"labctl import {self.path} --write-map MAP.toml writes the map so far, to correct and give with --map"
+            )
+        else:
+            raise BadFile.of(self.path, lines)
+        raise BadFile.of(self.path, [f"{lines[0]} ({hint})"] if len(lines) == 1 else [*lines, hint])
+
+    def _decide(self) -> None:
+        from labctl.errors import BadInput
+
+        choices = "--accept-map imports by it, --write-map MAP.toml writes it, to correct and give with --map MAP.toml"
+        if self.quiet or not sys.stdin.isatty():
+            raise BadInput(f"{self.path}: this map is proposed and not yet accepted; {choices}")
+        if not typer.confirm("import by this map?", default=False, err=True):
+            stderr.print(f"nothing was imported; {choices}", style="dim")
+            raise typer.Exit(1)
+
+
+def show(found: MappedFile) -> None:
+    """Print what a log would become: its map, what was guessed, its first rows, and columns without use."""
+    log = found.log
+    word = "proposed map" if found.proposed else "map"
+    console.print(f"{found.table.path.name}: {found.title}, {found.table.rows} rows; {word}:", markup=False)
+    mapped = table("", "column of the recording", "from", "unit", "scale")
+    for target, column in found.column_map.columns.items():
+        raw = found.table.columns.get(str(column.source))
+        unit = column.unit or (raw.unit if raw is not None else "")
+        mapped.add_row(
+            target, escape(str(column.source)), escape(unit) or "–", "" if column.scale is None else f"{column.scale:g}"
+        )
+    console.print(mapped)
+    for guess in found.guesses:
+        console.print(f"guessed: {guess}", markup=False, style="yellow")
+    names = list(found.table.columns)[:SHOWN_COLUMNS]
+    rows = table("first rows", *(escape(name) for name in names))
+    for row in found.table.shown_rows()[:SHOWN_ROWS]:
+        rows.add_row(*(escape(cell) for cell in row[: len(names)]))
+    console.print(rows)
+    if log is not None:
+        info = log.recording.info
+        sets = len(set(log.recording.columns["dataset"].tolist()))
+        console.print(
+            f"serial {info.serial}; motion {log.motion}; data sets by {found.column_map.datasets.by}: {sets}; "
+            f"began {info.started_at:%Y-%m-%d %H:%M:%S} UTC", markup=False
+        )  # fmt: skip
+        if log.unused:
+            console.print(f"not used: {', '.join(log.unused)}", markup=False)

@@ -1,0 +1,67 @@
+"""What moved a unit, by the columns that a log has and by its readings."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.recording.column_map.movement import Movement, poses
+from labctl.recording.columns import BY_NAME, needed
+from labctl.recording.constant_rate import rate_change
+from labctl.recording.info import Motion, RecordingInfo
+from labctl.recording.recording import Columns
+
+Array = NDArray[np.float64]
+#: Poses that gravity tells apart, from which on a gyro can be calibrated by them (imu_tk asks for 9 and more).
+LEAST_POSES = 6
+
+
+def motion_of(columns: Columns, kind: str, found: Movement, t_s: Array) -> Motion | None:
+    """Return what moved the unit; None where it moved and nothing in the columns says how."""
+    if "turn_deg" in columns:
+        return "turns"
+    if "table_rate_dps" in columns:
+        rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
+        if kind == "points":
+            return "rates"
+        valid = np.ones(len(rate), dtype=np.bool_)
+        change = rate_change(np.asarray(columns["dataset"], dtype=np.int64), rate, valid)
+        return "rates" if change is None else "profile"
+    if found.is_rest:
+        return "rest"
+    return "poses" if _poses(columns, found, t_s) >= LEAST_POSES else None
+
+
+def free_motion(columns: Columns, found: Movement, t_s: Array) -> str:
+    """Return why a log of a unit that moved cannot be used, and what would do instead, as one sentence."""
+    n = _poses(columns, found, t_s)
+    seen = f"; its accelerometer shows {n} poses at rest, {LEAST_POSES} are needed" if n else ""
+    spread = f"its output spreads over {found.spread_dps:.3g} deg/s"
+    return (
+        f"the unit moves in {100 * found.share:.0f} % of the time ({spread}) and nothing says by how much{seen}: free "
+        "motion without a reference is no calibration data; what would do is a column with the table's rate "
+        "(table_rate_dps), the angle of each turn (turn_deg), an accelerometer with rests in at least "
+        f"{LEAST_POSES} poses (accel_x_g, accel_y_g, accel_z_g), or a log at rest"
+    )
+
+
+def missing_columns(info: RecordingInfo, columns: Columns) -> list[str]:
+    """Return a line for each column that a recording of this motion needs and that is not there."""
+    lines = []
+    for name in needed(info):
+        if name in columns:
+            continue
+        advice = f"write [columns.{name}]"
+        if name == "position":
+            advice = 'write [constants] position = "z" (the body axis along the table axis), or a column of it'
+        elif name in {"turn_deg", "table_rate_dps", "temperature_c"}:
+            advice += f", or {name} in [constants] or in [parts.NAME]"
+        lines.append(f"no {name} ({BY_NAME[name].meaning}), needed for motion = {info.motion!r}; {advice}")
+    return lines
+
+
+def _poses(columns: Columns, found: Movement, t_s: Array) -> int:
+    names = [f"accel_{axis}_g" for axis in "xyz"]
+    if any(name not in columns for name in names):
+        return 0
+    return poses(found, t_s, np.column_stack([np.asarray(columns[name], dtype=np.float64) for name in names]))

@@ -1,0 +1,125 @@
+"""What the name of a column says: its unit, and which column of a recording it is."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from labctl.recording.column_map.units import QUANTITIES, find_unit, is_lsb, unit_of_target
+from labctl.recording.columns import BY_NAME
+
+_BRACKETS = re.compile(r"^(.*?)[\s_.-]*[\[(]\s*([^\])]+?)\s*[\])]\s*$")
+#: Units that stand at the end of a name without brackets, longest first.
+_ENDINGS = (
+    "rad_per_s", "deg_per_s", "rad/sec", "deg/sec", "rad_s2", "m_s2", "rad_s", "deg_s", "rad/s", "deg/s", "mdps",
+    "m/s^2", "m/s2", "m/s²", "°/s", "rads", "dps", "degc", "deg c", "celsius", "kelvin", "degf", "msec", "usec", "nsec",
+    "sec", "°c", "mg", "ms", "us", "ns", "lsb", "raw", "ut", "mt", "deg", "rad", "s", "c", "k", "f", "g", "v",
+)  # fmt: skip
+_AXIS = r"(?P<axis>[xyz])"
+_INDEX = {"0": "x", "1": "y", "2": "z"}
+_ANY = r"(?:.*[_ ])?"
+_RAW = r"[_ ]?(?:raw[_ ]?)?"
+_GYRO = "gyroscope|gyro|gyr|angularvelocity|angular velocity|angvel|angular rate|omega|rotationrate|rotation rate"
+_ACCEL = "accelerometer|acceleration|accel|acc|specific force|linear acceleration"
+_TABLE = "table|rig|turntable|stage"
+_TIME = "time ?stamp|time|clock|datetime|date|millis|micros|epoch|stamp|t|elapsed|uptime|seconds"
+
+#: Names, folded -> column of a recording; `{axis}` is the axis that the name has.
+_RULES: tuple[tuple[str, str], ...] = (
+    (rf"{_ANY}(?:{_GYRO}){_RAW}{_AXIS}", "gyro_{axis}"),
+    (rf"(?:g|w|imu g|imu w){_AXIS}", "gyro_{axis}"),
+    (rf"{_AXIS}[_ ]?(?:gyroscope|gyro|gyr|omega|angular velocity|rate)", "gyro_{axis}"),
+    (rf"rate[_ ]?{_AXIS}", "gyro_{axis}"),
+    (rf"{_ANY}(?:{_ACCEL}){_RAW}{_AXIS}", "accel_{axis}_g"),
+    (rf"(?:a|f|imu a){_AXIS}", "accel_{axis}_g"),
+    (rf"{_AXIS}[_ ]?(?:accelerometer|acceleration|accel|acc)", "accel_{axis}_g"),
+    (rf"{_ANY}(?:magnetometer|magnetic field|mag|field)\d?[_ ]?{_AXIS}", "field_{axis}_ut"),
+    (
+        rf"{_ANY}(?:{_TABLE}|reference|ref|true|commanded|cmd)[_ ](?:angular )?(?:rate|speed|velocity|omega)",
+        "table_rate_dps",
+    ),
+    (rf"{_ANY}(?:{_TABLE}|encoder)[_ ](?:angle|position|pos)", "table_angle_deg"),
+    (r"(?:turn|turned|turn angle|turned angle)", "turn_deg"),
+    (r"(?:chamber|oven|ambient|air|env|environment)(?:[_ ](?:temperature|temp|t|air))?", "chamber_c"),
+    (r"(?:chamber|oven)?[_ ]?(?:setpoint|set point)(?:[_ ](?:temperature|temp))?", "chamber_setpoint_c"),
+    (rf"{_ANY}(?:temperature|temp|thermometer)(?:[_ ](?:imu|gyro|die|raw|1))?", "temperature_c"),
+    (r"(?:d|die|imu|gyro|t)temp", "temperature_c"),
+    (r"(?:supply|vcc|vdd|supply voltage|voltage)", "supply_v"),
+    (rf"{_ANY}(?:{_TIME})(?:[_ ]?(?:utc|boot|sample|since boot))?", "t_s"),
+    (r"(?:gyro|gyroscope|angular rate|rate|angular velocity|gyro out|gyro output|gyro rate|output)", "gyro_z"),
+    (r"(?:position|orientation|up|up axis)", "position"),
+    (r"valid", "valid"),
+)
+_COMPILED = tuple((re.compile(pattern), target) for pattern, target in _RULES)
+#: Names of columns that number or name stretches of a log.
+PARTS = re.compile(
+    r"(?:part|data ?set|set|segment|label|phase|section|activity|step|burst)(?: ?(?:id|no|number|name))?"
+)
+#: Names of columns that count readings.
+COUNTERS = re.compile(
+    r"(?:n |num )?(?:samples?|index|idx|seq|sequence|counter|count|row|no|n|packet|id|frame)"
+    r"(?: ?(?:id|no|number|count|counter))?"
+)
+
+
+@dataclass(frozen=True)
+class NameSays:
+    """What a name says: the column of a recording, or empty, and the unit, or empty."""
+
+    target: str
+    unit: str
+
+
+def folded(name: str) -> str:
+    """Return a name in lower case, words apart: `GyroX` and `gyro_x` are `gyro x`, `angular_velocity.x` too."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.strip())
+    apart = re.sub(r"\[([012])\]", lambda found: " " + _INDEX[found[1]], apart)
+    return re.sub(r"[\s_.\-:/]+", " ", apart).strip().lower()
+
+
+def name_says(name: str) -> NameSays:
+    """Return what a column's name says about it."""
+    stripped = name.strip()
+    if stripped in BY_NAME:
+        unit = unit_of_target(stripped)
+        return NameSays(stripped, "" if stripped.startswith("gyro_") else unit)
+    for stem, unit in _divided(stripped):
+        target = _target(stem)
+        if target and _is_unit_of(target, unit):
+            return NameSays(target, unit)
+    brackets = _BRACKETS.match(stripped)
+    return NameSays(_target(brackets[1] if brackets is not None else stripped), "")  # a unit that is not known is none
+
+
+def _divided(name: str) -> list[tuple[str, str]]:
+    """Return how a name may divide into what it means and its unit, the surest first; the last is without a unit."""
+    found: list[tuple[str, str]] = []
+    if (brackets := _BRACKETS.match(name)) is not None and brackets[2] not in _INDEX:
+        found.append((brackets[1], _plain_unit(brackets[2])))
+    lower = name.lower()
+    for ending in _ENDINGS:
+        stem = name[: len(name) - len(ending)]
+        if lower.endswith(ending) and stem and (stem[-1] in "_ .-/" or len(ending) > 3):
+            found.append((stem.rstrip("_ .-/"), _plain_unit(ending)))
+    return [*found, (name, "")]
+
+
+def _plain_unit(text: str) -> str:
+    return {"rad_per_s": "rad/s", "deg_per_s": "deg/s", "rad_s": "rad/s", "deg_s": "deg/s", "m_s2": "m/s2"}.get(
+        text.lower(), text
+    )
+
+
+def _is_unit_of(target: str, unit: str) -> bool:
+    quantity = unit_of_target(target)
+    if not unit:
+        return True
+    return is_lsb(unit) or (quantity in QUANTITIES and find_unit(quantity, unit) is not None)
+
+
+def _target(stem: str) -> str:
+    text = folded(stem)
+    for pattern, target in _COMPILED:
+        if (found := pattern.fullmatch(text)) is not None:
+            return target.format(axis=found.groupdict().get("axis", ""))
+    return ""

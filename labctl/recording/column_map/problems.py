@@ -1,0 +1,50 @@
+"""Everything that is wrong with a file, gathered, so that one look at it mends all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadFile
+
+#: Problems that are listed of one file.
+MOST_PROBLEMS = 20
+#: Rows that one problem names.
+MOST_ROWS = 5
+
+
+class Problems:
+    """Collects lines about one file; every line stands alone: what, where, value, what to do."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.lines: list[str] = []
+
+    def add(self, line: str) -> None:
+        """Add a line, once."""
+        if line not in self.lines:
+            self.lines.append(line)
+
+    def listed(self) -> list[str]:
+        """Return the lines, bounded."""
+        more = len(self.lines) - MOST_PROBLEMS
+        return self.lines[:MOST_PROBLEMS] + ([f"and {more} more problems"] if more > 0 else [])
+
+    def raise_if_any(self) -> None:
+        """Raise BadFile where something is wrong."""
+        if self.lines:
+            raise BadFile.of(self.path, self.listed())
+
+
+def rows_text(wrong: NDArray[np.bool_] | Sequence[int], total: int | None = None) -> str:
+    """Return rows, given as a mask or as numbers from 1, as words: `row 3`, or `rows 3, 7, 9 and 12 more`."""
+    found = (np.flatnonzero(wrong) + 1).tolist() if isinstance(wrong, np.ndarray) else list(wrong)
+    n = len(found) if total is None else total
+    if n == 1:
+        return f"row {found[0]}"
+    shown = found[:MOST_ROWS]
+    more = n - len(shown)
+    return f"rows {', '.join(map(str, shown))}" + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,203 @@
+"""A recording made of a log by its column map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from labctl.recording.column_map.conversion import converted, output_of
+from labctl.recording.column_map.data_sets import Division, divide
+from labctl.recording.column_map.model import ColumnMap
+from labctl.recording.column_map.motion import free_motion, missing_columns, motion_of
+from labctl.recording.column_map.movement import Movement, movement
+from labctl.recording.column_map.problems import Problems
+from labctl.recording.column_map.proposal import serial_of
+from labctl.recording.column_map.sources import refuse_wrong_cells, sources, unused
+from labctl.recording.column_map.time_axis import TimeAxis, time_axis
+from labctl.recording.columns import BY_NAME
+from labctl.recording.info import Motion, OutputUnit, RecordingInfo
+from labctl.recording.raw_table import RawColumn, RawTable
+from labctl.recording.recording import Recording
+
+Array = NDArray[np.float64]
+#: Readings that a recording has at least.
+LEAST_ROWS = 2
+#: Keys of recording.toml that the map has in places of its own, or that the data decide.
+_TAKEN = frozenset({"format", "serial", "axes", "kind", "motion", "started_at", "output", "sample_rate_hz"})
+#: Specific force at rest that units of g allow, g.
+_AT_REST_G = (0.5, 2.0)
+
+
+@dataclass(frozen=True)
+class MappedLog:
+    """A recording made of a log: with the motion that was found, and the file's columns that nothing uses."""
+
+    recording: Recording
+    motion: Motion
+    unused: list[str]
+
+
+def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
+    """Return the recording that a map makes of a log; raises BadFile with everything that is wrong."""
+    problems = Problems(table.path)
+    for line in table.problems:
+        problems.add(line)
+    found = sources(table, column_map, problems)
+    if table.rows < LEAST_ROWS:
+        problems.add(f"{table.rows} row of readings; a recording needs at least {LEAST_ROWS}, of one unit in one run")
+    if not column_map.axes:
+        problems.add(
+            "no column is known to be the output of a gyro (it has "
+            f"{', '.join(repr(name[:40]) for name in list(table.columns)[:20])}); write [columns.gyro_x], _y or _z"
+        )
+    valid = found.get("valid")
+    for target, column in found.items():
+        if target == "t_s" and column.is_text and _is_date(column_map, column):
+            continue
+        if not _holds_text(target):
+            allowed = valid is not None and target.startswith("gyro_")
+            refuse_wrong_cells(column, target, problems, empty_allowed=allowed)
+    times = time_axis(column_map, found.get("t_s"), table.rows, problems)
+    if column_map.kind == "points" and times is None and "t_s" not in column_map.columns:
+        problems.lines = [line for line in problems.lines if not line.startswith("no column of time")]
+        times = TimeAxis(np.arange(table.rows, dtype=np.float64), None)
+    usable = {target: column for target, column in found.items() if not column.is_text or _holds_text(target)}
+    columns = _columns(column_map, usable, problems)
+    problems.raise_if_any()
+    assert times is not None  # else a problem was raised
+    return _assembled(table, column_map, usable, columns, times, problems)
+
+
+def _is_date(column_map: ColumnMap, column: RawColumn) -> bool:
+    return (column_map.columns["t_s"].unit or column.unit).lower() in {
+        "date-time",
+        "iso",
+        "iso8601",
+        "iso 8601",
+        "datetime",
+    }
+
+
+def _holds_text(target: str) -> bool:
+    return target in BY_NAME and BY_NAME[target].kind == "text"
+
+
+def _columns(column_map: ColumnMap, found: dict[str, RawColumn], problems: Problems) -> dict[str, Any]:
+    """Return every column but time in the unit of the recording's, the gyro's in deg/s."""
+    columns: dict[str, Any] = {}
+    for target, column in found.items():
+        if target == "t_s":
+            continue
+        if _holds_text(target):
+            columns[target] = column.words if column.words is not None else column.values.astype(np.str_)
+            continue
+        values = converted(target, column_map.columns[target], column, problems)
+        if values is None:
+            continue
+        whole = target in BY_NAME and BY_NAME[target].kind == "integer"
+        columns[target] = np.nan_to_num(values).astype(np.int64) if whole else values
+    return columns
+
+
+def _assembled(
+    table: RawTable, column_map: ColumnMap, found: dict[str, RawColumn], columns: dict[str, Any], times: TimeAxis,
+    problems: Problems,
+) -> MappedLog:  # fmt: skip
+    rates = np.column_stack([columns[f"gyro_{axis}"] for axis in column_map.axes])
+    moved = movement(rates, times.t_s)
+    division = divide(table, column_map, times.t_s, moved, problems)
+    if column_map.kind == "samples" or "t_s" in column_map.columns:
+        columns["t_s"] = times.t_s
+    columns["dataset"] = division.numbers
+    _fill_constants(column_map, division, columns)
+    _refuse_force(columns, moved, problems)
+    motion = column_map.motion or motion_of(columns, column_map.kind, moved, times.t_s)
+    if motion is None:
+        problems.add(free_motion(columns, moved, times.t_s))
+        problems.raise_if_any()
+    assert motion is not None
+    output: dict[str, OutputUnit] = {}
+    for axis in column_map.axes:
+        name = f"gyro_{axis}"
+        columns[name], unit = output_of(column_map.columns[name], found[name])
+        if unit is not None:
+            output[axis] = unit
+    info = _info(table, column_map, motion, output, times, problems)
+    if info is not None:
+        for line in missing_columns(info, columns):
+            problems.add(line)
+    kept = division.numbers > 0
+    if not kept.any():
+        problems.add("no row is left in any data set; correct [datasets] and [parts]")
+    problems.raise_if_any()
+    assert info is not None
+    whole = {name: values[kept] for name, values in columns.items()} if not kept.all() else columns
+    return MappedLog(Recording(info, whole), motion, unused(table, column_map))
+
+
+def _fill_constants(column_map: ColumnMap, division: Division, columns: dict[str, Any]) -> None:
+    """Fill in what the map says about all rows, then what it says about each data set."""
+    n = len(division.numbers)
+    for name, value in column_map.constants.constants().items():
+        columns[name] = np.full(n, value)
+    for number, part in division.parts(column_map).items():
+        rows = division.numbers == number
+        for name, value in part.constants().items():
+            if name not in columns:
+                columns[name] = np.full(n, "", dtype="<U2") if isinstance(value, str) else np.full(n, np.nan)
+            columns[name][rows] = value
+
+
+def _refuse_force(columns: dict[str, Any], moved: Movement, problems: Problems) -> None:
+    names = [f"accel_{axis}_g" for axis in "xyz"]
+    if not all(name in columns for name in names) or not moved.still.any():
+        return
+    force = np.column_stack([columns[name] for name in names])[moved.still]
+    median = float(np.nanmedian(np.linalg.norm(force, axis=1)))
+    low, high = _AT_REST_G
+    if not low <= median <= high:
+        problems.add(
+            f"accel_x_g, accel_y_g, accel_z_g: {median:.4g} g at rest, where gravity is 1 g; check their unit or scale"
+        )
+
+
+def _info(
+    table: RawTable, column_map: ColumnMap, motion: Motion, output: dict[str, OutputUnit], times: TimeAxis,
+    problems: Problems,
+) -> RecordingInfo | None:  # fmt: skip
+    taken = sorted(_TAKEN & set(column_map.info))
+    if taken:
+        problems.add(
+            f"[info] {taken[0]}: this key stands at the top of a map, or is found by itself; leave it out here"
+        )
+        return None
+    started = column_map.started_at or times.started_at or table.started_at
+    noted = [str(column_map.info.get("notes") or table.facts.get("notes") or "")]
+    if started is None:
+        started = _modified(table)
+        noted.append("started_at is when the file was written: nothing in it says more")
+    head = {
+        **{key: value for key, value in table.facts.items() if key not in _TAKEN},
+        **column_map.info,
+        "serial": column_map.serial or serial_of(table), "axes": column_map.axes, "kind": column_map.kind,
+        "motion": motion,
+        "started_at": started, "output": output, "sample_rate_hz": column_map.sample_rate_hz,
+        "notes": "; ".join(filter(None, noted)),
+    }  # fmt: skip
+    try:
+        return RecordingInfo.model_validate(head)
+    except ValidationError as error:
+        for each in error.errors():
+            place = ".".join(map(str, each["loc"]))
+            problems.add(f"[info] {place}: {each['msg']}; correct it in the map")
+        return None
+
+
+def _modified(table: RawTable) -> datetime:
+    """Return when the file was written, where nothing in it says when its readings were taken."""
+    return datetime.fromtimestamp(table.path.stat().st_mtime, tz=UTC)

@@ -1,0 +1,82 @@
+"""The columns of a file that a map names, and what is wrong with their cells."""
+
+from __future__ import annotations
+
+import difflib
+from collections import defaultdict
+
+import numpy as np
+
+from labctl.recording.column_map.model import ColumnMap
+from labctl.recording.column_map.problems import Problems, rows_text
+from labctl.recording.raw_table import RawColumn, RawTable
+
+
+def source(table: RawTable, named: str | int) -> RawColumn | None:
+    """Return the column of a file by its name or its number from 1; None where there is none."""
+    if isinstance(named, int):
+        by_number = list(table.columns.values())
+        exact = table.columns.get(f"column {named}")
+        return exact or (by_number[named - 1] if 1 <= named <= len(by_number) else None)
+    found = table.columns.get(named)
+    if found is not None:
+        return found
+    loose = [column for name, column in table.columns.items() if name.strip().lower() == named.strip().lower()]
+    return loose[0] if len(loose) == 1 else None
+
+
+def sources(table: RawTable, column_map: ColumnMap, problems: Problems) -> dict[str, RawColumn]:
+    """Return the file's column behind each of a recording's; what is not there, or stands twice, is a problem."""
+    found: dict[str, RawColumn] = {}
+    used = defaultdict(list)
+    for target, mapped in column_map.columns.items():
+        column = source(table, mapped.source)
+        if column is None:
+            problems.add(_not_there(table, mapped.source, target))
+            continue
+        found[target] = column
+        used[column.name].append(target)
+    for name, targets in used.items():
+        if len(targets) > 1 and any(target.startswith(("gyro_", "accel_")) for target in targets):
+            problems.add(f"column {name!r} is mapped to {' and '.join(targets)}; each needs a column of its own")
+    return found
+
+
+def unused(table: RawTable, column_map: ColumnMap) -> list[str]:
+    """Return the columns of a file that a map does not use, in the file's order."""
+    named = [mapped.source for mapped in column_map.columns.values()]
+    named += [column_map.datasets.column] if column_map.datasets.column is not None else []
+    used = {found.name for each in named if (found := source(table, each)) is not None}
+    return [name for name in table.columns if name not in used]
+
+
+def refuse_wrong_cells(column: RawColumn, target: str, problems: Problems, *, empty_allowed: bool) -> None:
+    """Add a problem for cells that are no numbers, and one for empty cells where none may be."""
+    if column.words is not None:
+        problems.add(
+            f"column {column.name!r} (for {target}) holds text, such as {str(column.words[0])[:40]!r}; expected "
+            "numbers; correct the map, or the separator and the decimal sign in [file]"
+        )
+        return
+    if column.n_wrong:
+        texts = ", ".join(repr(text[:40]) for _, text in column.wrong[:3])
+        rows = rows_text([row for row, _ in column.wrong], column.n_wrong)
+        comma = ' (a decimal comma? write decimal = "," in [file])' if any("," in t for _, t in column.wrong) else ""
+        problems.add(f"column {column.name!r}, {rows}: {texts} is no number{comma}; correct or leave out these rows")
+    missing = ~np.isfinite(column.values)
+    for row, _ in column.wrong:
+        missing[row - 1] = False
+    if missing.any() and not empty_allowed and int(missing.sum()) > column.n_wrong - len(column.wrong):
+        problems.add(
+            f"column {column.name!r} (for {target}), {rows_text(missing)}: empty or no finite number; fill in or leave "
+            "out these rows"
+        )
+
+
+def _not_there(table: RawTable, named: str | int, target: str) -> str:
+    names = list(table.columns)
+    near = difflib.get_close_matches(str(named), names, n=1, cutoff=0.6)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    listed = ", ".join(repr(name[:40]) for name in names[:20]) + (" ..." if len(names) > 20 else "")
+    what = f"number {named}" if isinstance(named, int) else repr(named[:60])
+    return f"column {what} (for {target}) is not in the file{hint} (it has {listed})"

@@ -1,0 +1,161 @@
+"""ROS 1 and ROS 2 bags as a table: the messages sensor_msgs/Imu of one topic, by rosbags.
+
+Units: REP 103 and sensor_msgs/Imu (rad/s, m/s2); sensor_msgs/Temperature is in deg C.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from labctl.errors import BadInput, BadRecording
+from labctl.recording.importer import TableImporter, TableOptions
+from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
+from labctl.recording.raw_table import RawColumn, RawTable
+
+ROS1 = b"#ROSBAG V2.0"
+MCAP = b"\x89MCAP0\r\n"
+METADATA = "metadata.yaml"
+IMU, TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
+
+NS = 1_000_000_000
+
+Array = NDArray[np.float64]
+
+
+class BagOptions(TableOptions):
+    """Which of a bag's topics to take."""
+
+    topic: str | None = Field(default=None, max_length=200)  #: None: the only one of sensor_msgs/Imu
+    temperature: str | None = Field(default=None, max_length=200)  #: None: the only one of sensor_msgs/Temperature
+
+
+def probe(path: Path) -> float:
+    """Return 1 for a ROS 1 bag, a ROS 2 folder with metadata.yaml, or one of its data files."""
+    if path.is_dir():
+        metadata = path / METADATA
+        return float(metadata.is_file() and b"rosbag2_bagfile_information" in metadata.read_bytes()[:4096])
+    if not path.is_file():
+        return 0.0
+    with path.open("rb") as file:
+        head = file.read(len(ROS1))
+    return float(head == ROS1 or head.startswith(MCAP) or path.suffix == ".db3")
+
+
+def read(path: Path, options: BagOptions) -> RawTable:
+    """Return time, output, specific force and temperature of one topic; raises BadRecording, BadInput."""
+    for each in [path] if path.is_file() else sorted(path.iterdir()):
+        refuse_large(each, MOST_LOG_BYTES)
+    if path.is_file() and head_of(path).startswith(ROS1) and path.suffix != ".bag":
+        raise BadRecording(f"{path}: a ROS 1 bag whose name does not end in .bag; rename it")
+    with _opened(path) as bag:
+        topic = _topic(path, bag, options.topic, IMU, "topic")
+        assert topic is not None
+        imu = _imu(bag, topic)
+        thermometer = _topic(path, bag, options.temperature, TEMPERATURE, "temperature")
+        if thermometer is not None and len(imu["stamp"]):
+            imu["temperature"] = _temperature(bag, thermometer, imu["stamp"])
+    if not len(imu["stamp"]):
+        raise BadRecording(f"{path}: topic {topic} holds no message; take another bag, or another topic")
+    return _table(path, topic, imu)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Give the reader of a bag; raises BadRecording for whatever broken bytes lead it to."""
+    from rosbags.highlevel import AnyReader  # noqa: PLC0415  0.3 s that only bags need
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  as above
+
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
+            yield bag
+    except (BadInput, MemoryError):
+        raise
+    except Exception as error:
+        raise BadRecording(
+            f"{path}: not a whole bag ({type(error).__name__}: {' '.join(str(error).split())[:200]}); run `rosbag "
+            "reindex` or `ros2 bag reindex` on it, or record again"
+        ) from error
+
+
+def _topic(path: Path, bag: Any, asked: str | None, kind: str, option: str) -> str | None:
+    """Return the topic of a kind of message; None for a temperature that there is not."""
+    there = sorted(name for name, info in bag.topics.items() if info.msgtype == kind)
+    if asked is not None:
+        if asked not in there:
+            raise BadInput(f"{path}: no topic {asked!r} of {kind} (there are {', '.join(there) or 'none'})")
+        return asked
+    if len(there) == 1:
+        return str(there[0])
+    if kind == TEMPERATURE:
+        return None
+    if not there:
+        names = ", ".join(f"{name} ({info.msgtype})" for name, info in list(bag.topics.items())[:10])
+        raise BadRecording(
+            f"{path}: no topic of {kind} (it has {names or 'none'}); record one that has the gyro's output"
+        )
+    raise BadInput(f"{path}: {' and '.join(there)} are of {kind}; choose one with --option {option}=NAME")
+
+
+def _messages(bag: Any, topic: str) -> Iterator[tuple[int, Any]]:
+    """Yield the time of each message, ns since 1970 (of its head, else of its arrival), and the message."""
+    connections = [each for each in bag.connections if each.topic == topic]
+    for connection, arrived_ns, raw in bag.messages(connections=connections):
+        message = bag.deserialize(raw, connection.msgtype)
+        stamp = message.header.stamp
+        yield (stamp.sec * NS + stamp.nanosec or int(arrived_ns)), message
+
+
+def _imu(bag: Any, topic: str) -> dict[str, NDArray[Any]]:
+    rows = [
+        (
+            at_ns, message.angular_velocity.x, message.angular_velocity.y, message.angular_velocity.z,
+            message.linear_acceleration.x, message.linear_acceleration.y, message.linear_acceleration.z,
+            message.linear_acceleration_covariance[0],
+        )
+        for at_ns, message in _messages(bag, topic)
+    ]  # fmt: skip
+    whole = np.array([row[1:] for row in rows], dtype=np.float64).reshape(-1, 7)
+    names = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+    columns: dict[str, NDArray[Any]] = {"stamp": np.array([row[0] for row in rows], dtype=np.int64)}
+    columns.update({name: whole[:, index] for index, name in enumerate(names)})
+    if (whole[:, 6] == -1).any():  # sensor_msgs/Imu: -1 says that the sensor has no such output
+        columns = {name: values for name, values in columns.items() if not name.startswith("accel_")}
+    return columns
+
+
+def _temperature(bag: Any, topic: str, at_ns: NDArray[np.int64]) -> Array:
+    rows = [((ns - int(at_ns[0])) / NS, message.temperature) for ns, message in _messages(bag, topic)]
+    times, values = np.array(rows, dtype=np.float64).reshape(-1, 2).T
+    return np.interp((at_ns - at_ns[0]) / NS, times, values) if rows else np.full(len(at_ns), np.nan)
+
+
+_TARGETS = {
+    "time": ("t_s", "s"), "gyro_x": ("gyro_x", "rad/s"), "gyro_y": ("gyro_y", "rad/s"), "gyro_z": ("gyro_z", "rad/s"),
+    "accel_x": ("accel_x_g", "m/s2"), "accel_y": ("accel_y_g", "m/s2"), "accel_z": ("accel_z_g", "m/s2"),
+    "temperature": ("temperature_c", "deg C"),
+}  # fmt: skip
+
+
+def _table(path: Path, topic: str, imu: dict[str, NDArray[Any]]) -> RawTable:
+    at_ns = imu.pop("stamp")
+    if not np.isfinite(imu.get("temperature", np.zeros(1))).all():
+        del imu["temperature"]
+    columns = {"time": (at_ns - at_ns[0]) / NS, **imu}
+    raw = {name: RawColumn(name, values, unit=_TARGETS[name][1]) for name, values in columns.items()}
+    return RawTable(
+        path, raw, len(columns["time"]),
+        targets={name: _TARGETS[name][0] for name in raw},
+        facts={"notes": f"ROS bag, topic {topic}"},
+        started_at=datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=int(at_ns[0]) // 1000),
+    )  # fmt: skip
+
+
+IMPORTER = TableImporter("a ROS bag", probe, read, BagOptions)

@@ -1,0 +1,128 @@
+"""Text files of any layout as a table: CSV, tabs, semicolons, blanks, decimal commas, with or without a header."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv as pacsv
+from pydantic import Field
+
+from labctl.errors import BadRecording
+from labctl.recording.column_map.model import FileKeys
+from labctl.recording.column_map.problems import rows_text
+from labctl.recording.data_files.limits import MOST_COLUMNS, refuse_too_many
+from labctl.recording.importer import TableImporter, TableOptions
+from labctl.recording.logs.cells import column_of
+from labctl.recording.logs.encoding import TextStream
+from labctl.recording.logs.layout import layout_of, split
+from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_large, refuse_other
+from labctl.recording.raw_table import SHOWN_ROWS, FileLayout, RawTable
+
+#: How sure the importer is of a text: any other that knows a file is surer.
+SURENESS = 0.1
+
+
+class TextOptions(TableOptions):
+    """What a user may say about a text file beside its map."""
+
+    file: FileKeys = Field(default=FileKeys(), exclude=True)
+
+
+def probe(path: Path) -> float:
+    """Return a low sureness for a file that is text, 0 for anything else."""
+    if not path.is_file() or path.suffix.lower() == ".parquet":
+        return 0.0
+    try:
+        head = head_of(path)
+        refuse_other(path, head)
+        layout_of(path, head, FileKeys())
+    except BadRecording:
+        return 0.0
+    return SURENESS
+
+
+def read_text(path: Path, options: TextOptions) -> RawTable:
+    """Return the table of a text file, all columns; raises BadRecording for what is no table of numbers."""
+    head = head_of(path)
+    refuse_other(path, head)
+    refuse_large(path, MOST_TEXT_BYTES)
+    layout, names = layout_of(path, head, options.file)
+    _refuse_names(path, names)
+    blocks, ragged = _blocks(path, layout, names)
+    rows = sum(block.num_rows for block in blocks)
+    if rows == 0:
+        raise BadRecording(f"{path}: no row of {len(names)} columns below the header; expected at least one")
+    columns = {}
+    for name in names:
+        pieces = [block.column(name) for block in blocks]
+        columns[name] = column_of(name, pieces, layout.decimal)
+        blocks = [block.drop_columns([name]) for block in blocks]
+    return RawTable(
+        path,
+        {name: column for name, column in columns.items() if not column.is_empty or not name.startswith("column ")},
+        rows,
+        tuple(_ragged_lines(ragged, len(names), layout)),
+        layout,
+        first_rows=_first_rows(head, layout, names),
+    )
+
+
+def _refuse_names(path: Path, names: list[str]) -> None:
+    if len(names) > MOST_COLUMNS:
+        raise BadRecording(
+            f"{path}: {len(names)} columns; at most {MOST_COLUMNS} are read; leave out what is not needed"
+        )
+    doubled = sorted({name for name in names if names.count(name) > 1})
+    if doubled:
+        listed = ", ".join(repr(name[:60]) for name in doubled[:5])
+        raise BadRecording(f"{path}: {listed} stands more than once in the header; give each column a name of its own")
+
+
+def _blocks(path: Path, layout: FileLayout, names: list[str]) -> tuple[list[Any], list[tuple[int, int]]]:
+    ragged: list[tuple[int, int]] = []
+
+    def wrong_width(row: Any) -> str:
+        ragged.append((0 if row.number is None else row.number - (layout.data - 1), row.actual_columns))
+        return "skip"
+
+    parse = pacsv.ParseOptions(
+        delimiter="\t" if layout.separator == " " else layout.separator, invalid_row_handler=wrong_width
+    )
+    convert = pacsv.ConvertOptions(
+        column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False, quoted_strings_can_be_null=False
+    )
+    layout_options = pacsv.ReadOptions(column_names=names, skip_rows=layout.data - 1, use_threads=False)
+    blocks, rows = [], 0
+    with closing(TextStream(path, layout.encoding, blanks=layout.separator == " ")) as stream:
+        try:
+            with pacsv.open_csv(stream, layout_options, parse, convert) as opened:
+                for block in opened:
+                    rows += block.num_rows
+                    refuse_too_many(path, rows, len(names))
+                    blocks.append(block)
+        except pa.ArrowInvalid as error:
+            raise BadRecording(f"{path}: row {rows + 1} or later: {str(error).splitlines()[0][:200]}") from error
+    return blocks, ragged
+
+
+def _ragged_lines(ragged: list[tuple[int, int]], width: int, layout: FileLayout) -> list[str]:
+    if not ragged:
+        return []
+    counts = sorted({count for _, count in ragged})
+    had = ", ".join(map(str, counts[:5]))
+    mark = {"\t": "tab", " ": "blanks"}.get(layout.separator, repr(layout.separator))
+    rows = rows_text([row for row, _ in ragged])
+    advice = "correct or leave out these rows"
+    return [f"{rows}: {had} columns where the others have {width} (separator {mark}); {advice}"]
+
+
+def _first_rows(head: bytes, layout: FileLayout, names: list[str]) -> list[list[str]]:
+    text = head.decode("utf-8-sig" if layout.encoding == "utf-8" else layout.encoding, errors="ignore")
+    lines = [line for line in text.splitlines()[layout.data - 1 :] if line.strip()]
+    return [split(line, layout.separator)[: len(names)] for line in lines[:SHOWN_ROWS]]
+
+
+IMPORTER = TableImporter("a text file with columns (CSV)", probe, read_text, TextOptions)

@@ -1,0 +1,187 @@
+"""PX4 ULog files as a table: the raw readings of one gyro, by pyulog.
+
+Topics and units: PX4 message definitions (sensor_gyro: rad/s, deg C; sensor_accel: m/s2; vehicle_imu: delta_angle, rad,
+in delta_angle_dt, us; sensor_combined: gyro_rad rad/s). Time stamps are us since boot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import redirect_stdout, suppress
+from datetime import UTC, datetime, timedelta
+from io import StringIO
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from labctl.errors import BadInput, BadRecording
+from labctl.recording.importer import TableImporter, TableOptions
+from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
+from labctl.recording.raw_table import RawColumn, RawTable
+
+#: ULog format, "File header": the first seven bytes of every log.
+MAGIC = b"ULog\x01\x12\x35"
+GYRO, COMBINED, INTEGRATED, ACCEL = "sensor_gyro", "sensor_combined", "vehicle_imu", "sensor_accel"
+#: Topics with the output of a gyro, the rawest first.
+TOPICS = (GYRO, INTEGRATED, COMBINED)
+#: Topics with the time of day; a receiver without a fix sends 0. Nothing was logged before 2001, us.
+RECEIVERS, EARLIEST_US = ("vehicle_gps_position", "sensor_gps"), 1e15
+#: Readings of an accelerometer this far apart in time belong to no reading of the gyro, s.
+MOST_APART_S = 0.5
+
+Array = NDArray[np.float64]
+
+
+class ULogOptions(TableOptions):
+    """Which of a log's gyros to take."""
+
+    topic: Literal["sensor_gyro", "vehicle_imu", "sensor_combined"] | None = None  #: None: the rawest that is there
+    instance: int = Field(default=0, ge=0, le=255)  #: which of several gyros, from 0
+
+
+def probe(path: Path) -> float:
+    """Return 1 for a file that begins as ULog files do."""
+    if not path.is_file():
+        return 0.0
+    with path.open("rb") as file:
+        return float(file.read(len(MAGIC)) == MAGIC)
+
+
+def read(path: Path, options: ULogOptions) -> RawTable:
+    """Return time, output, temperature and specific force of one gyro; raises BadRecording, BadInput."""
+    head_of(path)
+    refuse_large(path, MOST_LOG_BYTES)
+    log = _parsed(path)
+    data = {(each.name, each.multi_id): each.data for each in log.data_list}
+    there = sorted(key for key in data if key[0] in TOPICS)
+    rawest = next((topic for topic in TOPICS if any(name == topic for name, _ in there)), None)
+    topic: str | None = options.topic or rawest
+    listed = ", ".join(f"{name} {instance}" for name, instance in there)
+    if topic is None:
+        names = ", ".join(sorted({name for name, _ in data})[:12])
+        raise BadRecording(
+            f"{path}: none of {', '.join(TOPICS)} is in this log (it has {names or 'no topic'}); log one of them "
+            "(SDLOG_PROFILE: sensor comparison, or high rate), or take another log"
+        )
+    if (topic, options.instance) not in data:
+        raise BadInput(
+            f"{path}: {topic} has no instance {options.instance} (there are {listed}); choose one with "
+            "--option instance=N, and --option topic=NAME"
+        )
+    columns = _gyro(path, topic, data[topic, options.instance])
+    instance = options.instance if topic != COMBINED else 0
+    _add_temperature(columns, data, instance)
+    _add_force(columns, data, instance)
+    return _table(path, log, f"{topic} {options.instance} (of {listed})", columns, _booted(data))
+
+
+def _parsed(path: Path) -> Any:
+    from pyulog.core import ULog  # noqa: PLC0415  0.1 s that only logs need
+
+    try:
+        with redirect_stdout(StringIO()):  # it prints what it finds damaged
+            return ULog(str(path), [*TOPICS, *RECEIVERS, ACCEL])
+    except (MemoryError, OSError):
+        raise
+    except Exception as error:  # the parser raises whatever broken bytes lead it to
+        raise BadRecording(
+            f"{path}: not a whole ULog file ({type(error).__name__}: {str(error)[:200]}); take the log off the "
+            "card again"
+        ) from error
+
+
+def _gyro(path: Path, topic: str, data: Mapping[str, Any]) -> dict[str, Array]:
+    try:
+        stamps = np.asarray(data.get("timestamp_sample", data["timestamp"]), dtype=np.float64)
+        if not stamps.any():
+            stamps = np.asarray(data["timestamp"], dtype=np.float64)
+        if topic == GYRO:
+            rates = [data[axis] for axis in "xyz"]
+        elif topic == COMBINED:
+            stamps = np.asarray(data["timestamp"], dtype=np.float64)
+            rates = [data[f"gyro_rad[{index}]"] for index in range(3)]
+        else:
+            dt_s = 1e-6 * np.asarray(data["delta_angle_dt"], dtype=np.float64)
+            dt_s = np.where(dt_s > 0, dt_s, np.nan)
+            rates = [np.asarray(data[f"delta_angle[{index}]"], dtype=np.float64) / dt_s for index in range(3)]
+    except KeyError as error:
+        raise BadRecording(f"{path}: {topic} has no field {error}; its definition is not one that PX4 wrote") from error
+    if not len(stamps):
+        raise BadRecording(f"{path}: {topic} holds no reading; take another log, or another topic")
+    columns = {"timestamp": stamps}
+    columns.update(
+        {f"gyro_{axis}": np.asarray(rate, dtype=np.float64) for axis, rate in zip("xyz", rates, strict=True)}
+    )
+    if topic == GYRO and "temperature" in data:
+        columns["temperature"] = np.asarray(data["temperature"], dtype=np.float64)
+    if topic == COMBINED and "accelerometer_m_s2[0]" in data:
+        force = {f"accel_{axis}": data[f"accelerometer_m_s2[{index}]"] for index, axis in enumerate("xyz")}
+        columns.update({name: np.asarray(values, dtype=np.float64) for name, values in force.items()})
+    return columns
+
+
+def _add_temperature(columns: dict[str, Array], data: Mapping[tuple[str, int], Any], instance: int) -> None:
+    """Fill in the gyro's own thermometer, which PX4 logs with sensor_gyro only, at the times of the readings."""
+    source = data.get((GYRO, instance))
+    if "temperature" not in columns and source is not None and "temperature" in source:
+        columns["temperature"] = _at(columns["timestamp"], source, "temperature")
+    if "temperature" in columns and not np.isfinite(columns["temperature"]).all():
+        del columns["temperature"]
+
+
+def _add_force(columns: dict[str, Array], data: Mapping[tuple[str, int], Any], instance: int) -> None:
+    source = data.get((ACCEL, instance))
+    if source is None or "accel_x" in columns or any(axis not in source for axis in "xyz"):
+        return
+    stamps = np.asarray(source["timestamp"], dtype=np.float64)
+    if not len(stamps):
+        return
+    nearest = np.abs(np.interp(columns["timestamp"], stamps, stamps) - columns["timestamp"])
+    if nearest.max() > 1e6 * MOST_APART_S:
+        return
+    for axis in "xyz":
+        columns[f"accel_{axis}"] = _at(columns["timestamp"], source, axis)
+
+
+def _at(times: Array, source: Mapping[str, Any], name: str) -> Array:
+    stamps = np.asarray(source.get("timestamp_sample", source["timestamp"]), dtype=np.float64)
+    return np.interp(times, stamps, np.asarray(source[name], dtype=np.float64))
+
+
+_TARGETS = {
+    "timestamp": ("t_s", "us"), "gyro_x": ("gyro_x", "rad/s"), "gyro_y": ("gyro_y", "rad/s"),
+    "gyro_z": ("gyro_z", "rad/s"), "temperature": ("temperature_c", "deg C"), "accel_x": ("accel_x_g", "m/s2"),
+    "accel_y": ("accel_y_g", "m/s2"), "accel_z": ("accel_z_g", "m/s2"),
+}  # fmt: skip
+
+
+def _table(path: Path, log: Any, taken: str, columns: dict[str, Array], started: datetime | None) -> RawTable:
+    damaged = "; damaged in places, which are left out" if log.file_corruption else ""
+    facts: dict[str, object] = {"notes": f"PX4 ULog, {taken}{damaged}"}
+    uid = log.msg_info_dict.get("sys_uuid", "")
+    if isinstance(uid, str) and uid.isalnum() and uid.isascii():
+        facts["serial"] = f"{uid[-16:]}-{taken.split(' ')[1]}"
+    raw = {name: RawColumn(name, values, unit=_TARGETS[name][1]) for name, values in columns.items()}
+    targets = {name: _TARGETS[name][0] for name in raw}
+    return RawTable(path, raw, len(columns["timestamp"]), targets=targets, facts=facts, started_at=started)
+
+
+def _booted(data: Mapping[tuple[str, int], Any]) -> datetime | None:
+    """Return when the log's clock was 0, from the first fix of a satellite receiver; None without one."""
+    for topic in RECEIVERS:
+        source = data.get((topic, 0))
+        if source is None or "time_utc_usec" not in source:
+            continue
+        utc_us = np.asarray(source["time_utc_usec"], dtype=np.float64)
+        known = np.flatnonzero(utc_us > EARLIEST_US)
+        if len(known):
+            boot_us = float(utc_us[known[0]]) - float(source["timestamp"][known[0]])
+            with suppress(OverflowError, ValueError):
+                return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=boot_us)
+    return None
+
+
+IMPORTER = TableImporter("a PX4 ULog", probe, read, ULogOptions)

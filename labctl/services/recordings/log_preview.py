@@ -1,0 +1,110 @@
+"""A log as a page shows it before it is imported: map, first rows, traces, problems."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.recording.column_map import ColumnMap, map_document, map_text
+from labctl.recording.column_map.sources import source, unused
+from labctl.recording.column_map.units import LSB, QUANTITIES, unit_of_target
+from labctl.recording.columns import COLUMNS
+from labctl.recording.raw_table import RawTable
+from labctl.services.recordings.importers import log_with_map
+from labctl.services.recordings.logs import MappedFile
+from labctl.services.schemas.recordings import LogColumn, LogPreview, LogTarget, LogTrace
+from labctl.store import Store
+
+#: Bins of a trace, and columns that have one.
+BINS, MOST_TRACES = 300, 24
+#: Columns of a recording that a log does not have: made by the import, or belonging to means and coefficients.
+_NOT_OF_LOGS = ("dataset", "scale_factor", "offset", "axis", "n")
+
+Array = NDArray[np.float64]
+
+
+def preview_log(
+    store: Store,  # noqa: ARG001  a computation gets it
+    path: Path,
+    importer: str | None,
+    options: Mapping[str, str],
+    column_map: ColumnMap | None,
+) -> LogPreview:
+    """Return what a log would become by a map, or by the one that is proposed; raises BadInput, BadRecording."""
+    found = log_with_map(path, importer, options, column_map)
+    table, chosen = found.table, found.column_map
+    taken = {target: source(table, mapped.source) for target, mapped in chosen.columns.items()}
+    target_of = {column.name: target for target, column in taken.items() if column is not None}
+    log = found.log
+    return LogPreview(
+        file=path.name,
+        importer=found.importer,
+        title=found.title,
+        rows=table.rows,
+        columns=[
+            LogColumn(name=name, unit=column.unit, is_text=column.is_text, target=target_of.get(name, ""))
+            for name, column in table.columns.items()
+        ],
+        first_rows=table.shown_rows(),
+        column_map=map_document(chosen),
+        map_toml=map_text(chosen),
+        guesses=found.guesses,
+        problems=found.problems,
+        unused=unused(table, chosen),
+        serial=log.recording.info.serial if log is not None else None,
+        motion=log.motion if log is not None else None,
+        datasets=None if log is None else len(np.unique(np.asarray(log.recording.columns["dataset"]))),
+        duration_s=_duration(found),
+        traces=_traces(table, found),
+        targets=_targets(),
+    )
+
+
+def _duration(found: MappedFile) -> float | None:
+    if found.log is None or "t_s" not in found.log.recording.columns:
+        return None
+    t_s = np.asarray(found.log.recording.columns["t_s"], dtype=np.float64)
+    return float(t_s[-1] - t_s[0])
+
+
+def _traces(table: RawTable, found: MappedFile) -> list[LogTrace]:
+    n = table.rows
+    x = np.arange(1, n + 1, dtype=np.float64)
+    if found.log is not None and "t_s" in found.log.recording.columns:
+        t_s = np.asarray(found.log.recording.columns["t_s"], dtype=np.float64)
+        x = t_s if len(t_s) == n else x
+    numbers = [column for column in table.columns.values() if not column.is_text][:MOST_TRACES]
+    starts = np.unique(np.linspace(0, n, BINS + 1).astype(np.int64)[:-1])
+    middle = x[np.minimum(starts + np.diff(np.append(starts, n)) // 2, n - 1)]
+    return [
+        LogTrace(name=each.name, x=middle.tolist(), low=_least(each.values, starts), high=_most(each.values, starts))
+        for each in numbers
+    ]
+
+
+def _least(values: Array, starts: NDArray[np.int64]) -> list[float | None]:
+    return _finite(np.fmin.reduceat(values, starts))
+
+
+def _most(values: Array, starts: NDArray[np.int64]) -> list[float | None]:
+    return _finite(np.fmax.reduceat(values, starts))
+
+
+def _finite(values: Array) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def _targets() -> list[LogTarget]:
+    return [
+        LogTarget(name=column.name, meaning=column.meaning, unit=unit, units=_units(unit))
+        for column in COLUMNS
+        if column.name not in _NOT_OF_LOGS and not column.name.endswith("_std")
+        for unit in [unit_of_target(column.name)]
+    ]
+
+
+def _units(quantity: str) -> list[str]:
+    return [*(unit.name for unit in QUANTITIES[quantity]), LSB] if quantity in QUANTITIES else []

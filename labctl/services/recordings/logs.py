@@ -1,0 +1,65 @@
+"""A log and its column map together: what it would become, everything that is wrong with it, and what to ask."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from labctl.errors import BadFile
+from labctl.recording import Recording
+from labctl.recording.column_map import (
+    ColumnMap,
+    MappedLog,
+    checked_map,
+    completed,
+    map_document,
+    propose,
+    recording_of,
+)
+from labctl.recording.importer import TableImporter, TableOptionsT
+from labctl.recording.raw_table import RawTable
+
+
+@dataclass(frozen=True)
+class MappedFile:
+    """A log as an importer read it, with its map; `log` is None where `problems` say what is wrong."""
+
+    importer: str
+    title: str
+    table: RawTable
+    column_map: ColumnMap
+    proposed: bool  #: the map is a proposal, not accepted yet
+    guesses: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    log: MappedLog | None = None
+
+    @property
+    def recording(self) -> Recording:
+        """The recording; raises BadFile with everything that is wrong."""
+        if self.log is None:
+            raise BadFile.of(self.table.path, self.problems)
+        return self.log.recording
+
+
+#: Is shown what a log would become; raises where that is not wanted.
+Accept = Callable[[MappedFile], None]
+
+
+def mapped_file(
+    name: str, importer: TableImporter[TableOptionsT], path: Path, options: TableOptionsT, column_map: ColumnMap | None
+) -> MappedFile:
+    """Return what a log becomes by a map, or by the one that is proposed; raises BadRecording for what is no log."""
+    if column_map is not None and "file" in type(options).model_fields:
+        options = options.model_copy(update={"file": column_map.file})
+    table = importer.table(path, options)
+    proposal = propose(table) if column_map is None else completed(table, column_map)
+    chosen = proposal.column_map
+    if options.serial is not None:
+        chosen = checked_map({**map_document(chosen), "serial": options.serial}, "--option serial")
+    made = MappedFile(name, importer.title, table, chosen, column_map is None, proposal.guesses)
+    try:
+        log = recording_of(table, chosen)
+    except BadFile as error:
+        return replace(made, problems=error.problems)
+    return replace(made, log=log)

@@ -1,0 +1,334 @@
+// A log before it is imported: the proposed map of its columns to correct, its first rows, a plot, and what is wrong.
+
+import { sendFile } from "../core/http/api.js";
+import { messageOf, Problem } from "../core/http/errors.js";
+import { saveBlob } from "../core/http/api.js";
+import { setChildren, h } from "../core/elements.js";
+import { axisColour, colour, figure } from "../core/figure.js";
+import { count, duration } from "../core/format.js";
+import { busyIndicator, button, notice, table } from "../core/components.js";
+import { labelledField, option, selectField } from "../core/fields.js";
+import { entryOf, withKey, withTarget, withUnit } from "./log_map.js";
+
+/** @import { Imported, LogPreview } from "../../../types/api.js" */
+/** @import { MapDocument } from "./log_map.js" */
+
+/** @type {[string, string][]} */
+const MOTIONS = [
+  ["", "as found"],
+  ["rest", "rest: nothing moves it"],
+  ["rates", "rates: a table at one rate in each data set"],
+  ["profile", "profile: a table whose rate changes"],
+  ["turns", "turns: by a known angle in each data set"],
+  ["poses", "poses: by hand, between rests"],
+];
+/** @type {[string, string][]} */
+const DIVISIONS = [
+  ["whole", "the whole file is one"],
+  ["gaps", "a new one after each gap"],
+  ["rests", "each rest is one"],
+  ["column", "a new value of a column begins one"],
+];
+
+/**
+ * Show a log and let its map be corrected; `taken(imported)` is called when it is in the database.
+ * @param {File} file
+ * @param {(imported: Imported) => unknown} taken
+ */
+export function logPreview(file, taken) {
+  const place = h("div", { class: "stack", "aria-live": "polite" });
+  /** @type {string[]} */
+  let options = [];
+
+  /** @param {MapDocument | string | null} map */
+  const fields = (map) => ({
+    column_map: typeof map === "string" ? map : map ? JSON.stringify(map) : "",
+    modified_ms: String(file.lastModified),
+    option: options,
+  });
+
+  /** @param {MapDocument | string | null} map */
+  async function look(map) {
+    setChildren(place, busyIndicator(`Looking at ${file.name}`));
+    try {
+      show(await sendFile("/api/recordings/logs/preview", file, fields(map)));
+    } catch (error) {
+      setChildren(
+        place,
+        refused(error),
+        map
+          ? h(
+              "div",
+              { class: "row" },
+              button("Propose a map again", () => look(null)),
+            )
+          : optionField(),
+      );
+    }
+  }
+
+  /** @param {LogPreview} seen */
+  function show(seen) {
+    /** @type {MapDocument} */
+    const map = seen.column_map;
+    const act = button(
+      "Import",
+      async () => {
+        try {
+          taken(await sendFile("/api/recordings/logs", file, fields(map)));
+        } catch (error) {
+          setChildren(
+            place,
+            refused(error),
+            h(
+              "div",
+              { class: "row" },
+              button("Look again", () => look(map)),
+            ),
+          );
+        }
+      },
+      { kind: "primary" },
+    );
+    act.disabled = seen.problems.length > 0;
+    setChildren(
+      place,
+      h("p", { class: "lead" }, `${seen.file}: ${seen.title}, ${count(seen.rows)} rows`),
+      seen.problems.length ? problemList(seen.problems) : summary(seen),
+      seen.guesses.map((guess) => h("p", { class: "small" }, `Guessed: ${guess}`)),
+      settings(seen, map, look),
+      columnTable(seen, map, look),
+      rowTable(seen),
+      plot(seen, map),
+      asText(seen, look),
+      h(
+        "div",
+        { class: "row" },
+        act,
+        button("Save the map", () => saveMap(seen)),
+      ),
+    );
+  }
+
+  function optionField() {
+    /** @type {HTMLInputElement} */
+    const input = h("input", { type: "text", placeholder: "topic=/imu/data" });
+    return h(
+      "div",
+      { class: "row" },
+      labelledField("Option of the importer", input, "KEY=VALUE, such as instance=1 for another gyro of a ULog."),
+      button("Look again", () => {
+        options = input.value.trim() ? [input.value.trim()] : [];
+        return look(null);
+      }),
+    );
+  }
+
+  look(null);
+  return place;
+}
+
+/** @param {unknown} error */
+function refused(error) {
+  const problems = error instanceof Problem ? (error.problems ?? []) : [];
+  return notice(
+    "bad",
+    h("p", { class: "lead" }, messageOf(error)),
+    problems.slice(1).map((line) => h("p", {}, line)),
+    h("p", { class: "small" }, "Nothing of it was kept."),
+  );
+}
+
+/** @param {readonly string[]} problems */
+const problemList = (problems) =>
+  notice(
+    "bad",
+    h(
+      "p",
+      { class: "lead" },
+      problems.length === 1 ? "One thing is missing or wrong" : `${problems.length} things are missing or wrong`,
+    ),
+    problems.map((line) => h("p", {}, line)),
+  );
+
+/** @param {LogPreview} seen */
+const summary = (seen) =>
+  notice(
+    "good",
+    h(
+      "p",
+      {},
+      `Unit ${seen.serial}, motion ${seen.motion}, ${count(seen.datasets ?? 0)} data set${seen.datasets === 1 ? "" : "s"}` +
+        (seen.duration_s === null ? "." : `, ${duration(seen.duration_s)}.`),
+    ),
+    seen.unused.length ? h("p", { class: "small" }, `Not used: ${seen.unused.join(", ")}.`) : null,
+  );
+
+/**
+ * @param {LogPreview} seen
+ * @param {MapDocument} map
+ * @param {(map: MapDocument) => unknown} look
+ */
+function settings(seen, map, look) {
+  /** @type {HTMLInputElement} */
+  const serial = h("input", {
+    type: "text",
+    value: map.serial ?? "",
+    onchange: () => look(withKey(map, "serial", serial.value.trim())),
+  });
+  /** @type {HTMLInputElement} */
+  const rate = h("input", {
+    type: "number",
+    value: String(map.sample_rate_hz ?? ""),
+    min: "0",
+    step: "any",
+    onchange: () => look(withKey(map, "sample_rate_hz", Number(rate.value) || null)),
+  });
+  const by = map.datasets?.by ?? "whole";
+  const columns = seen.columns.map((column) => option(column.name, column.name));
+  return h(
+    "div",
+    { class: "row" },
+    labelledField("Serial number", serial),
+    selectField("What moved it", MOTIONS, map.motion ?? "", (value) => look(withKey(map, "motion", value))),
+    map.columns?.t_s ? null : labelledField("Readings per second", rate, "No column of time is named."),
+    selectField("Data sets", DIVISIONS, by, (value) =>
+      look(withKey(map, "datasets", value === "column" ? { by: value, column: seen.columns[0].name } : { by: value })),
+    ),
+    by === "column"
+      ? selectField("By the column", columns, map.datasets.column, (value) =>
+          look(withKey(map, "datasets", { by, column: value })),
+        )
+      : null,
+  );
+}
+
+/**
+ * @param {LogPreview} seen
+ * @param {MapDocument} map
+ * @param {(map: MapDocument) => unknown} look
+ */
+function columnTable(seen, map, look) {
+  const targets = [option("", "not used"), ...seen.targets.map((each) => option(each.name, each.name))];
+  /** @typedef {LogPreview["columns"][number]} Row */
+  /** @param {Row} row */
+  const numberOf = (row) => seen.columns.indexOf(row) + 1;
+  /** @param {Row} row */
+  const entry = (row) => entryOf(map, row.name, numberOf(row));
+  /** @param {Row} row */
+  function unitCell(row) {
+    const found = entry(row);
+    const units = seen.targets.find((each) => each.name === found?.[0])?.units ?? [];
+    if (!found || !units.length) return "–";
+    const [target, { unit = "", scale }] = found;
+    const shown = [option("", row.unit || "not given"), ...units.map((each) => option(each, each))];
+    const known = unit === "" || units.includes(unit) ? shown : [...shown, option(unit, unit)];
+    /** @type {HTMLInputElement} */
+    const input = h("input", {
+      type: "number",
+      step: "any",
+      value: String(scale ?? ""),
+      "aria-label": `Words per unit of ${row.name}`,
+      onchange: () => look(withUnit(map, target, "LSB", Number(input.value) || null)),
+    });
+    const choice = selectField(`Unit of ${row.name}`, known, unit, (value) => {
+      if (value !== "LSB") return look(withUnit(map, target, value, null));
+      map = withUnit(map, target, "LSB", null);
+      return choice.after(input);
+    });
+    return [choice, unit === "LSB" ? input : null];
+  }
+  return table(
+    [
+      { title: "Column of the file", cell: (row) => h("strong", {}, row.name) },
+      {
+        title: "Is",
+        cell: (row) =>
+          selectField(`${row.name} is`, targets, entry(row)?.[0] ?? "", (value) =>
+            look(withTarget(map, row.name, numberOf(row), value)),
+          ),
+      },
+      { title: "In", cell: unitCell },
+    ],
+    seen.columns,
+    { label: "Map of the columns", first: "11rem", dense: true },
+  );
+}
+
+/** @param {LogPreview} seen */
+const rowTable = (seen) =>
+  table(
+    seen.columns.map((column, k) => ({
+      title: column.name,
+      number: !column.is_text,
+      /** @param {string[]} row */
+      cell: (row) => row[k] ?? "",
+    })),
+    seen.first_rows,
+    { label: "First rows", dense: true },
+  );
+
+/**
+ * @param {LogPreview} seen
+ * @param {MapDocument} map
+ */
+function plot(seen, map) {
+  const used = seen.traces.filter((trace) => {
+    const column = seen.columns.findIndex((each) => each.name === trace.name);
+    return entryOf(map, trace.name, column + 1)?.[0].startsWith("gyro_");
+  });
+  const shown = used.length ? used : seen.traces.slice(0, 6);
+  if (!shown.length) return null;
+  const draw = () => ({
+    data: shown.map((trace, k) => ({
+      type: "scatter",
+      mode: "lines",
+      x: trace.x.flatMap((x) => [x, x]),
+      y: trace.low.flatMap((low, row) => [low, trace.high[row]]),
+      line: { width: 1.2, color: used.length ? axisColour("xyz"[k]) : colour(["axis-x", "axis-y", "axis-z"][k % 3]) },
+      name: trace.name,
+    })),
+    layout: {
+      xaxis: { title: { text: seen.motion ? "time, s" : "row, or time in s where it is known" } },
+      yaxis: { title: { text: "value in the file" } },
+      margin: { l: 70, r: 12, t: 8, b: 46 },
+    },
+  });
+  return figure(
+    `Columns of ${seen.file}`,
+    "Least and largest value in each of up to 300 stretches, as the file has them.",
+    draw,
+    {
+      height: "18rem",
+    },
+  );
+}
+
+/**
+ * @param {LogPreview} seen
+ * @param {(map: string) => unknown} look
+ */
+function asText(seen, look) {
+  const text = h("textarea", {
+    rows: "14",
+    spellcheck: "false",
+    value: seen.map_toml,
+    "aria-label": "The map as TOML",
+  });
+  return h(
+    "details",
+    {},
+    h("summary", {}, "The map as text: parts, constants and everything else"),
+    text,
+    h(
+      "div",
+      { class: "row" },
+      button("Check this map", () => look(text.value)),
+    ),
+  );
+}
+
+/** @param {LogPreview} seen */
+async function saveMap(seen) {
+  saveBlob(new Blob([seen.map_toml], { type: "application/toml" }), `${seen.file.replace(/\.\w+$/, "")}.map.toml`);
+}
