@@ -45,7 +45,7 @@ def version(control: str) -> str:
 
 @contextmanager
 def opened(control: str, url: str, settled_s: float = 4.0) -> Iterator[Page]:
-    """Open an address in a tab of its own and leave it alone for a time; only then look at it."""
+    """Open an address in a tab of its own and leave it alone for a time; only then read it."""
     httpx.put(f"{control}/json/new?{url}").raise_for_status()
     time.sleep(settled_s)
     with sync_playwright() as playwright:

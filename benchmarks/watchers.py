@@ -1,4 +1,5 @@
-"""What 50 onlookers cost a running campaign: each an open event stream, as a browser on the bench page keeps one."""
+"""What 50 watching clients cost a running campaign: each an open event stream, as a browser on the bench page
+keeps one."""
 
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ settle_s = 1
 
 
 def run() -> dict[str, float | str]:
-    """Run the same campaign alone and with onlookers; returns what each took."""
+    """Run the same campaign alone and with watching clients; returns what each took."""
     with tempfile.TemporaryDirectory() as folder, serve(Path(folder) / "lab.sqlite", "--simulate") as service:
         alone, watched = (asyncio.run(_campaign(service, watchers)) for watchers in (0, WATCHERS))
     return {
@@ -50,7 +51,7 @@ def run() -> dict[str, float | str]:
 
 
 async def _campaign(service: Served, watchers: int) -> dict[str, float]:
-    """Run a campaign before a number of onlookers; returns the bench's time, the processor's share."""
+    """Run a campaign before a number of watching clients; returns the bench's time, the processor's share."""
     async with httpx.AsyncClient(base_url=service.url, timeout=60) as client:
         before = service.processor_s()
         status = (await client.post("/api/campaigns", json={"recipe": RECIPE})).raise_for_status().json()

@@ -110,7 +110,7 @@ class SimulationSettings(Strict):
     control: str | None = None  #: HOST:PORT of a simulator in another process, for its unit handler
     speed: float = Field(
         default=1.0, gt=0
-    )  #: clock seconds per wall second of that process; `labctl simulator` writes both
+    )  #: clock seconds per second of real time of that process; `labctl simulator` writes both
 
 
 class DriverRelease(Strict):

@@ -40,7 +40,7 @@ def sleep_until(clock: Clock, t_s: float) -> None:
 class ScaledClock:
     """Wall time, `speed` times as fast; 1 for real instruments. Raises ValueError for a speed that is not positive."""
 
-    #: Least useful time-out of a client library, wall seconds, whatever the speed.
+    #: Least useful time-out of a client library, s of real time, at every speed.
     MIN_WALL_TIMEOUT_S = 0.05
 
     def __init__(self, speed: float = 1.0, *, now_s: float = 0.0) -> None:
@@ -81,7 +81,7 @@ class WallClock(SystemClock):
 class VirtualClock:
     """Time that advances only by `sleep`, at once. Raises ValueError for a start without a time zone."""
 
-    #: Wall seconds of every time-out. A simulator in this process replies before the call returns, or never: a slow
+    #: Every time-out, s of real time. A simulator in this process replies before the call returns, or never: a slow
     #: machine must not look like a slow wire.
     WALL_TIMEOUT_S = 10.0
 

@@ -154,7 +154,7 @@ def _burn() -> None:
 
 @contextmanager
 def watchers(target: Target) -> Iterator[None]:
-    """50 onlookers follow campaign 1, half of them without ever reading."""
+    """50 clients follow campaign 1, half of them without ever reading."""
     with ExitStack() as opened:
         for number in range(50):
             connection = opened.enter_context(socket.create_connection(target.address, timeout=5))

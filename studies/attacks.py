@@ -48,7 +48,7 @@ class Seen:
     answer_s: list[float] = field(default_factory=list)
     safe_s: list[float] = field(default_factory=list)
     health_s: float = 0.0  #: the longest answer of /health
-    heard_s: float = 0.0  #: the longest that the bench process was not heard
+    heard_s: float = 0.0  #: the longest that the bench process gave no sign of life
     refused: int = 0
 
 

@@ -143,7 +143,7 @@ def difference_dps(one: Fitted, other: Fitted) -> float:
 
 
 def judge(kill: Kill, expected: Fitted, folder: Path) -> Verdict:
-    """Kill one campaign, let the next process take it up, and hold the result against what is promised."""
+    """Kill one campaign, let the next process resume it, and compare the result with what is promised."""
     world, rng = World(bench()), np.random.default_rng(kill.seed)
     life = Life(kill.at)
     database, campaign = first_process(world, new_database(folder / "first"), life)

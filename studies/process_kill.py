@@ -24,8 +24,9 @@ from studies.databases import close_server, new_database
 
 KILLS = int(os.environ.get("LABCTL_STUDY_REAL_KILLS", "30"))
 SPEED = 5.0
-#: About what the campaign takes of the wall. A machine that is busy otherwise stalls for seconds of the bench's time:
-#: the recipe allows for that, as it is not what is looked at here.
+#: About what the campaign takes of real time, s. A machine that is busy otherwise stalls for seconds of the bench's
+#: time:
+#: the recipe allows for that, as it is not what is measured here.
 WHOLE_S = 16.0
 RECIPE = """
 format = "labctl-recipe/1"

@@ -122,7 +122,7 @@ class Service:
 
 
 def suffer(folder: Path, bench: Path, faults: tuple[Fault, ...]) -> Outcome:
-    """Run a campaign, let the faults happen, and look at what is there in the end."""
+    """Run a campaign, let the faults happen, and check the final state."""
     (folder / "killed.toml").write_text(RECIPE)
     service = Service(folder, bench)
     try:

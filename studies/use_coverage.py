@@ -24,7 +24,7 @@ from labctl.fitting.uncertainty import rate_uncertainty, use_evidence
 from labctl.recording import Recording, RecordingInfo
 
 UNITS = 200
-#: The first seed: none of these units was looked at while the uncertainty was made.
+#: The first seed: none of these units was used while the uncertainty was made.
 FIRST_SEED = 1_001
 RATES = np.array([-100, -80, -60, -40, -20, 0, 20, 40, 60, 80, 100], dtype=np.float64)
 WARM_C = np.arange(-20.0, 61.0, 10.0)

@@ -53,7 +53,7 @@ def signals() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def nothing_left(signals: None) -> Iterator[None]:
-    """Fail a test that leaves a thread or an asyncio task of its own behind. Set up first, so looked at last."""
+    """Fail a test that leaves a thread or an asyncio task of its own behind. Set up first, so checked last."""
     with leftover_threads() as threads, leftover_tasks() as tasks:
         yield
     assert not threads, f"threads that run on: {threads}"

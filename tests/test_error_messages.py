@@ -27,7 +27,7 @@ VERBS = frozenset(
 )
 #: Where an instruction begins: after a stop, a colon or a conjunction.
 CLAUSE = re.compile(r"(?:[;:.?,(]|\b(?:or|and|then|instead|first|once|where|until)\b)\s+([A-Za-z]+)")
-#: A message may name the command to run, what was expected, or what there is to choose from; or end with advice that a
+#: A message may name the command to run, what was expected, or what can be chosen; or end with advice that a
 #: variable holds.
 ADVICE = re.compile(
     r"`[a-z]|--[a-z]|\bexpected\b|\(there are |^[A-Z][a-z]+ [a-z "

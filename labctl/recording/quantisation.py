@@ -12,7 +12,7 @@ from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
 #: What coarse steps of the output leave in a mean, as a standard deviation: suffix of the output's column.
 QUANTISATION = "_quantisation_std"
-#: Readings of a data set that are looked at for codes; with more different ones than this there is no coarse step.
+#: Readings of a data set that are searched for codes; with more different ones than this there is no coarse step.
 CODE_READINGS, MOST_CODES, LEAST_READINGS = 256, 32, 16
 #: Share of the data sets that must take few codes, and of those the share that shows two codes or more.
 COARSE_SHARE, STEP_SHARE = 0.5, 0.2

@@ -103,7 +103,7 @@ def _switch_on(context: ExecutionContext, run: int, restart: Restart) -> None:
     else:
         try:
             open_streams(context, run, dropping=False)
-        except Exception as error:  # noqa: BLE001  whatever is silent, a person looks at it and then it is tried again
+        except Exception as error:  # noqa: BLE001  a silent device is inspected by a person, then tried again
             context.recorder.event(Event("units_off", f"{error}", level="warning"))
             ask(context, prompt)
             open_streams(context, run)

@@ -46,7 +46,7 @@ class Shutdown:
     def _end(self, state: CampaignState, reason: str, *, bench_is_safe: bool) -> Outcome:
         recorder = self._context.recorder
         if not bench_is_safe:
-            recorder.tracker.update(step_text="making the bench safe")
+            recorder.tracker.update(step_text="setting the bench to its safe state")
         self.complaints = () if bench_is_safe else make_safe(self._context.full_bench, self._context.clock)
         if self.complaints:
             text = NOT_SAFE + "; ".join(self.complaints)

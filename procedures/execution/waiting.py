@@ -14,7 +14,7 @@ from procedures.contracts.errors import Aborted, GuardTripped, Interrupted, Step
 from procedures.contracts.journal import Event
 from procedures.execution.context import POLL_S, ExecutionContext
 
-CHECK_S = 1.0  #: how long the clock runs at most between two looks at the control
+CHECK_S = 1.0  #: how long the clock runs at most between two polls of the control
 
 
 def checkpoint(context: ExecutionContext) -> None:

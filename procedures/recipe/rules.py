@@ -107,7 +107,7 @@ class OnFailure(Table):
 
     acquire_attempts: Whole = Field(default=2, ge=1)  #: a data set whose readings failed is taken again
     link_attempts: Whole = Field(default=3, ge=1)  #: a step whose instrument fell silent is begun so often
-    operator_timeout_s: Number | None = Field(default=None, gt=0)  #: absent: a question waits for ever
+    operator_timeout_s: Number | None = Field(default=None, gt=0)  #: absent: a question waits without limit
     operator_remind_s: Number | None = Field(default=None, gt=0)  #: an open question is put again this often
     #: What an unanswered mounting leads to: the end, or its data sets left out and the next mounting asked for.
     operator_timeout: Literal["fail", "skip"] = "fail"

@@ -23,7 +23,7 @@ CHUNK = bytes(1 << 16)
 
 @dataclass
 class SmallApp:
-    """Answers `/` at once, `/body` after the body, `/endless` for ever; fails at `/mistake`."""
+    """Answers `/` at once, `/body` after the body, `/endless` without end; fails at `/mistake`."""
 
     left: threading.Event = field(default_factory=threading.Event)  #: a client of `/endless` is gone
     streams: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))  #: one for each that began

@@ -48,7 +48,7 @@ class Server(uvicorn.Server):
         self.ready.set()
 
     def serve_until_stopped(self, listener: socket.socket) -> None:
-        """Serve in this thread; `ready` is also set when nothing came of it."""
+        """Serve in this thread; `ready` is also set when it failed."""
         try:
             self.run(sockets=[listener])
         finally:
@@ -106,7 +106,7 @@ class Service:
         return answer.json()
 
     def until(self, path: str, holds: Callable[[Any], bool]) -> Any:
-        """Return the answer once it is as it should be; looked at again whenever the bench reports something."""
+        """Return the answer once it is as it should be; polled whenever the bench reports something."""
         return wait_until(self.lab_service.bench_access.listen, lambda: self.get(path), holds)
 
 

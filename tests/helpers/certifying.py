@@ -1,4 +1,4 @@
-"""Certifying a version that lacks something: what a test says to do it all the same."""
+"""Certifying a version that lacks something: what a test sends to override the objections."""
 
 from __future__ import annotations
 

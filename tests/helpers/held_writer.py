@@ -11,7 +11,7 @@ from labctl.store import Store
 
 @contextmanager
 def held_writer(store: Store) -> Iterator[Callable[[], None]]:
-    """Give what makes a thread hold the connection, at its first call; it lets go at the end."""
+    """Give what makes a thread hold the connection, at its first call; it is released at the end."""
     taken, free = threading.Event(), threading.Event()
 
     def hold() -> None:

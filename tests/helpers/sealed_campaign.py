@@ -48,7 +48,7 @@ def clock_of(standing: ResumePoint) -> VirtualClock:
 
 
 def main(database: str, bench_name: str, recipe: str, how: str) -> None:
-    """Run a campaign to its end, or abort it and, where it is `resumed`, take it up."""
+    """Run a campaign to its end, or abort it and, where it is `resumed`, resume it."""
     bench = load_bench(bench_name)
     with open_store(database, write=True) as store:
         prepared, control = prepare(store, recipe, bench, VirtualClock(), clip=True), Control()

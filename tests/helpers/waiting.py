@@ -1,4 +1,4 @@
-"""Waiting for what another thread does: looked at again whenever it says that something happened."""
+"""Waiting for what another thread does: polled whenever it reports that something happened."""
 
 from __future__ import annotations
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import io
 import re
+import tokenize
 from collections.abc import Iterator
 
 from tests.helpers.paths import ROOT
@@ -33,6 +35,21 @@ def python_strings() -> Iterator[Written]:
             for node in ast.walk(file.tree):
                 if isinstance(node, ast.Constant) and isinstance(node.value, str):
                     yield f"{file.name}:{node.lineno}", node.value
+
+
+def python_comments() -> Iterator[Written]:
+    """Yield every comment of the project's Python files, and every docstring outside the runtime."""
+    for file in sources():
+        if file.parts[0] == "migrations":  # a released revision does not change
+            continue
+        for token in tokenize.generate_tokens(io.StringIO(file.text).readline):
+            if token.type == tokenize.COMMENT:
+                yield f"{file.name}:{token.start[0]}", token.string
+        if not file.is_runtime:
+            documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+            for node in ast.walk(file.tree):
+                if isinstance(node, documented) and (text := ast.get_docstring(node)):
+                    yield f"{file.name}:{getattr(node, 'lineno', 1)}", text
 
 
 def page_strings() -> Iterator[Written]:

@@ -98,7 +98,7 @@ class HeaterSettings(ChamberSettings):
 
 
 def heater(settings: HeaterSettings, ports: object, clock: object) -> Any:
-    """Return no driver: only the settings are looked at."""
+    """Return no driver: only the settings are checked."""
     return settings
 
 

@@ -19,7 +19,7 @@ from labctl.services.campaigns.execution import run_here
 from labctl.services.schemas.campaigns import BENCH_CHECKS, StartRequest
 from labctl.store import open_store
 
-#: A unit counts as silent after 2 s of the bench, half a second of the wall: a machine that is busy otherwise stalls
+#: A unit counts as silent after 2 s of the bench, half a second of real time: a machine that is busy otherwise stalls
 #: for less.
 SPEED = 4.0
 RECIPE = """

@@ -17,7 +17,7 @@ CASES = {"one": (1, 0.0), "two": (2, 0.0), "exact": (20, 0.0), "coarse": (600, 5
 
 
 def without_scatter(per_set: int, step_dps: float) -> Recording:
-    """Return readings that are all the same within each of 21 data sets."""
+    """Return readings that are equal within each of 21 data sets."""
     rate = np.repeat(np.tile([0.0, 10.0, -10.0, 50.0, -50.0, 100.0, -100.0], 3), per_set)
     output = 1.01 * rate + 0.02
     columns = {

@@ -1,4 +1,4 @@
-"""Certainly wrong data on the pages: the refusal in its sentences, and the way to fit them all the same."""
+"""Certainly wrong data on the pages: the refusal in its sentences, and the way to fit them nevertheless."""
 
 from __future__ import annotations
 

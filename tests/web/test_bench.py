@@ -106,7 +106,7 @@ def test_says_that_it_is_stale_and_goes_on_where_it_was(
     page.context.set_offline(False)
     service.start()
     expect(page.get_by_text("Nothing new since")).not_to_be_visible()
-    # taken up by the service itself, or ended by its stopping: either is shown
+    # resumed by the service itself, or ended by its stopping: either is shown
     expect(page.locator("main")).to_contain_text("campaign 1")
     faults.clear()
 

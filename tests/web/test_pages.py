@@ -19,7 +19,7 @@ SERIOUS = {"serious", "critical"}
 
 @pytest.fixture
 def furnished(service: Service) -> Service:
-    """A house with a campaign that is done, a unit with two versions, one in force, and a table that was imported."""
+    """A service with a campaign that is done, a unit with two versions, one in force, and a table that was imported."""
     service.post("/api/campaigns", {"recipe": "short"})
     service.until("/api/campaigns/1", lambda answer: answer["state"] == "done")
     unit = "/api/units/FOG-0001/calibrations"

@@ -1,4 +1,4 @@
-"""Bringing recordings in and looking at them, down to the readings."""
+"""Importing recordings and showing them, down to the readings."""
 
 from __future__ import annotations
 

@@ -177,7 +177,7 @@ def _figure(j: int, fitted: _Fitted) -> Figure:
         return Figure(
             None, None, kind.unit, bound, f"no {kind.region} {span}: the deviation does not follow that slope"
         )
-    # beside those that the record does not show and that may be there all the same
+    # beside those that the record does not show and that may be there nevertheless
     beside = np.union1d(np.flatnonzero(fitted.terms), BESIDE)
     u_squared = _u_squared(j, beside, design, model, fitted.freedom)
     u = u_squared / (2 * value)

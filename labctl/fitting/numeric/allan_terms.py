@@ -80,7 +80,7 @@ def fit_terms(variance: Array, tau: Array, m: Array, phases: float) -> tuple[Arr
     for _ in range(2):  # the terms say which noise prevails where, and that says how sure each variance is
         terms = _fewest(design, variance, freedom)
         freedom = freedom_of(terms, tau, m, phases)
-    # what shows is sized beside what does not and may be there all the same: else it would take that in
+    # what shows is sized beside what does not and may be there nevertheless: else it would take that in
     sized, _ = _fit(design, variance, freedom, sorted({*np.flatnonzero(terms).tolist(), *BESIDE}))
     return sized, terms > 0, freedom
 

@@ -73,8 +73,8 @@ class StartRequest(Request):
         default=None, gt=0, allow_inf_nan=False, description="Of a simulated bench; absent: as fast as it can."
     )
     seed: int | None = Field(default=None, ge=0, description="Speed of a simulated bench: X times real time.")
-    confirmed_by: str = Field(default="", max_length=200, description="As in CampaignRequest.")
-    checks: list[BenchCheck] = Field(default_factory=list, description="As in CampaignRequest.")
+    confirmed_by: str = Field(default="", max_length=200, description="Same as in `POST /api/campaigns`.")
+    checks: list[BenchCheck] = Field(default_factory=list, description="Same as in `POST /api/campaigns`.")
 
 
 class ReasonRequest(Request):

@@ -75,7 +75,7 @@ class CriticismResponse(ResponseModel):
     confounded_with: list[str] = Field(
         default_factory=list, description="Channels that this schedule cannot tell from the first of `depends_on`."
     )
-    remainder: Remainder | None = Field(default=None, description="What remains beside all that was named.")
+    remainder: Remainder | None = Field(default=None, description="Share of the excess that no named effect explains.")
     not_physical: list[str] = Field(
         default_factory=list,
         description="Effects that explain these data equally well, but at a size that the unit cannot have.",

@@ -28,7 +28,7 @@ DISK_FULL, LOCK_NOT_AVAILABLE = "53100", "55P03"
 #: shut down, was killed, starts, or drops its database. The codes are SQLSTATEs.
 CONNECTION_CLASS = "08"
 SERVER_AWAY = frozenset({"57P01", "57P02", "57P03", "57P05", "25P03", "53300"})
-#: What a server says that refuses a connection, which waiting does not mend. The client library gives no SQLSTATE.
+#: What a server says that refuses a connection, which does not end by waiting. The client library gives no SQLSTATE.
 REFUSALS = ("authentication failed", "does not exist", "no pg_hba.conf entry", "permission denied", "not permitted")
 
 _BEGIN = sa.text("SELECT pg_current_xact_id()::text FROM (SELECT pg_advisory_xact_lock(:key)) AS turn")

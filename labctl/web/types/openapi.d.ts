@@ -1216,7 +1216,7 @@ export interface components {
             recording: number | null;
             /**
              * Datasets
-             * @description First and last data set of the stretch.
+             * @description First and last data set of the section at rest.
              */
             datasets: number[];
             /** Temperature C */
@@ -2358,7 +2358,7 @@ export interface components {
              * @description Channels that this schedule cannot tell from the first of `depends_on`.
              */
             confounded_with: string[];
-            /** @description What remains beside all that was named. */
+            /** @description Share of the excess that no named effect explains. */
             remainder: components["schemas"]["Remainder"] | null;
             /**
              * Not Physical

@@ -1,4 +1,4 @@
-"""Who may come in: keys and roles on every path of the API, and no stranger through the loopback door."""
+"""Access: keys and roles on every path of the API, and no foreign request over loopback."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ def test_a_page_of_another_site_may_not_act(loopback: Ask, headers: dict[str, st
 
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
 def test_a_page_of_another_site_keeps_nothing_busy(loopback: Ask, site: str) -> None:
-    """The browser keeps the answer from the page, but what computes it would be busy all the same."""
+    """The browser keeps the answer from the page, but what computes it would be busy nevertheless."""
     paths = [
         "/api/units",
         "/api/units/U/calibrations/1/criticism",

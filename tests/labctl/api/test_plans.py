@@ -1,4 +1,4 @@
-"""HTTP: recipes and plans to look at before anything moves, and a campaign's steps while it runs."""
+"""HTTP: recipes and plans before anything moves, and a campaign's steps while it runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""HTTP: readings to look at, however many there are, and to take away."""
+"""HTTP: readings for display, however many there are, and for download."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def test_values_are_within_their_intervals_and_bounds_above_the_truth(warm_up_dp
     true = {"N": 2e-3 * DEG_PER_ROOT_HOUR, "B": 3e-4 * DEG_PER_HOUR, "K": 3e-5 * K_UNIT}
     within: dict[str, list[bool]] = {letter: [] for letter in true}
     above = []
-    t_s = np.arange(28_800.0)  # readings of a second each; noise() speaks of tenths
+    t_s = np.arange(28_800.0)  # readings of a second each; noise() has tenths
     for seed in range(40):
         rates = noise(seed, len(t_s), 2e-3 * math.sqrt(PERIOD_S), 3e-4, 3e-5 / math.sqrt(PERIOD_S))
         found = allan(rates + warm_up_dps * np.exp(-t_s / 900), 1.0)

@@ -1,4 +1,4 @@
-"""Certification knows the verdict: it is kept with the act, and what speaks against a version has to be overridden."""
+"""Certification knows the verdict: it is kept with the act, and objections to a version have to be overridden."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units that drop out while others go on, wires that are mended, questions that are put again or left out."""
+"""Units that drop out while others continue, wires that are repaired, questions that are put again or left out."""
 
 from __future__ import annotations
 

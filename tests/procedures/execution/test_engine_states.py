@@ -26,7 +26,7 @@ instants = st.integers(0, 60)
 
 
 class Campaign(RuleBasedStateMachine):
-    """One campaign on the fake bench, run in legs: each leg ends as it is drawn, and the next takes it up."""
+    """One campaign on the fake bench, run in legs: each leg ends as it is drawn, and the next resumes it."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -21,7 +21,7 @@ from labctl.fitting.effects import Effect
 from labctl.json_types.views import AngleSpectrum, FrequencySpectrum, StartProfile, Views
 from labctl.recording import Recording
 
-#: What there is to see beside the residual against each channel, which goes by the channel's name.
+#: Diagnostics beside the residual against each channel, which goes by the channel's name.
 VIEWS = ("map", "time", "angle", "frequency", "time_in_set", "legs", "previous_rate", "worst", "repeats")
 
 __all__ = ["VIEWS", "draws_of", "residual_maps", "views_of"]

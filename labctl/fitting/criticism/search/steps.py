@@ -23,7 +23,7 @@ TIME = "t_s"
 PLACES, ROUNDS = 48, 3
 #: A step nearer than this share of the campaign to its ends is left out.
 EDGE = 0.02
-#: From this share of the evidence for the leading effect on, time is looked at for a sharp step.
+#: From this share of the evidence for the leading effect on, time is searched for a sharp step.
 SHARE = 0.5
 
 

@@ -188,7 +188,7 @@ def test_formulas_compute(text: str) -> None:
         ("f: supply_v.real", "Attribute"),
         ("f: [1, 2]", "List"),
         ("f: 'text'", "not a number"),
-        ("f: supply_v @ supply_v", "only + - * / **"),
+        ("f: supply_v @ supply_v", "use + - * / **"),
         ("f: supply_v *", "cannot be read"),
         ("f: exp(1, 2)", "of one value"),
         ("f: (lambda: 1)()", "only exp"),

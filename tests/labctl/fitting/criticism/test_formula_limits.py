@@ -1,4 +1,4 @@
-"""Formulas of strangers: how many, how deep, and from how many threads at once."""
+"""Formulas of unknown users: how many, how deep, and from how many threads at once."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def client(runner: BenchRunner) -> Iterator[TestClient]:
 
 
 def until(client: TestClient, wanted: Any) -> Any:
-    """Look at campaign 1, whenever its runner says that something happened, until it is as wanted."""
+    """Poll campaign 1, whenever its runner reports a change, until it is as wanted."""
     runner = service_of(client).bench_access
     return wait_until(runner.listen, lambda: client.get("/api/campaigns/1").json(), wanted)
 

@@ -286,7 +286,7 @@ def test_what_can_be_known_now_is_refused_now(lab: Lab) -> None:
 
 
 class Served:
-    """A service in virtual time, whose schedule is looked at by the test."""
+    """A service in virtual time, whose schedule is read by the test."""
 
     def __init__(self, location: str) -> None:
         self.clock = VirtualClock(START)
