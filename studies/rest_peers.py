@@ -66,7 +66,7 @@ def ardupilot(warm: Array, rate: Array) -> Law:
 
 
 def across_legs(recording: Recording) -> dict[str, float]:
-    """Return method -> root mean square of the minutes of each leg by a fit to the legs of the other direction, deg/s."""
+    """Return method -> root mean square of the minutes of each leg by a fit to the other legs, deg/s."""
     points = to_points(recording)
     data = fit_data_of(points)
     legs = legs_of(data.temperature_c, np.ones(len(data), dtype=np.int64))
@@ -114,8 +114,8 @@ def printed_parabolas(path: Path) -> dict[str, tuple[Array, Array]]:
 
     labctl's design and solver on every reading, unweighted as the author's: square, linear, constant term in words.
     """
-    from labctl.fitting.numeric.drift_noise import Drift, Scatter  # noqa: PLC0415  only where the data are there
-    from labctl.fitting.numeric.least_squares import solve  # noqa: PLC0415
+    from labctl.fitting.numeric.drift_noise import Drift, Scatter
+    from labctl.fitting.numeric.least_squares import solve
 
     table = np.genfromtxt(path, delimiter=",", skip_header=1)
     word = table[:, 9]
