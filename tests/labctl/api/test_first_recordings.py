@@ -25,7 +25,7 @@ HIDE = ["scale_factor_asymmetry=0.02"]
 
 
 def test_examples_come_with_the_package(client: TestClient) -> None:
-    assert set(examples()) == {"osu-fog", "weiss-gyrostar"}
+    assert set(examples()) == {"freeimu-warmup", "osu-fog", "weiss-gyrostar"}
     assert all("labctl" in folder.parts[-3:] for folder in examples().values())
     fog = client.post("/api/recordings/example", json={"name": "osu-fog"})
     assert fog.status_code == 201
@@ -38,7 +38,10 @@ def test_examples_come_with_the_package(client: TestClient) -> None:
         assert (nothing.status_code, "table of coefficients" in nothing.json()["detail"]) == (400, True)
     assert client.get("/api/units/WEISS-ENV05S/calibrations/1/surface").status_code == 200
     refused = client.post("/api/recordings/example", json={"name": "../.."})
-    assert (refused.status_code, "there are osu-fog, weiss-gyrostar" in refused.json()["detail"]) == (400, True)
+    assert (refused.status_code, "there are freeimu-warmup, osu-fog, weiss-gyrostar" in refused.json()["detail"]) == (
+        400,
+        True,
+    )
 
 
 def test_a_simulated_recording_is_taken_in_with_what_is_hidden(client: TestClient) -> None:
