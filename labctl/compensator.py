@@ -14,8 +14,10 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.temperature_channel import STAND_IN_C
+from labctl.fitting.data.temperature_history import TemperatureHistory
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.matrix_form import Linear, linear_of
+from labctl.fitting.models.memory import RunningMemory, course, split_memory
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
 from labctl.fitting.models.sine_form import sine_form_of
 
@@ -25,7 +27,7 @@ Array = NDArray[np.float64]
 Outside = Literal["clamp", "refuse"]
 #: Beyond the calibrated temperatures by no more than this counts as inside, K: a thermometer's last digits.
 MARGIN_C = 0.5
-#: The range of rates is taken wider by this share: it was measured in true rates and is looked at in the output's.
+#: The range of rates is taken wider by this share: it was measured in true rates and is compared with output rates.
 MARGIN_SHARE = 0.02
 Correct = Callable[[Array, Array, Mapping[str, Array]], Array]
 
@@ -52,11 +54,14 @@ class Compensator:
     sample ("clamp"), or raises BadInput ("refuse"). A sample that is not a number, or whose temperature is none, comes
     back as no number, flagged. Temperatures count as inside up to `MARGIN_C` beyond the calibrated ones, but are
     corrected at the edge; rates up to `MARGIN_SHARE` of their range. The C header does the same.
+
+    A lag or a hysteresis (`remembers`) is followed from sample to sample: `step` goes on from the last one, an array is
+    a course of its own. Both then need the times, `t_s`. The unit is taken to have rested at its first temperature.
     """
 
     def __init__(self, calibration: Calibration, outside: Outside = "clamp") -> None:
         if outside not in {"clamp", "refuse"}:
-            raise BadInput(f"outside = {outside!r}: either 'clamp' or 'refuse'")
+            raise BadInput(f"outside = {outside!r}: give 'clamp' or 'refuse'")
         self.calibration = calibration
         self.axes = calibration.axes
         self._outside = outside
@@ -65,9 +70,12 @@ class Compensator:
         units = [calibration.output[axis] for axis in self.axes]
         self._offset = np.array([unit.offset for unit in units])
         self._scale = np.array([unit.scale for unit in units])
-        self._correct = correction(calibration.fitted, self.axes)
-        #: Channels beside output and temperature that the model's effects need, such as power_s or supply_v.
-        self.needs = calibration.fitted.model.needs
+        rest, self._memory = split_memory(calibration.fitted, self.axes)
+        self._correct = correction(rest, self.axes)
+        self._running = RunningMemory(self._memory) if self._memory else None
+        self._is_direct = calibration.fitted.model.argument == "output"
+        #: Channels beside output and temperature that the model's effects need, such as power_s, supply_v or t_s.
+        self.needs = tuple(dict.fromkeys((*rest.model.needs, *(("t_s",) if self._memory else ()))))
 
     @classmethod
     def from_file(cls, path: Path | str, outside: Outside = "clamp") -> Compensator:
@@ -79,6 +87,16 @@ class Compensator:
         """Load a calibration from the bytes that the service gives; raises BadCalibrationFile."""
         return cls(read_calibration(content), outside)
 
+    @property
+    def remembers(self) -> bool:
+        """Whether the correction of a sample depends on the temperatures before it."""
+        return self._memory is not None
+
+    def reset(self) -> None:
+        """Forget the temperatures that `step` has seen, as after the unit was switched off."""
+        if self._running is not None:
+            self._running.reset()
+
     def compensate_output(
         self, output: Array, temperature_c: Array | None, channels: Mapping[str, Array] | None = None
     ) -> Compensated:
@@ -88,12 +106,19 @@ class Compensator:
         return self.compensate((values - offset) / scale, temperature_c, channels)
 
     def compensate(
-        self, raw_dps: Array, temperature_c: Array | float | None, channels: Mapping[str, Array] | None = None
+        self,
+        raw_dps: Array,
+        temperature_c: Array | float | None,
+        channels: Mapping[str, Array] | None = None,
+        *,
+        history: TemperatureHistory | None = None,
     ) -> Compensated:
         """Correct rates, (n, axes) deg/s, or (n,) for one axis, at temperatures (n,), (n, axes) or one for all.
 
-        None for the temperature where the calibration was made without a thermometer. `channels` hold what the model `needs` besides, (n,) each. Raises BadInput where one is missing, for a shape
-        that does not fit, or outside the calibrated range when that is refused.
+        None for the temperature where the calibration was made without a thermometer. `channels`
+        hold what the model `needs` besides, (n,) each; `history`, of a recording, what the temperatures were between
+        the samples too. Raises BadInput where a channel is missing, for a shape that does not fit, for times that go
+        back, or outside the calibrated range when that is refused.
         """
         known = channels or {}
         for name in self.needs:
@@ -104,8 +129,30 @@ class Compensator:
         if raw.size == 0:
             return Compensated(given, np.zeros(len(raw), dtype=bool))
         if raw.shape[1] != len(self.axes):
-            raise BadInput(f"rates of {raw.shape[1]} axes given; the calibration is of {', '.join(self.axes)}")
+            raise BadInput(
+                f"rates of {raw.shape[1]} axes given; the calibration has axes {', '.join(self.axes)}; give one rate "
+                "for each"
+            )
         warm = np.asarray(self._known(temperature_c), dtype=np.float64)
+        if self._memory is None:
+            found = self._held(raw, warm, known)
+            return Compensated(found.rate_dps.reshape(given.shape), found.outside)
+        if history is not None:
+            remembered = self._memory.of_history(history, known)
+        else:
+            remembered = course(RunningMemory(self._memory), np.asarray(known["t_s"], dtype=np.float64), warm)
+        return self._beside(remembered, raw, warm, known, given.shape)
+
+    def _beside(
+        self, remembered: Array, raw: Array, warm: Array, known: Mapping[str, Array], shape: tuple[int, ...]
+    ) -> Compensated:
+        """Correct outputs (n, axes) of which the error that is remembered, (n, axes) deg/s, is known."""
+        found = self._held(raw if self._is_direct else raw - remembered, warm, known)
+        rate = found.rate_dps - remembered if self._is_direct else found.rate_dps
+        return Compensated(rate.reshape(shape), found.outside)
+
+    def _held(self, raw: Array, warm: Array, known: Mapping[str, Array]) -> Compensated:
+        """Correct outputs (n, axes) by what does not remember, at the edge of the range where they are outside."""
         lowest, highest = (float(np.min(warm)), float(np.max(warm))) if warm.size else (self._low_c, self._high_c)
         least, most = (float(np.min(raw)), float(np.max(raw))) if raw.size else (0.0, 0.0)
         calm = lowest >= self._low_c and highest <= self._high_c and least >= self._slow and most <= self._fast
@@ -115,9 +162,8 @@ class Compensator:
             flags = self._judge(raw, warm)
             warm = np.clip(warm, self._low_c, self._high_c)
             held = np.clip(raw, self._slow, self._fast)
-            return Compensated((self._correct(held, warm, known) + (raw - held)).reshape(given.shape), flags)
-        corrected = self._correct(raw, warm, known)
-        return Compensated(corrected.reshape(given.shape), flags)
+            return Compensated(self._correct(held, warm, known) + (raw - held), flags)
+        return Compensated(self._correct(raw, warm, known), flags)
 
     @property
     def needs_temperature(self) -> bool:
@@ -153,9 +199,25 @@ class Compensator:
             )
         return np.asarray(cold | fast)
 
-    def step(self, raw_dps: ArrayLike, temperature_c: float | None) -> tuple[Array, bool]:
-        """Correct one sample, (axes,) deg/s; returns the corrected rates and whether it lay outside."""
-        found = self.compensate(np.asarray(raw_dps, dtype=np.float64).reshape(1, -1), temperature_c)
+    def step(self, raw_dps: ArrayLike, temperature_c: float | None, t_s: float | None = None) -> tuple[Array, bool]:
+        """Correct one sample, (axes,) deg/s; returns the corrected rates and whether it lay outside.
+
+        Where the unit `remembers` samples come in order of time, with their times `t_s` in s; raises BadInput for one
+        without, or one from before the last.
+        """
+        raw = np.asarray(raw_dps, dtype=np.float64).reshape(1, -1)
+        if self._running is None:
+            found = self.compensate(raw, temperature_c)
+            return found.rate_dps[0], bool(found.outside[0])
+        if t_s is None or temperature_c is None:
+            raise BadInput(f"{self.calibration.serial}: its model remembers temperatures; give t_s and temperature_c")
+        if self._running.last_s is not None and t_s < self._running.last_s:
+            raise BadInput(
+                f"t_s = {t_s:.9g} s is before the last sample's {self._running.last_s:.9g} s; give samples in order of "
+                "time, or call reset()"
+            )
+        remembered = self._running.error_dps(t_s, temperature_c)[None, :]
+        found = self._beside(remembered, raw, np.array([temperature_c]), {"t_s": np.array([t_s])}, raw.shape)
         return found.rate_dps[0], bool(found.outside[0])
 
 

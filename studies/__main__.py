@@ -10,11 +10,14 @@ STUDIES = (
     "use_coverage",
     "hand_turns",
     "criticism",
+    "rest_loops",
+    "rest_peers",
     "crash_recovery",
     "process_kill",
     "process_pairs",
     "faults",
     "attacks",
+    "log_size",
 )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.data.fit_data import fit_data_of
-from labctl.fitting.effects import CATALOGUE
+from labctl.fitting.effects import CATALOGUE, Term
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.estimation.shapes import with_shapes
@@ -67,7 +67,7 @@ def outcome(seed: int, hidden: Hidden, names: frozenset[str]) -> Outcome:
     return Outcome(right, named, found.verdict.form, _leg(base), _leg(after))
 
 
-def _terms(found: Criticism) -> tuple:
+def _terms(found: Criticism) -> tuple[Term, ...]:
     return tuple(found.verdict.terms[group[0]] for group in found.verdict.groups if group[0] in found.verdict.terms)
 
 

@@ -21,6 +21,7 @@ from labctl.cli.commands import (
     database,
     effects,
     keys,
+    noise,
     plugins,
     recordings,
     schedule,
@@ -36,7 +37,7 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
-    help="Calibrate gyroscopes: run the bench, fit, hold the model against the measurements, serve the calibration.",
+    help="Calibrate gyroscopes: run the bench, fit a model, compare it with the measurements, serve the calibration.",
 )
 app.add_typer(bench.app, name="bench")
 app.add_typer(campaign.app, name="campaign")
@@ -51,6 +52,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "simulator": server.simulator,
     "simulate": recordings.simulate,
     "import": recordings.import_,
+    "allan": noise.allan,
     "fit": calibrations.fit,
     "effects": effects.effects,
     "plugins": plugins.plugins,

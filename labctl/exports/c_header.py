@@ -10,11 +10,13 @@ import numpy as np
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
+from labctl.exports.c_memory import memory_body
 from labctl.exports.c_sine import sine_body
 from labctl.exports.c_tables import c_table
 from labctl.exports.format import Format
 from labctl.fitting.models.matrix_form import LINEAR as LINEAR_EFFECTS
 from labctl.fitting.models.matrix_form import Linear, linear_of
+from labctl.fitting.models.memory import split_memory
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
 from labctl.fitting.models.sine_form import SINE, sine_form_of
 from labctl.fitting.models.temperature import LagrangeTable
@@ -24,7 +26,7 @@ HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * Hash of the calibration: {hash}
  * Names begin with {name}: letters and digits of the serial number as they are, anything else as _ and its code in
  * hexadecimal, so that headers of several units go into one program.
- * Valid from {low:g} to {high:g} deg C and {rates}; outside, the error at the edge of the range is
+ * Valid {temperatures} and {rates}; outside, the error at the edge of the range is
  * taken off and the function returns 1, else 0. What is at most {margin_c:g} K or {margin:g} deg/s beyond counts as
  * inside: a thermometer's last digits, corrected at the edge, and rates in the output's, as the range is of true rates.
  * What is not a number gives no number, and 1.
@@ -41,8 +43,8 @@ HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
 
 #define {name}_AXES {axes}
 static const char {name}_hash[] = "{hash}";
-static const double {name}_temperature_c[2] = {{{low:.17g}, {high:.17g}}};
-static const double {name}_inside_c[2] = {{{coldest:.17g}, {warmest:.17g}}};
+static const double {name}_temperature_c[2] = {{{low}, {high}}};
+static const double {name}_inside_c[2] = {{{coldest}, {warmest}}};
 static const double {name}_output_dps[2] = {{{slowest}, {fastest}}};
 
 static inline LABCTL_REAL {name}_held(LABCTL_REAL w, int *outside)
@@ -161,9 +163,10 @@ def c_name(serial: str) -> str:
 def c_header(calibration: Calibration) -> bytes:
     """Return a calibration as a C header; raises BadInput for a model that has no closed form in C yet."""
     name = c_name(calibration.serial)
-    surface = surface_of(calibration.fitted, calibration.axes)
-    linear = linear_of(calibration.fitted, calibration.axes)
-    sine = sine_form_of(calibration.fitted, calibration.axes)
+    fitted, memory = split_memory(calibration.fitted, calibration.axes)
+    surface = surface_of(fitted, calibration.axes)
+    linear = linear_of(fitted, calibration.axes)
+    sine = sine_form_of(fitted, calibration.axes)
     if surface is not None:
         body = _surface(name, surface)
     elif linear is not None:
@@ -171,17 +174,20 @@ def c_header(calibration: Calibration) -> bytes:
     elif sine is not None:
         body = sine_body(name, sine, *_nodes(sine.linear, calibration.temperature_c))
     else:
-        effects = calibration.fitted.model.effect_ids
+        effects = fitted.model.effect_ids
         blocking = [effect for effect in effects if effect not in LINEAR_EFFECTS | {SINE}] or effects
         raise BadInput(
             f"format c: model {calibration.fitted.model.name} has effects without a closed form in C "
             f"({', '.join(blocking)}); use the JSON file with labctl's Compensator"
         )
+    if memory is not None:
+        body += memory_body(name, memory, is_direct=fitted.model.argument == "output")
     return (_head(name, calibration) + body + TAIL).encode()
 
 
 def _head(name: str, calibration: Calibration) -> str:
     (low, high), (slow, fast) = calibration.temperature_c, calibration.rate_dps
+    has_thermometer = math.isfinite(high - low)
     slowest, fastest = output_limits_dps(calibration)
     is_limited = math.isfinite(slow) and math.isfinite(fast)
     nominal = "; ".join(
@@ -193,20 +199,26 @@ def _head(name: str, calibration: Calibration) -> str:
         version=calibration.version,
         model=_in_comment(calibration.fitted.model.name),
         hash=calibration.hash,
-        low=low,
-        high=high,
+        low=_number(low),
+        high=_number(high),
+        temperatures=f"from {low:g} to {high:g} deg C" if has_thermometer else "at any temperature (none was measured)",
         rates=f"from {slow:g} to {fast:g} deg/s" if is_limited else "at any rate",
         margin_c=MARGIN_C,
         margin=fastest - fast if is_limited else 0.0,
-        coldest=low - MARGIN_C,
-        warmest=high + MARGIN_C,
-        slowest=f"{slowest:.17g}" if is_limited else "-INFINITY",
-        fastest=f"{fastest:.17g}" if is_limited else "INFINITY",
+        coldest=_number(low - MARGIN_C),
+        warmest=_number(high + MARGIN_C),
+        slowest=_number(slowest),
+        fastest=_number(fastest),
         nominal=nominal,
         guard=f"LABCTL_{name}_V{calibration.version}_{calibration.hash[:GUARD_DIGITS]}_H",
         name=name,
         axes=len(calibration.axes),
     )
+
+
+def _number(value: float) -> str:
+    """Return a number in C; an infinite one is no limit."""
+    return f"{value:.17g}" if math.isfinite(value) else ("INFINITY" if value > 0 else "-INFINITY")
 
 
 def _in_comment(text: str) -> str:
@@ -227,6 +239,8 @@ def _nodes(linear: Linear, span_c: tuple[float, float]) -> tuple[Array, int]:
     if isinstance(basis, LagrangeTable) and not any("temperature" in e for e in linear.fitted.model.effect_ids):
         return np.array(basis.nodes_c), basis.points
     low, high = span_c
+    if not math.isfinite(high - low):  # made without a thermometer: the same at every temperature
+        return np.array([0.0]), 1
     return np.linspace(low, max(high, low + 1.0), POLYNOMIAL_NODES), POLYNOMIAL_NODES
 
 

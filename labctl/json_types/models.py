@@ -168,6 +168,7 @@ class LeftOut(TypedDict):
     effect: str
     origin: Origin
     term: str
+    rms_dps: NotRequired[float | None]  #: what it does to the data sets of the fit
 
 
 #: The range that an effect's first coefficient usually lies in, and whether it may do so on every axis.

@@ -117,11 +117,11 @@ def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Rec
 def to_points(recording: Recording) -> Recording:
     """Return the recording with one row per data set (kind "points"); points and coefficients return as they are.
 
-    A long data set through which the temperature moved, and at rest any longer than a window, has a row for each of its
-    pieces, under its own number. Only valid readings count. `t_s` is the middle of the data set, `table_angle_deg` its start, `duration_s` its
-    length; each gyro column gains `_std` (n - 1), where every set has readings enough `_white_std`, and where its
-    readings come in coarse steps `_quantisation_std`; every row gains `n`. A data set without a valid reading is left
-    out.
+    A long data set through which the temperature moved, and at rest any that is longer than a window, has a row for
+    each of its pieces, under its own number. Only valid readings count. `t_s` is the middle of the data set,
+    `table_angle_deg` its start, `duration_s` its length; each gyro column gains `_std` (n - 1), where every set has
+    readings enough `_white_std`, and where its readings come in coarse steps `_quantisation_std`; every row gains `n`.
+    A data set without a valid reading is left out.
     """
     if recording.info.kind != "samples":
         return recording

@@ -6,6 +6,7 @@ lag, hysteresis) is computed once over the whole run and interpolated at the tim
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,6 +25,8 @@ LoggedColumns = Mapping[str, NDArray[np.generic]]
 CourseFunction = Callable[[Array, float], Array]
 #: Spacing of a resampled temperature course, s.
 SPACING_S = 10.0
+#: Windows whose middles are no further apart than this many of their lengths follow one another.
+NEXT_WINDOW = 1.2
 #: Plays of which a rounded hysteresis is made.
 ROUNDED_PLAYS = 4
 
@@ -98,6 +101,17 @@ class TemperatureHistory:
         return found
 
 
+def lag_shares(step_s: float, tau_s: float) -> tuple[float, float, float]:
+    """Return the shares of follower, last and new temperature in where a first-order follower is after a step.
+
+    Exact for a temperature that changes linearly through the step, however long it is.
+    """
+    ratio = step_s / tau_s
+    keep = math.exp(-ratio)
+    mean = -math.expm1(-ratio) / ratio if ratio > 0 else 1.0
+    return keep, mean - keep, 1.0 - mean
+
+
 def rounded_plays(width_k: float) -> list[tuple[float, float]]:
     """Return widths, K, and shares of plays whose sum nears its new side as 1 - exp(-way / width_k).
 
@@ -121,10 +135,11 @@ def _slope(temperature_c: Array, over_s: float) -> Array:
 
 
 def _lag(temperature_c: Array, tau_s: float) -> Array:
-    """Return follower minus temperature, (k,) K: f[i] - keep f[i-1] = (1 - keep) T[i], in equilibrium at the start."""
-    keep = np.exp(-SPACING_S / tau_s)
+    """Return follower minus temperature, (k,) K, in equilibrium at the start; straight lines between temperatures."""
+    keep, last, new = lag_shares(SPACING_S, tau_s)
     band = np.array([np.ones(len(temperature_c)), np.full(len(temperature_c), -keep)])
-    pull = (1 - keep) * temperature_c
+    pull = new * temperature_c
+    pull[1:] += last * temperature_c[:-1]
     pull[0] = temperature_c[0]
     return np.asarray(solve_banded((1, 0), band, pull) - temperature_c)
 
@@ -175,8 +190,30 @@ def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int,
             here = np.isfinite(warm)
         if here.sum() < 2:
             continue
-        times, values = t_s[here], warm[here]
-        order = np.argsort(times, kind="stable")
-        grid = np.arange(times[order][0], times[order][-1] + SPACING_S, SPACING_S)
-        found[int(run)] = TemperatureCourse(float(grid[0]), np.interp(grid, times[order], values[order]))
+        order = np.argsort(t_s[here], kind="stable")
+        times, values = t_s[here][order], warm[here][order]
+        if source is columns and "duration_s" in columns:
+            times, values = _to_the_ends(
+                times, values, np.asarray(columns["duration_s"], dtype=np.float64)[here][order]
+            )
+        grid = np.arange(times[0], times[-1] + SPACING_S, SPACING_S)
+        found[int(run)] = TemperatureCourse(float(grid[0]), np.interp(grid, times, values))
     return found
+
+
+def _to_the_ends(times: Array, values: Array, durations_s: Array) -> tuple[Array, Array]:
+    """Return a course of means, (k,), with where it began and ended: the middle of a window is neither.
+
+    A follower starts at rest. On a ramp that is measured window by window it would start half a window late. Only where
+    the first two and the last two windows follow one another, so that they tell the slope.
+    """
+    parts_t, parts_c = [times], [values]
+    for first, second, side in ((0, 1, -1.0), (-1, -2, 1.0)):
+        apart = abs(float(times[second] - times[first]))
+        if 0 < apart <= NEXT_WINDOW * durations_s[first]:
+            slope = float(values[second] - values[first]) / float(times[second] - times[first])
+            half = side * float(durations_s[first]) / 2
+            at = 0 if side < 0 else len(parts_t)
+            parts_t.insert(at, np.array([times[first] + half]))
+            parts_c.insert(at, np.array([values[first] + slope * half]))
+    return np.concatenate(parts_t), np.concatenate(parts_c)

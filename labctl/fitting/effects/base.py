@@ -14,6 +14,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from labctl.fitting.data.channels import Carrier, Channels
+from labctl.fitting.data.temperature_history import TemperatureHistory
 from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.models import Origin
 
@@ -139,6 +140,7 @@ class Effect(ABC):
     experiment: ClassVar[str] = ""  #: what would distinguish it from similar effects
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
     shows_at_rest: bool = False  #: whether it is an error of the bias, at least in part: then it takes no rate to see
+    remembers: ClassVar[bool] = False  #: whether it needs the temperatures before, which a state stands for in use
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 
     @abstractmethod
@@ -152,6 +154,10 @@ class Effect(ABC):
 
     def shaped_by(self, term: Term, coefficients: Mapping[str, float]) -> Term:
         """Return a term whose columns have the shape of a fit: axis -> its first coefficient, at the nodes' mean."""
+        return term
+
+    def kept(self, term: Term, history: TemperatureHistory) -> Term:
+        """Return a term with what its columns take from a recording and a calibration file has to keep."""
         return term
 
     @classmethod

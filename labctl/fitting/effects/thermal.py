@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.temperature_history import TemperatureHistory
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.json_types.models import Origin
 
@@ -46,7 +48,7 @@ class ThermalLag(Effect):
     """Thermal lag between the sensing part and the thermometer."""
 
     id = "thermal_lag"
-    in_use = False
+    remembers = True
     term = "Thermal lag (sensing element behind the thermometer)"
     sentence = "The part that matters follows the thermometer late, so the correction comes for another temperature."
     by_temperature = True
@@ -74,7 +76,7 @@ class ThermalHysteresis(Effect):
     """Thermal hysteresis."""
 
     id = "thermal_hysteresis"
-    in_use = False
+    remembers = True
     term = "Thermal hysteresis"
     sentence = "The bias depends on whether the temperature was reached from below or from above."
     by_temperature = True
@@ -100,9 +102,17 @@ class ThermalHysteresis(Effect):
         if term.parameters.get("bowed", 0.0):
             warm = channels.temperature_c(axis)
             low, high = channels.history.span_c
+            low, high = term.parameters.get("low_c", low), term.parameters.get("high_c", high)
             share = np.clip((warm - low) / max(high - low, 1e-9), 0.0, 1.0)
             state = state * 4 * share * (1 - share)
         return [Column("leg", "deg/s", state)]
+
+    def kept(self, term: Term, history: TemperatureHistory) -> Term:
+        """Return the term with the temperatures between which it is bowed: in use there is no recording to ask."""
+        if not term.parameters.get("bowed", 0.0):
+            return term
+        low, high = history.span_c
+        return replace(term, parameters={"low_c": low, "high_c": high, **term.parameters})
 
     def options(self, span: Span) -> list[Term]:
         plain = by_parameter(self.id, width_k=np.array([1.5, 4.0, 8.0, 15.0]), bowed=np.array([0.0]))

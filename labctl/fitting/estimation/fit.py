@@ -11,6 +11,7 @@ from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.noise_floor import AxisNoise
 from labctl.fitting.data.temperature_channel import is_chambers
+from labctl.fitting.data.temperature_history import TemperatureHistory
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.coefficient_tables import from_coefficients
@@ -21,8 +22,8 @@ from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.estimation.validity import valid_rates_dps
-from labctl.fitting.models.error_model import ErrorModel
-from labctl.fitting.models.fitted_model import AxisFit, FittedModel
+from labctl.fitting.models.error_model import ErrorModel, is_exported
+from labctl.fitting.models.fitted_model import AxisFit, FittedModel, without
 from labctl.fitting.models.presets import Preset, preset_for
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
@@ -48,7 +49,7 @@ def fit(
 
 @single_threaded
 def fit_preset(data: FitData, preset: Preset) -> FitResult:
-    """Fit a preset to data sets; its errors include those on temperatures that the fit has not seen.
+    """Fit a preset to data sets; its errors include those on temperatures left out of the fit.
 
     Raises NotEnoughData where the data sets do not determine the model, NotConverged where it cannot be inverted.
     """
@@ -56,7 +57,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     used = data.take(rows)
     require_enough_data(used, model)
     found = solve_axes(used, model)
-    fitted = FittedModel(_with_shapes(model, found.fits), found.fits)
+    fitted = FittedModel(_with_shapes(model, found.fits, data.channels.history), found.fits)
     residual = residuals(fitted, data, found.turning)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
     floor = data.noise_floor
@@ -72,17 +73,30 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         {axis: _noise_json(floor.axes[axis], solution) for axis, solution in found.solutions.items()},
         _environment(data, found.turning),
         residual,
+        _left_out_dps(fitted, data),
     )
 
 
-def _with_shapes(model: ErrorModel, fits: Mapping[str, AxisFit]) -> ErrorModel:
+def _left_out_dps(fitted: FittedModel, data: FitData) -> dict[str, float]:
+    """Return effect -> what it does to the data sets, root mean square deg/s, of the effects that are not exported."""
+    found = {}
+    for term in fitted.model.terms:
+        if not is_exported(term):
+            rest = without(fitted, term.effect)
+            channels = data.channels if fitted.model.argument == "rate" else data.channels.with_rates(data.outputs)
+            parts = {axis: fitted.error_dps(channels, axis) - rest.error_dps(channels, axis) for axis in data.outputs}
+            found[term.effect] = rms(parts) or 0.0
+    return found
+
+
+def _with_shapes(model: ErrorModel, fits: Mapping[str, AxisFit], history: TemperatureHistory) -> ErrorModel:
     """Return the model whose effects have the shape that they were fitted with, for what looks at it linearly."""
 
     def shaped(term: Term) -> Term:
         first = {
             a: float(f.values[f.effects.index(term.effect)].mean()) for a, f in fits.items() if term.effect in f.effects
         }
-        return kind_of(term).shaped_by(term, first)
+        return kind_of(term).kept(kind_of(term).shaped_by(term, first), history)
 
     return model.with_terms(tuple(map(shaped, model.terms)))
 

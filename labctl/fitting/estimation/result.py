@@ -19,6 +19,7 @@ from labctl.json_types.models import (
     CoefficientTable,
     FitEnvironment,
     FitResultJson,
+    LeftOut,
 )
 
 
@@ -33,6 +34,12 @@ class FitResult:
     noise: Mapping[str, AxisNoiseJson] = field(default_factory=dict)  #: axis -> white noise and drift, as JSON
     environment: FitEnvironment = field(default_factory=FitEnvironment)
     residual_dps: Mapping[str, Array] = field(default_factory=dict)  #: axis -> (m,) corrected minus true rate, deg/s
+    left_out_dps: Mapping[str, float] = field(default_factory=dict)  #: effect that is not exported -> its RMS, deg/s
+
+    def exported(self) -> tuple[FittedModel, list[LeftOut]]:
+        """Return the part of the model that belongs to the unit, and what was left out, with its size."""
+        model, left_out = self.fitted.exported()
+        return model, [{**one, "rms_dps": self.left_out_dps.get(one["effect"])} for one in left_out]
 
     def to_json(self) -> FitResultJson:
         """Return what `labctl fit --json` gives of the model, besides serial and version."""

@@ -17,7 +17,7 @@ from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Effect, Parameter, Span, Term, kind_of
 from labctl.fitting.estimation.axis_design import axis_design
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.fitting.models.presets import Preset
+from labctl.fitting.models.presets import Preset, Rows
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.drift_noise import whitened
@@ -48,11 +48,9 @@ def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> 
     if not shapes:
         return preset
 
-    def build(some: FitData) -> tuple[ErrorModel, Array]:
+    def build(some: FitData) -> tuple[ErrorModel, Rows]:
         made, rows = preset.build(some)
-        terms = (
-            replace(t, parameters=shapes[t.effect].parameters) if t.effect in shapes else t for t in made.terms
-        )
+        terms = (replace(t, parameters=shapes[t.effect].parameters) if t.effect in shapes else t for t in made.terms)
         return made.with_terms(tuple(terms)), rows
 
     return Preset(preset.name, build, preset.inner_only)

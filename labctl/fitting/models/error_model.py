@@ -39,8 +39,8 @@ class ErrorModel:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The channels that its effects need beside rate and temperature."""
-        return tuple(sorted({name for term in self.terms for name in kind_of(term).needs}))
+        """The channels that its effects need beside rate and temperature; what remembers has its state instead."""
+        return tuple(sorted({n for t in self.terms if not kind_of(t).remembers for n in kind_of(t).needs}))
 
     @property
     def steady(self) -> frozenset[str]:

@@ -38,7 +38,7 @@ def worse_than_raw(error: Errors) -> list[Finding]:
     return [
         Finding(
             "worse", "certain", "fit",
-            f"it leaves {left:.4g} deg/s RMS of its own data, where the output without correction is off by "
+            f"its residual on the data of the fit is {left:.4g} deg/s RMS, and the error without correction is "
             f"{raw:.4g} deg/s", left, "deg/s", f"less than {raw:.4g} deg/s",
             "check sign, unit and axes of the output, or choose another model",
         )
@@ -61,7 +61,7 @@ def worse_than_before(before: Errors, after: Errors) -> list[Finding]:
 
 def _of_change(said: str, first: float, second: float) -> Finding:
     return Finding(
-        "worse", "likely", "change", said, second, "deg/s", f"less than {first:.4g} deg/s", "leave the model as it was"
+        "worse", "likely", "change", said, second, "deg/s", f"less than {first:.4g} deg/s", "keep the model unchanged"
     )
 
 

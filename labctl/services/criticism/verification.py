@@ -74,12 +74,12 @@ def applied_errors(
     if missing:
         raise BadInput(
             f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}; the "
-            f"recording has no column gyro_{missing[0]}"
+            f"recording has no column gyro_{missing[0]}, name another recording"
         )
     compensator = Compensator(calibration)
     raw = np.column_stack([data.outputs[axis] for axis in calibration.axes])
     warm = np.column_stack([data.channels.temperature_c(axis) for axis in calibration.axes])
-    found = compensator.compensate(raw, warm, _channels(compensator, data))
+    found = compensator.compensate(raw, warm, _channels(compensator, data), history=data.channels.history)
     errors = {axis: found.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
     return errors, found.outside
 
@@ -87,8 +87,14 @@ def applied_errors(
 def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[np.float64]]:
     absent = [name for name in compensator.needs if name not in data.channels]
     if absent:
-        raise BadInput(f"the model needs channel {absent[0]!r}, which the recording does not have")
-    return {name: np.asarray(data.channels[name], dtype=np.float64) for name in compensator.needs}
+        raise BadInput(
+            f"the model needs channel {absent[0]!r}, which the recording does not have; name another recording"
+        )
+    needed = {name: np.asarray(data.channels[name], dtype=np.float64) for name in compensator.needs}
+    if not compensator.remembers:
+        return needed
+    kept = {name: data.channels[name] for name in ("run", "temperature_c") if name in data.channels}
+    return {**needed, **{name: np.asarray(values, dtype=np.float64) for name, values in kept.items()}}
 
 
 def _expected_dps(row: CalibrationRecord) -> float | None:

@@ -34,7 +34,8 @@ class ExampleRequest(Request):
     """Which of the recordings that come with labctl to take in."""
 
     name: str = Field(
-        max_length=100, description="osu-fog: a real fibre-optic gyro; weiss-gyrostar: a published table."
+        max_length=100,
+        description="osu-fog: a real fibre-optic gyro; freeimu-warmup: a MEMS gyro at rest; weiss-gyrostar: a table.",
     )
 
 
@@ -160,10 +161,11 @@ class TraceResponse(ResponseModel):
 class AllanResponse(ResponseModel):
     """An overlapping Allan deviation, axis by axis, and the figures of IEEE Std 952 that it shows."""
 
-    recording: int
+    recording: int | None = Field(description="null: of a file that is not in the database.")
     datasets: list[int] = Field(description="First and last data set of the stretch.")
     temperature_c: float | None
     duration_s: float | None
     axes: dict[str, AllanJson] = Field(
         description="tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K."
     )
+    datasheet: dict[str, float] = Field(default_factory=dict, description="What the maker promises, if it is known.")

@@ -48,6 +48,8 @@ export function uncertaintyInUse(serial, signal) {
  */
 function placeOf({ rate_dps, temperature_c }) {
   const asked = query();
+  // without a thermometer, and so without limits, one temperature is like any other
+  const [cold, warm] = [temperature_c[0] ?? 25, temperature_c[1] ?? 25];
   /**
    * @param {string | undefined} text
    * @param {number} otherwise
@@ -55,7 +57,7 @@ function placeOf({ rate_dps, temperature_c }) {
   const given = (text, otherwise) => (text && Number.isFinite(Number(text)) ? Number(text) : otherwise);
   return {
     rate_dps: given(asked.rate, Number(((rate_dps[1] ?? 0) / 2).toPrecision(3))),
-    temperature_c: given(asked.temperature, Number(((temperature_c[0] + temperature_c[1]) / 2).toFixed(1))),
+    temperature_c: given(asked.temperature, Number(((cold + warm) / 2).toFixed(1))),
   };
 }
 
@@ -138,7 +140,7 @@ function reasons(cells) {
       ? h(
           "p",
           { class: "small" },
-          "“same run”: coefficients and model alone, expanded; it holds only until the unit is switched off.",
+          "“same run”: uncertainty of coefficients and model only, expanded; valid only until the unit is switched off.",
         )
       : null,
   );

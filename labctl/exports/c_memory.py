@@ -1,0 +1,81 @@
+"""The part of a C header that remembers: the followers of a lag or a hysteresis, and a step from sample to sample."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from labctl.exports.c_tables import c_table
+from labctl.fitting.models.memory import Memory
+from labctl.fitting.numeric.arrays import Array
+
+BODY = """
+/* What remembers: {count} followers of the temperature, of a thermal lag (time constant, s) or a hysteresis (width of a
+ * play, K). Call {name}_begin once, and {name}_step for every sample in order of time, t_s in s; the unit is taken to
+ * have rested at its first temperature. A temperature that goes straight from sample to sample is followed exactly,
+ * however far they are apart. {name}_correct alone is right where the temperature has not changed for long, but for the
+ * side of a hysteresis. Link with the C library's mathematics (-lm). */
+#define {name}_FOLLOWERS {count}
+typedef struct {{ int begun; double t_s, temperature_c, at_c[{name}_FOLLOWERS]; }} {name}_state;
+static const int {name}_is_lag[{name}_FOLLOWERS] = {is_lag};
+static const double {name}_follower[{name}_FOLLOWERS] = {parameters};
+static const double {name}_bow_c[{name}_FOLLOWERS][2] = {bows};
+static const double {name}_size[{name}_FOLLOWERS][{name}_AXES] = {sizes};
+
+static inline void {name}_begin({name}_state *state) {{ state->begun = 0; }}
+
+static inline int {name}_step(
+    {name}_state *state, const LABCTL_REAL *w, LABCTL_REAL temperature_c, double t_s, LABCTL_REAL *rate)
+{{
+    double now = (double)temperature_c, error[{name}_AXES];
+    LABCTL_REAL left[{name}_AXES];
+    int a, f, outside, known = isfinite(now) && isfinite(t_s);
+    for (a = 0; a < {name}_AXES; a++) error[a] = known ? 0 : NAN;
+    for (f = 0; known && f < {name}_FOLLOWERS; f++) {{
+        double parameter = {name}_follower[f], at = now, side;
+        if (state->begun && {name}_is_lag[f]) {{
+            double ratio = (t_s - state->t_s) / parameter, keep = exp(-ratio);
+            double mean = ratio > 0 ? -expm1(-ratio) / ratio : 1;
+            at = keep * state->at_c[f] + (mean - keep) * state->temperature_c + (1 - mean) * now;
+        }} else if (state->begun) {{
+            at = fmin(fmax(state->at_c[f], now - parameter / 2), now + parameter / 2);
+        }}
+        state->at_c[f] = at;
+        side = {name}_is_lag[f] ? at - now : (now - at) / (parameter / 2);
+        if ({name}_bow_c[f][1] > {name}_bow_c[f][0]) {{
+            double share = (now - {name}_bow_c[f][0]) / ({name}_bow_c[f][1] - {name}_bow_c[f][0]);
+            share = fmin(fmax(share, 0), 1);
+            side *= 4 * share * (1 - share);
+        }}
+        for (a = 0; a < {name}_AXES; a++) error[a] += {name}_size[f][a] * side;
+    }}
+    if (known) {{
+        state->begun = 1;
+        state->t_s = t_s;
+        state->temperature_c = now;
+    }}
+    for (a = 0; a < {name}_AXES; a++) left[a] = {left};
+    outside = {name}_correct(left, temperature_c, rate);
+    {after}return outside;
+}}
+"""
+
+
+def memory_body(name: str, memory: Memory, *, is_direct: bool) -> str:
+    """Return the constants, the state and the step; a direct law of the output takes the error off afterwards."""
+    followers = memory.followers
+    bows = np.array([follower.bow or (0.0, 0.0) for follower in followers])
+    taken = f"for (a = 0; a < {name}_AXES; a++) rate[a] = (LABCTL_REAL)((double)rate[a] - error[a]);\n    "
+    return BODY.format(
+        name=name,
+        count=len(followers),
+        is_lag="{" + ", ".join(str(int(follower.kind == "lag")) for follower in followers) + "}",
+        parameters=c_table(np.array([follower.parameter for follower in followers])),
+        bows=c_table(bows),
+        sizes=c_table(_sizes(memory)),
+        left="w[a]" if is_direct else "(LABCTL_REAL)((double)w[a] - error[a])",
+        after=taken if is_direct else "",
+    )
+
+
+def _sizes(memory: Memory) -> Array:
+    return np.stack([follower.size for follower in memory.followers])

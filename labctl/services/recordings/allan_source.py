@@ -1,0 +1,125 @@
+"""Allan deviation of a unit's newest record at rest, or of a file: a recording, or a table with a column of times."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadInput, BadRecording, NotEnoughData
+from labctl.fitting.data.static_record import GAP, StaticRecord, static_record
+from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, allan
+from labctl.recording import Recording, RecordingInfo, read_recording
+from labctl.recording.data_files import read_table
+from labctl.recording.recording import Columns
+from labctl.services.recordings.allan import allan_unit
+from labctl.services.recordings.importers import as_interchange
+from labctl.services.recordings.loading import newest_row
+from labctl.services.schemas.recordings import AllanResponse
+from labctl.store import Store
+
+#: Files that are read as they are, a header and columns, where no recording.toml says more.
+TABLES = frozenset({".csv", ".parquet"})
+
+
+def allan_of_unit(store: Store, serial: str, recording: int | None, column: str | None) -> AllanResponse:
+    """Return the Allan deviation of a unit's recording (default: the newest), or of one column of it.
+
+    Raises NotFound, BadInput, NotEnoughData.
+    """
+    row = newest_row(store, serial, recording)
+    if column is None:
+        return allan_unit(store, row.id, None)
+    info = RecordingInfo.model_validate(row.info)
+    parts = [columns for _, columns in store.recordings.iter_datasets(row.id)]
+    _refuse_unknown(f"recording {row.id}", column, parts[0] if parts else {})
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return _of_recording(Recording(info, whole), column, row.id)
+
+
+def allan_of_file(path: Path, column: str | None) -> AllanResponse:
+    """Return the Allan deviation of a file: a folder or file that can be imported, or a table with a column `t_s`.
+
+    Raises BadRecording, BadInput, NotEnoughData.
+    """
+    if path.is_file() and path.suffix in TABLES:
+        return _of_table(path, read_table(path), column)
+    with as_interchange(path) as folder:
+        return _of_recording(read_recording(folder), column, None)
+
+
+def _of_recording(recording: Recording, column: str | None, number: int | None) -> AllanResponse:
+    if recording.info.kind != "samples":
+        raise BadInput(f"{recording.info.serial}: holds {recording.info.kind}; an Allan deviation needs the readings")
+    if column is None:
+        found = static_record(recording)
+        if found is None:
+            raise NotEnoughData(
+                f"{recording.info.serial}: no stretch of {LEAST_READINGS} readings at rest, at one temperature and "
+                "without a gap; record the unit at rest"
+            )
+        return _answer(found, number, dict(recording.info.datasheet))
+    _refuse_unknown(recording.info.serial, column, recording.columns)
+    axis = column.removeprefix("gyro_")
+    values = recording.gyro_dps(axis) if f"gyro_{axis}" == column else _floats(recording.columns[column])
+    found = _of_course(recording.info.serial, {column: values}, _floats(recording.columns["t_s"]))
+    return _answer(found, number, dict(recording.info.datasheet))
+
+
+def _of_table(path: Path, columns: Columns, column: str | None) -> AllanResponse:
+    if "t_s" not in columns:
+        raise BadRecording(
+            f"{path}: column 't_s' is missing (seconds; there are {', '.join(list(columns)[:12])}); rename the column "
+            "of times, or import the file with a column map"
+        )
+    names = [column] if column is not None else [name for name in columns if name.startswith("gyro_")]
+    if not names:
+        raise BadInput(f"{path}: no column begins with gyro_; name one with --column ({', '.join(list(columns)[:12])})")
+    for name in names:
+        _refuse_unknown(str(path), name, columns)
+    found = _of_course(str(path), {name: _floats(columns[name]) for name in names}, _floats(columns["t_s"]))
+    return _answer(found, None, {})
+
+
+def _of_course(what: str, courses: dict[str, NDArray[np.float64]], t_s: NDArray[np.float64]) -> StaticRecord:
+    """Return the noise of columns by their longest stretch without a gap, wherever it is and whatever moved there."""
+    steps = np.diff(t_s)
+    spacing = float(np.median(steps)) if len(steps) else 0.0
+    if not spacing > 0:
+        raise BadRecording(f"{what}: column 't_s' does not rise (its median step is {spacing:g} s)")
+    edges = np.concatenate([[0], np.flatnonzero((steps <= 0) | (steps > GAP * spacing)) + 1, [len(t_s)]])
+    longest = int(np.argmax(np.diff(edges)))
+    rows = slice(int(edges[longest]), int(edges[longest + 1]))
+    n = rows.stop - rows.start
+    if n < LEAST_READINGS:
+        raise NotEnoughData(
+            f"{what}: its longest stretch without a gap has {n} readings; an Allan deviation needs {LEAST_READINGS}"
+        )
+    period_s = float((t_s[rows][-1] - t_s[rows][0]) / (n - 1))
+    axes: dict[str, Allan] = {}
+    for name, values in courses.items():
+        if not np.all(np.isfinite(values[rows])):
+            row = rows.start + int(np.argmin(np.isfinite(values[rows])))
+            raise BadRecording(f"{what}: column {name!r}, row {row + 1}: {values[row]} where a number is needed")
+        if (noise := allan(values[rows], period_s)) is not None:
+            axes[name] = noise
+    if not axes:
+        raise NotEnoughData(f"{what}: its readings do not scatter, so they say nothing about noise")
+    return StaticRecord(1, 1, float("nan"), n * period_s, axes)
+
+
+def _refuse_unknown(what: str, column: str, columns: Columns) -> None:
+    if column not in columns:
+        raise BadInput(f"{what}: there is no column {column!r} (there are {', '.join(list(columns)[:20])})")
+    if np.asarray(columns[column]).dtype.kind not in "fiu":
+        raise BadInput(f"{what}: column {column!r} holds text, not numbers")
+
+
+def _floats(values: NDArray[np.generic]) -> NDArray[np.float64]:
+    return np.asarray(values, dtype=np.float64)
+
+
+def _answer(found: StaticRecord, recording: int | None, datasheet: dict[str, float]) -> AllanResponse:
+    said = {"recording": recording, "datasheet": datasheet, **found.to_json()}
+    return AllanResponse.model_validate(said, extra="forbid")
