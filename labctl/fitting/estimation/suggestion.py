@@ -11,11 +11,11 @@ from labctl.fitting.numeric.least_squares import rank_of
 from labctl.recording import Recording
 
 #: Presets, the fullest first, for one axis and for several; the first that a recording determines is proposed.
-ONE_AXIS: tuple[str, ...] = ("ojeda2000", "bias_scale", "bias_temperature", "bias")
-SEVERAL_AXES: tuple[str, ...] = ("yang2018", "bias_scale", "single_temperature", "bias_temperature", "bias")
+ONE_AXIS = ("ojeda2000", "bias_scale", "bias_temperature", "bias")
+SEVERAL_AXES = ("yang2018", "bias_scale", "single_temperature", "bias_temperature", "bias")
 #: At rest nothing is learned of the scale factor.
-AT_REST: tuple[str, ...] = ("bias_temperature", "bias")
-TURNED: tuple[str, ...] = ("turns", "bias")
+AT_REST = ("bias_temperature", "bias")
+TURNED = ("turns", "bias")
 
 
 def suggested_model(points: Recording) -> str:
@@ -28,11 +28,10 @@ def suggested_model(points: Recording) -> str:
     if points.info.motion == POSES:
         return POSES
     data = fit_data_of(points)
-    if not data.channels.table_rate_dps().any():
-        names = AT_REST
-    elif data.info.motion == "turns":
+    names: tuple[str, ...] = AT_REST
+    if data.channels.table_rate_dps().any() and data.info.motion == "turns":
         names = TURNED
-    else:
+    elif data.channels.table_rate_dps().any():
         names = SEVERAL_AXES if len(data.info.axes) > 1 else ONE_AXIS
     return next((name for name in names[:-1] if _is_determined(data, name)), names[-1])
 

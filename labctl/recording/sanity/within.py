@@ -32,7 +32,7 @@ def check_at_rest(summary: Summary) -> Iterator[Finding]:
     if not still.any():
         return
     fast = float(np.abs(np.asarray(summary["table_rate_dps"], dtype=np.float64)).max())
-    resting = "the unit" if summary.info.motion == "turns" else "the table"
+    resting = "turn_deg is given as 0" if summary.info.motion == "turns" else "the table rate is given as 0"
     for axis in summary.info.axes:
         wander = summary.of_axis("wander", axis)
         if np.isnan(wander).all():
@@ -44,7 +44,7 @@ def check_at_rest(summary: Summary) -> Iterator[Finding]:
             yield Finding(
                 "moves_at_rest", "certain" if most > max(MOVED_SHARE * fast, 1.0) else "likely",
                 f"axis {axis}, {numbers_in_words(summary['dataset'][moving])}",
-                f"{resting} is at rest by its columns and the output changes by {most:.3g} deg/s (root mean square)",
+                f"{resting} and the output changes by {most:.3g} deg/s (root mean square)",
                 most, "deg/s", f"at most {max(MOVES_DPS, MOVES_SHARE * fast):.2g} deg/s",
                 "correct the rate, or leave out the readings in which the unit was moved",
             )  # fmt: skip

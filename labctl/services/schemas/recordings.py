@@ -34,7 +34,8 @@ class ExampleRequest(Request):
     """Which of the recordings that come with labctl to import."""
 
     name: str = Field(
-        max_length=100, description="osu-fog: a real fibre-optic gyro; weiss-gyrostar: a published table."
+        max_length=100,
+        description="osu-fog: a real fibre-optic gyro; freeimu-warmup: a MEMS gyro at rest; weiss-gyrostar: a table.",
     )
 
 

@@ -2612,7 +2612,7 @@ export interface components {
         ExampleRequest: {
             /**
              * Name
-             * @description osu-fog: a real fibre-optic gyro; weiss-gyrostar: a published table.
+             * @description osu-fog: a real fibre-optic gyro; freeimu-warmup: a MEMS gyro at rest; weiss-gyrostar: a table.
              */
             name: string;
         };

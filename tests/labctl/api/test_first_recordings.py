@@ -25,7 +25,7 @@ HIDE = ["scale_factor_asymmetry=0.02"]
 
 
 def test_examples_come_with_the_package(client: TestClient) -> None:
-    assert set(examples()) == {"imucal-turns", "osu-fog", "weiss-gyrostar"}
+    assert set(examples()) == {"freeimu-warmup", "imucal-turns", "osu-fog", "weiss-gyrostar"}
     assert all("labctl" in folder.parts[-3:] for folder in examples().values())
     fog = client.post("/api/recordings/example", json={"name": "osu-fog"})
     assert fog.status_code == 201
@@ -40,7 +40,8 @@ def test_examples_come_with_the_package(client: TestClient) -> None:
     turned = client.post("/api/recordings/example", json={"name": "imucal-turns"}).json()
     assert turned.items() >= {"serial": "IMUCAL-FERRARIS", "suggested_model": "turns", "warnings": []}.items()
     refused = client.post("/api/recordings/example", json={"name": "../.."})
-    assert (refused.status_code, "there are imucal-turns, osu-fog, weiss-gyrostar" in refused.json()["detail"]) == (
+    known = "there are freeimu-warmup, imucal-turns, osu-fog, weiss-gyrostar"
+    assert (refused.status_code, known in refused.json()["detail"]) == (
         400,
         True,
     )

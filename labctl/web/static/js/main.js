@@ -44,6 +44,10 @@ route(
   "/recordings/:id",
   withPlots(() => import("./pages/recording.js")),
 );
+route(
+  "/noise",
+  withPlots(() => import("./pages/noise.js")),
+);
 route("/effects", () => import("./pages/effects.js"));
 route(
   "/effects/:id",

@@ -82,4 +82,4 @@ def test_a_rest_that_moves_is_told(turned: Recording) -> None:
     shaken = np.asarray(turned.columns["gyro_x"], dtype=np.float64).copy()
     shaken[rests] += 20.0 * np.sin(np.arange(rests.sum()) / 7.0)
     found = inspect_recording(replace(turned, columns={**turned.columns, "gyro_x": shaken}))
-    assert any("the unit is at rest by its columns" in finding.text for finding in found)
+    assert any("turn_deg is given as 0 and the output changes" in finding.text for finding in found)

@@ -43,7 +43,11 @@ export async function page({ query, signal }) {
   return h(
     "div",
     { class: "page" },
-    pageHeader("Recordings", "All data sets of one unit in one campaign, or imported as files."),
+    pageHeader(
+      "Recordings",
+      "All data sets of one unit in one campaign, or imported as files.",
+      h("a", { class: "button", href: "/noise" }, "Compare noise at rest"),
+    ),
     importForm(taken),
     cardWithHeader(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list),
   );

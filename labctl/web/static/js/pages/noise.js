@@ -1,0 +1,164 @@
+// The page of noise at rest: the Allan deviations of several recordings over each other, with the data sheet's line.
+
+import { get } from "../core/http/api.js";
+import { Problem } from "../core/http/errors.js";
+import { setChildren, h } from "../core/elements.js";
+import { figure } from "../core/figure.js";
+import { duration, number } from "../core/format.js";
+import { card, emptyState, loadInto, notice, pageHeader, table } from "../core/components.js";
+import { updateQuery } from "../core/router.js";
+
+/** @import { Allan, NoiseFigure, RecordingRow } from "../../../types/api.js" */
+/** @import { PageContext } from "../../../types/pages.js" */
+
+/** @typedef {{ row: RecordingRow, found: Allan | null, why: string }} Record */
+
+const MOST = 8;
+const COLOURS = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#888888", "#222255"];
+const DASHES = ["solid", "dash", "dot"];
+
+/** @param {PageContext} context */
+export async function page({ query, signal }) {
+  const rows = (await get("/api/recordings", { signal })).filter((row) => row.kind === "samples");
+  const known = new Set(rows.map((row) => row.id));
+  const asked = (query.recordings ?? "").split(",").map(Number);
+  let chosen = asked.filter((id) => known.has(id)).slice(0, MOST);
+  const place = h("div", { class: "stack" });
+  const show = () =>
+    loadInto(place, "Working out the Allan deviations", async () => {
+      const records = await Promise.all(
+        rows.filter((row) => chosen.includes(row.id)).map((row) => recordOf(row, signal)),
+      );
+      return records.length ? overlay(records) : emptyState("Choose one recording or more.");
+    });
+  /** @param {number} id */
+  const toggle = (id) => {
+    chosen = chosen.includes(id) ? chosen.filter((each) => each !== id) : [...chosen, id].slice(-MOST);
+    updateQuery({ recordings: chosen.join(",") });
+    setChildren(list, choices());
+    show();
+  };
+  const choices = () =>
+    rows.map((row) =>
+      h(
+        "label",
+        { class: "row" },
+        h("input", { type: "checkbox", checked: chosen.includes(row.id), onchange: () => toggle(row.id) }),
+        `Recording ${row.id}, ${row.serial}`,
+      ),
+    );
+  const list = h("div", { class: "stack" }, choices());
+  if (chosen.length) show();
+  else setChildren(place, emptyState("Choose one recording or more."));
+  return h(
+    "div",
+    { class: "page" },
+    pageHeader("Noise at rest", "Allan deviation of the longest section at rest of each recording, over each other."),
+    rows.length
+      ? card("Recordings", h("p", { class: "muted" }, `At most ${MOST} at once.`), list)
+      : emptyState("No recording holds readings."),
+    card("Allan deviation", place),
+  );
+}
+
+/**
+ * A recording with its Allan deviation, or with the reason why it has none.
+ * @param {RecordingRow} row
+ * @param {AbortSignal} signal
+ * @returns {Promise<Record>}
+ */
+async function recordOf(row, signal) {
+  try {
+    const found = await get("/api/recordings/{recording}/allan", { path: { recording: row.id }, signal });
+    return { row, found, why: "" };
+  } catch (error) {
+    if (error instanceof Problem && error.status < 500) return { row, found: null, why: error.message };
+    throw error;
+  }
+}
+
+/** @param {readonly Record[]} records */
+function overlay(records) {
+  const lines = records.flatMap(({ row, found }, k) =>
+    Object.entries(found?.axes ?? {}).map(([axis, noise], n) => ({ row, axis, noise, found, k, n })),
+  );
+  const draw = () => ({
+    data: [
+      ...lines.map(({ row, axis, noise, k, n }) => ({
+        type: "scatter",
+        mode: "lines+markers",
+        x: noise.tau_s,
+        y: noise.deviation_dps,
+        line: { color: COLOURS[k % COLOURS.length], dash: DASHES[n % DASHES.length], width: 2 },
+        marker: { size: 4 },
+        name: `${row.id} ${row.serial}, ${axis}`,
+        hovertemplate: `${row.serial} ${axis}: %{y:.3~g} deg/s over %{x:.3~g} s<extra></extra>`,
+      })),
+      ...records.flatMap(({ row, found }, k) => datasheetLines(row, found, COLOURS[k % COLOURS.length])),
+    ],
+    layout: {
+      xaxis: { type: "log", title: { text: "averaging time, s" } },
+      yaxis: { type: "log", title: { text: "Allan deviation, deg/s" } },
+      margin: { l: 70, r: 12, t: 8, b: 46 },
+    },
+  });
+  const csv = () => [
+    ["recording", "axis", "tau_s", "deviation_dps", "low_dps", "high_dps"],
+    ...lines.flatMap(({ row, axis, noise }) =>
+      noise.tau_s.map((tau, i) => [row.id, axis, tau, noise.deviation_dps[i], noise.low_dps[i], noise.high_dps[i]]),
+    ),
+  ];
+  return [
+    ...records.filter(({ found }) => !found).map(({ row, why }) => notice("", `Recording ${row.id}: ${why}`)),
+    lines.length
+      ? figure("Allan deviations", "Thin lines: what the data sheet says, where it is known.", draw, {
+          height: "26rem",
+          csv,
+        })
+      : null,
+    lines.length
+      ? table(
+          [
+            { title: "Record", cell: ({ row, axis }) => `${row.id} ${row.serial}, axis ${axis}` },
+            { title: "Length", cell: ({ found }) => duration(found?.duration_s ?? null) },
+            ...["N", "B", "K"].map((letter) => ({
+              title: letter,
+              /** @param {typeof lines[number]} line */
+              cell: ({ noise }) => figureText(noise[/** @type {"N" | "B" | "K"} */ (letter)]),
+            })),
+          ],
+          lines,
+          { label: "Figures of IEEE Std 952" },
+        )
+      : null,
+  ];
+}
+
+/**
+ * The lines of a data sheet: angle random walk falls with the root of the averaging time, bias stability is level.
+ * @param {RecordingRow} row
+ * @param {Allan | null} found
+ * @param {string} colour
+ */
+function datasheetLines(row, found, colour) {
+  const tau = Object.values(found?.axes ?? {})[0]?.tau_s ?? [];
+  /** @type {[string, (tau: number) => number][]} */
+  const laws = [];
+  const { angle_random_walk_dps_rthz: walk, bias_stability_dps: stability } = found?.datasheet ?? {};
+  if (walk) laws.push(["angle random walk", (t) => walk / Math.sqrt(t)]);
+  if (stability) laws.push(["bias stability", () => stability]);
+  return laws.map(([what, law]) => ({
+    type: "scatter",
+    mode: "lines",
+    x: tau,
+    y: tau.map((t) => (t === null ? null : law(t))),
+    line: { color: colour, width: 1 },
+    name: `${row.serial}, data sheet: ${what}`,
+  }));
+}
+
+/** @param {NoiseFigure} noise */
+function figureText(noise) {
+  if (noise.value !== null) return `${number(noise.value)} ${noise.unit}`;
+  return noise.at_most === null ? "not seen" : `below ${number(noise.at_most, 2)} ${noise.unit}`;
+}

@@ -1,0 +1,41 @@
+"""Noise at rest of several recordings over each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import httpx
+import pytest
+
+from labctl.recording import write_recording
+from tests.helpers.browser import Service
+from tests.helpers.rest import at_rest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def test_two_records_are_drawn_over_each_other_with_the_data_sheet(
+    service: Service, visit: Callable[..., Page], tmp_path: Path
+) -> None:
+    from playwright.sync_api import expect
+
+    for serial in ("A-1", "B-2"):
+        folder = tmp_path / serial
+        sheet = {"bias_stability_dps": 0.002}
+        write_recording(at_rest(("z",), thermometer=False, minutes=20.0, serial=serial, datasheet=sheet), folder, "csv")
+        files = [("files", (file.name, file.read_bytes())) for file in sorted(folder.iterdir())]
+        httpx.post(f"{service.url}/api/recordings", files=files, timeout=60).raise_for_status()
+    page = visit("/recordings")
+    page.get_by_role("link", name="Compare noise at rest").click()
+    page.get_by_label("Recording 1, A-1").check()
+    page.get_by_label("Recording 2, B-2").check()
+    expect(page.get_by_role("region", name="Allan deviation").get_by_role("row")).to_have_count(3)
+    assert "recordings=1%2C2" in page.url
+    page.reload()
+    expect(page.get_by_label("Recording 2, B-2")).to_be_checked()
+    expect(page.get_by_text("B-2, data sheet: bias stability")).to_be_visible()
