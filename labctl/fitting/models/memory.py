@@ -126,7 +126,9 @@ def course(running: RunningMemory, t_s: Array, temperature_c: Array) -> Array:
     """
     if np.any(np.diff(t_s) < 0):
         row = int(np.argmax(np.diff(t_s) < 0)) + 1
-        raise BadInput(f"sample {row + 1}: t_s = {t_s[row]:.9g} s is before {t_s[row - 1]:.9g} s; order them by time")
+        raise BadInput(
+            f"sample {row + 1}: t_s = {t_s[row]:.9g} s is before {t_s[row - 1]:.9g} s; give them in order of time"
+        )
     warm = temperature_c.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(temperature_c, t_s.shape)
     return np.array([running.error_dps(t, c) for t, c in zip(t_s.tolist(), warm.tolist(), strict=True)])
 

@@ -51,7 +51,9 @@ def allan_of_file(path: Path, column: str | None) -> AllanResponse:
 
 def _of_recording(recording: Recording, column: str | None, number: int | None) -> AllanResponse:
     if recording.info.kind != "samples":
-        raise BadInput(f"{recording.info.serial}: holds {recording.info.kind}; an Allan deviation needs the readings")
+        raise BadInput(
+            f"{recording.info.serial}: holds {recording.info.kind}; an Allan deviation needs the readings; import those"
+        )
     if column is None:
         found = static_record(recording)
         if found is None:
@@ -87,25 +89,28 @@ def _of_course(what: str, courses: dict[str, NDArray[np.float64]], t_s: NDArray[
     steps = np.diff(t_s)
     spacing = float(np.median(steps)) if len(steps) else 0.0
     if not spacing > 0:
-        raise BadRecording(f"{what}: column 't_s' does not rise (its median step is {spacing:g} s)")
+        raise BadRecording(f"{what}: column 't_s' does not rise (its median step is {spacing:g} s); check the column")
     edges = np.concatenate([[0], np.flatnonzero((steps <= 0) | (steps > GAP * spacing)) + 1, [len(t_s)]])
     longest = int(np.argmax(np.diff(edges)))
     rows = slice(int(edges[longest]), int(edges[longest + 1]))
     n = rows.stop - rows.start
     if n < LEAST_READINGS:
         raise NotEnoughData(
-            f"{what}: its longest stretch without a gap has {n} readings; an Allan deviation needs {LEAST_READINGS}"
+            f"{what}: its longest stretch without a gap has {n} readings; an Allan deviation needs {LEAST_READINGS}; "
+            "record for longer"
         )
     period_s = float((t_s[rows][-1] - t_s[rows][0]) / (n - 1))
     axes: dict[str, Allan] = {}
     for name, values in courses.items():
         if not np.all(np.isfinite(values[rows])):
             row = rows.start + int(np.argmin(np.isfinite(values[rows])))
-            raise BadRecording(f"{what}: column {name!r}, row {row + 1}: {values[row]} where a number is needed")
+            raise BadRecording(
+                f"{what}: column {name!r}, row {row + 1}: {values[row]} where a number is needed; leave the row out"
+            )
         if (noise := allan(values[rows], period_s)) is not None:
             axes[name] = noise
     if not axes:
-        raise NotEnoughData(f"{what}: its readings do not scatter, so they say nothing about noise")
+        raise NotEnoughData(f"{what}: its readings do not scatter, so they say nothing about noise; check the column")
     return StaticRecord(1, 1, float("nan"), n * period_s, axes)
 
 
@@ -113,7 +118,7 @@ def _refuse_unknown(what: str, column: str, columns: Columns) -> None:
     if column not in columns:
         raise BadInput(f"{what}: there is no column {column!r} (there are {', '.join(list(columns)[:20])})")
     if np.asarray(columns[column]).dtype.kind not in "fiu":
-        raise BadInput(f"{what}: column {column!r} holds text, not numbers")
+        raise BadInput(f"{what}: column {column!r} holds text, not numbers; name another")
 
 
 def _floats(values: NDArray[np.generic]) -> NDArray[np.float64]:
