@@ -9,6 +9,7 @@ STUDIES = (
     "coverage",
     "use_coverage",
     "criticism",
+    "profiles",
     "crash_recovery",
     "process_kill",
     "process_pairs",

@@ -19,7 +19,7 @@ from labctl.recording import Recording
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
 
 HIDDEN = {"time_delay": 0.005, "bandwidth": 1.0 / (2 * np.pi * 40.0)}
-BASE = ["bias", "scale_factor", "scale_factor_odd"]
+BASE = ["bias", "scale_factor", "scale_factor_odd", "scale_factor_even"]
 #: Hidden effects by the name of a cell.
 CELLS = {
     "nothing": (), "time_delay": ("time_delay",), "bandwidth": ("bandwidth",), "both": ("time_delay", "bandwidth"),

@@ -97,6 +97,12 @@ class _Walk:
         """Let the table follow a course of rates, and read it by its encoder."""
         times = np.arange(0.0, profile.duration_s + profile.step_s / 2, profile.step_s)
         rates = np.array([profile.rate_dps(min(t, profile.duration_s)) for t in times.tolist()])
+        fastest, most = float(np.abs(rates).max()), self._bench.table.max_rate_dps
+        if fastest > most:
+            raise BadInput(
+                f"recipe {self._plan.recipe.name}: a {profile.kind} goes to {fastest:g} deg/s, the table of bench "
+                f"{self._bench.name} to {most:g} deg/s; make it slower"
+            )
         lead = self._lead(rates[0], profile.step_s), self._lead(rates[-1], profile.step_s)[::-1]
         self._t = self._world.follow(self._t, profile.step_s, np.concatenate([lead[0], rates, lead[1]]))
         end = self._t - profile.step_s * len(lead[1])
