@@ -18,7 +18,7 @@ from labctl.recording.sanity import inspect_recording
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import limits_of, load_bench
 from labctl.services.simulation.plan_simulation import simulate
-from labctl.store import Store
+from labctl.store import open_store
 from procedures.planning.plan import make_plan
 from procedures.recipe.recipe import parse_recipe
 
@@ -123,8 +123,9 @@ def test_a_course_beyond_the_table_is_refused() -> None:
         simulated(amplitude_dps=5000.0)
 
 
-def test_no_campaign_runs_a_course(tmp_path: Path, store: Store) -> None:
+def test_no_campaign_runs_a_course(tmp_path: Path) -> None:
     path = tmp_path / "sweep.toml"
     path.write_text(RECIPE.format(amplitude=40))
-    with pytest.raises(BadInput, match="can be simulated only"):
+    lab = open_store(str(tmp_path / "lab.sqlite"), write=True)
+    with lab as store, pytest.raises(BadInput, match="can be simulated only"):
         prepare(store, str(path), load_bench("single-axis-sim"), VirtualClock(), clip=False)
