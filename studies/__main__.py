@@ -13,6 +13,7 @@ STUDIES = (
     "criticism",
     "rest_loops",
     "rest_peers",
+    "profiles",
     "crash_recovery",
     "process_kill",
     "process_pairs",

@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from instruments.toml_documents import listed, parse_toml, read_toml_text, shown
 from procedures.contracts.errors import RecipeError
+from procedures.recipe.profiles import Profile
 from procedures.recipe.rules import (
     AcquireRules,
     GuardRules,
@@ -54,6 +55,7 @@ class Recipe(Table):
     inverted: Inverted | None = None
     power_cycle: PowerCycle | None = None
     mounting: Mounting = Mounting()
+    profiles: tuple[Profile, ...] = ()  #: courses of the rate, run at the begin of each level; simulated only
     guards: GuardRules = GuardRules()
     on_failure: OnFailure = OnFailure()
     resume: ResumeRules = ResumeRules()

@@ -54,6 +54,13 @@ class HiddenEffect:
         """Return the addition to the output, deg/s, in a shape that broadcasts to (n, axes)."""
         return np.zeros((len(state.t_s), 1))
 
+    def memory(self) -> tuple[Array, Array] | None:
+        """Return the moments before now, (k,) s, of whose motion the unit feels a mean, and their weights, (k,).
+
+        None where it feels the motion of now. The weights have the sum 1.
+        """
+        return None
+
     def thermometer_c(self, state: State) -> Array:
         """Return the addition to the thermometer, (n,) K."""
         return np.zeros(len(state.t_s))

@@ -19,6 +19,7 @@ from instruments.simulators.hidden import (
     history,
     nonlinearity,
     rate_table,
+    response,
     scale_factor,
     thermal,
 )
@@ -40,6 +41,8 @@ KINDS: tuple[type[HiddenEffect], ...] = (
     nonlinearity.VibrationRectification,
     history.RateHysteresis,
     history.StartTransient,
+    response.TimeDelay,
+    response.Bandwidth,
     bias.BiasTemperature,
     scale_factor.ScaleFactorTemperature,
     thermal.TemperatureRate,

@@ -18,6 +18,7 @@ from instruments.simulators.physics.ambient import humidity_pct, supply_wander_v
 from instruments.simulators.physics.earth import BodyFrame, EarthRotation
 from instruments.simulators.physics.instability import BiasInstability
 from instruments.simulators.physics.motion import TableMotion
+from instruments.simulators.physics.profile_motion import ProfileMotion
 from instruments.simulators.physics.thermal import Body, Heat
 from instruments.simulators.physics.unit_profiles import UnitTruth, make_unit, usual_rate_hz
 
@@ -55,6 +56,10 @@ class World:
             step_error_deg=_number(settings.table, "step_error_deg", 0.0225),
             gear_error_deg=_number(settings.table, "gear_error_deg", 0.0),
         )
+        self._profile: ProfileMotion | None = None
+        self._encoder_noise_deg = _number(settings.table, "encoder_noise_deg", 0.0)
+        self._encoder_late_s = _number(settings.table, "encoder_late_s", 0.0)
+        self._encoder_rng = np.random.default_rng([settings.seed, settings.noise_seed, zlib.crc32(b"encoder")])
         self.position, self.mounting, self.run = "z", 0, 0
         self.powered_on_s: float | None = None
         truths = {gyro.name: self._make(gyro, settings) for gyro in bench.gyros}
@@ -81,6 +86,30 @@ class World:
     def gyro(self, name: str) -> SimulatedGyro:
         """Return a unit of the bench; raises KeyError."""
         return self._gyros[name]
+
+    def follow(self, t_s: float, step_s: float, rates_dps: Array) -> float:
+        """Let the table follow rates (k,) deg/s at even times from `t_s` on; returns the time of the last."""
+        self._profile = ProfileMotion(t_s, step_s, rates_dps)
+        return self._profile.end_s
+
+    def leave_profile(self) -> None:
+        """Let the table be the stepper again that it was before."""
+        self._profile = None
+
+    @property
+    def motion(self) -> TableMotion | ProfileMotion:
+        """What moves the units: the stepper, or a course of rates that the table follows."""
+        return self._profile or self.table
+
+    def encoder_rates_dps(self, t_s: Array, period_s: float) -> Array:
+        """Return the mean rates by the table's encoder over the periods that end at times (n,) s, in one row.
+
+        Each reading of the angle has noise, and its time stamps may be late: settings `encoder_noise_deg` and
+        `encoder_late_s` of the simulated table.
+        """
+        times = np.concatenate([t_s[:1] - period_s, t_s]) - self._encoder_late_s
+        noise = self._encoder_noise_deg * self._encoder_rng.standard_normal(len(times))
+        return np.asarray(np.diff(self.motion.angle_deg(times) + noise) / period_s)
 
     @staticmethod
     def humidity_pct(t_s: Array) -> Array:
@@ -110,6 +139,15 @@ class World:
         return BodyFrame.of(self.position).gravity(n)
 
 
+def _memory_of(hidden: list[HiddenEffect]) -> tuple[Array, Array]:
+    """Return the moments before now, (k,) s, and their weights, (k,), of all hidden responses one after the other."""
+    past_s, weights = np.zeros(1), np.ones(1)
+    for memory in filter(None, (effect.memory() for effect in hidden)):
+        past_s = np.add.outer(past_s, memory[0]).ravel()
+        weights = np.multiply.outer(weights, memory[1]).ravel()
+    return past_s, weights
+
+
 class SimulatedGyro:
     """One unit of the world, sampled at times that only rise."""
 
@@ -124,13 +162,13 @@ class SimulatedGyro:
         self._instability = BiasInstability(self._rng, truth.instability_dps, truth.instability_taus_s, len(truth.axes))
         self._hidden: list[HiddenEffect] = hidden_effects(world.settings.hidden, seed)
         self._rows = ["xyz".index(axis) for axis in truth.axes]
+        self._past_s, self._weights = _memory_of(self._hidden)
 
     def sample(self, t_s: Array) -> GyroSample:
         """Return the output at rising times (n,) s; each reading integrates the motion over one sampling interval."""
         world, truth, n = self.world, self.truth, len(t_s)
         period = 1.0 / self.sample_rate_hz
-        ends = world.table.angle_deg(np.concatenate([t_s - period, t_s]))
-        table_dps, angle = (ends[n:] - ends[:n]) / period, 0.5 * (ends[n:] + ends[:n])
+        table_dps, angle = self._felt(t_s, period)
         body = world.body_rates(table_dps, angle)
         sensor = world.heat.sensor_c(self.settings.name, t_s)
         gain = truth.gain(sensor)
@@ -151,6 +189,13 @@ class SimulatedGyro:
         rate = rate + drift + truth.white_dps_rthz * np.sqrt(self.sample_rate_hz) * white[:, :-1]
         thermometer = shown[:, None] + truth.thermometer_noise_c * white[:, -1:]
         return GyroSample(rate, np.repeat(thermometer, len(truth.axes), axis=1), truth.supply_v + supply_wander_v(t_s))
+
+    def _felt(self, t_s: Array, period_s: float) -> tuple[Array, Array]:
+        """Return the table's mean rate over each sampling interval, deg/s, and its angle as they are felt, (n,)."""
+        n, ends = len(t_s), np.zeros(2 * len(t_s))
+        for past_s, weight in zip(self._past_s, self._weights, strict=True):
+            ends += weight * self.world.motion.angle_deg(np.concatenate([t_s - period_s, t_s]) - past_s)
+        return (ends[n:] - ends[:n]) / period_s, 0.5 * (ends[n:] + ends[:n])
 
     def _state(self, t_s: Array, table_dps: Array, angle: Array, body: Array, sensor: Array, on_s: Array) -> State:
         world = self.world
@@ -180,6 +225,6 @@ class SimulatedGyro:
     def _own_at(self, t_s: Array) -> Array:
         """Return the rates along the recorded axes, (k, axes) deg/s, at times (k,), from the motion of the table."""
         half = 0.05
-        angle = self.world.table.angle_deg(np.concatenate([t_s - half, t_s + half]))
+        angle = self.world.motion.angle_deg(np.concatenate([t_s - half, t_s + half]))
         k = len(t_s)
         return self.world.body_rates((angle[k:] - angle[:k]) / (2 * half), angle[:k])[:, self._rows]

@@ -117,6 +117,11 @@ def prepare(
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
     recipe = load_recipe(recipe_source)
+    if recipe.profiles:
+        raise BadInput(
+            f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can be simulated only (`labctl simulate`): "
+            "no driver runs a table along a course of rates; leave them out"
+        )
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:

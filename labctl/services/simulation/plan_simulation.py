@@ -19,6 +19,7 @@ from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo
 from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn
 from procedures.planning.plan import Plan
+from procedures.recipe.profiles import Ramp, SineSweep
 
 #: Interval of the environment log, s.
 ENVIRONMENT_S = 10.0
@@ -48,6 +49,8 @@ class _Walk:
         self._run, self._setpoint = 0, bench.chamber.safe_c
         self._parts: list[dict[str, NDArray[np.generic]]] = []
         self._environment: list[tuple[float, int, float, float, float]] = []
+        self._level: tuple[object, ...] | None = None
+        self._courses = 0
 
     def run(self) -> None:
         """Take every step of the plan."""
@@ -83,6 +86,39 @@ class _Walk:
             self._environment += [(t, self._run, sensor, there, self._setpoint) for t, sensor, there in rows]
 
     def _acquire(self, step: Acquire) -> None:
+        level = (step.position, step.run, step.mounting, self._setpoint)
+        if level != self._level:  # the first data set of a level
+            self._level = level
+            for profile in self._plan.recipe.profiles:
+                self._follow(step, profile)
+        self._take(step)
+
+    def _follow(self, step: Acquire, profile: Ramp | SineSweep) -> None:
+        """Let the table follow a course of rates, and read it by its encoder."""
+        times = np.arange(0.0, profile.duration_s + profile.step_s / 2, profile.step_s)
+        rates = np.array([profile.rate_dps(min(t, profile.duration_s)) for t in times.tolist()])
+        fastest, most = float(np.abs(rates).max()), self._bench.table.max_rate_dps
+        if fastest > most:
+            raise BadInput(
+                f"recipe {self._plan.recipe.name}: a {profile.kind} goes to {fastest:g} deg/s, the table of bench "
+                f"{self._bench.name} to {most:g} deg/s; make it slower"
+            )
+        lead = self._lead(rates[0], profile.step_s), self._lead(rates[-1], profile.step_s)[::-1]
+        self._t = self._world.follow(self._t, profile.step_s, np.concatenate([lead[0], rates, lead[1]]))
+        end = self._t - profile.step_s * len(lead[1])
+        n = round(profile.duration_s / self._period)
+        read_s = end - self._period * np.arange(n - 1, -1, -1.0)
+        self._courses += 1
+        number = self._plan.datasets + self._courses
+        self._read(step, read_s, self._world.encoder_rates_dps(read_s, self._period), number)
+        self._world.leave_profile()
+
+    def _lead(self, rate_dps: float, step_s: float) -> NDArray[np.float64]:
+        """Return the rates from rest to a rate, (k,) deg/s."""
+        steps = int(np.ceil(abs(rate_dps) / self._bench.table.acceleration_dps2 / step_s)) + 1
+        return np.linspace(0.0, rate_dps, steps, endpoint=False)
+
+    def _take(self, step: Acquire) -> None:
         table, step_deg = self._world.table, self._world.table.step_deg
         achieved, steady_from = 0.0, self._t
         if step.rate_dps:
@@ -96,17 +132,21 @@ class _Walk:
             end_s = self._t + step.settle_s + step.duration_s
         first = steady_from + step.settle_s + self._period
         times = first + np.arange(round(step.duration_s / self._period), dtype=np.float64) * self._period
+        self._read(step, times, np.full(len(times), achieved), step.dataset)
+        self._t = max(end_s, float(times[-1]))
+
+    def _read(self, step: Acquire, times: NDArray[np.float64], rate_dps: NDArray[np.float64], dataset: int) -> None:
         sample = self._unit.sample(times)
         n = len(times)
         part: dict[str, NDArray[np.generic]] = {
-            "dataset": np.full(n, step.dataset, dtype=np.int64),
+            "dataset": np.full(n, dataset, dtype=np.int64),
             "t_s": times,
             "position": np.full(n, step.position),
             "run": np.full(n, step.run, dtype=np.int64),
             "mounting": np.full(n, step.mounting, dtype=np.int64),
             "power_s": times - (self._power_on_s or 0.0),
-            "table_rate_dps": np.full(n, achieved),
-            "table_angle_deg": table.commanded_deg(
+            "table_rate_dps": rate_dps,
+            "table_angle_deg": self._world.motion.commanded_deg(
                 times - self._period / 2
             ),  # at the middle of the interval that a reading averages
             "temperature_c": sample.temperature_c.mean(axis=1),
@@ -117,7 +157,6 @@ class _Walk:
         }
         part |= {f"gyro_{axis}": sample.rate_dps[:, i] for i, axis in enumerate(self._settings.axes)}
         self._parts.append(part)
-        self._t = max(end_s, float(times[-1]))
 
     def recording(self) -> Recording:
         """Return everything that was acquired."""
@@ -127,6 +166,7 @@ class _Walk:
             model=settings.model,
             axes=settings.axes,
             kind="samples",
+            motion="profile" if self._plan.recipe.profiles else "rates",
             started_at=self._clock.utc(),
             latitude_deg=self._bench.latitude_deg,
             sample_rate_hz=self._unit.sample_rate_hz,

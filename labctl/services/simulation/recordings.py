@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
@@ -59,7 +60,8 @@ def simulate_recording(request: SimulateRequest, out: Path, file_format: Literal
     made = make_recording(request)
     write_recording(made.recording, out, file_format)
     return SimulateResponse(
-        serial=made.recording.info.serial, datasets=made.plan.datasets, readings=len(made.recording),
+        serial=made.recording.info.serial, datasets=len(np.unique(made.recording.columns["dataset"])),
+        readings=len(made.recording),
         hidden=dict(made.hidden), folder=str(out),
     )  # fmt: skip
 
