@@ -14,10 +14,10 @@ from scipy.optimize import least_squares
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.at_rest.gravity import local_gravity_g
+from labctl.fitting.poses.at_rest.rests import Rests
 from labctl.fitting.poses.between import between_variance
-from labctl.fitting.poses.gravity import local_gravity_g
 from labctl.fitting.poses.readings import AXES, PoseReadings
-from labctl.fitting.poses.rests import Rests
 from labctl.fitting.poses.triad import UPPER, corrected, unit
 
 PARAMETERS = 3 + len(UPPER)
