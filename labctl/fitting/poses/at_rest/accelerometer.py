@@ -146,7 +146,7 @@ def _covariance(serial: str, jacobian: NDArray[np.float64], accel_g: NDArray[np.
     rank = np.linalg.matrix_rank(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300), tol=1e-6)
     u = np.sqrt(np.diag(covariance))
     if rank == PARAMETERS and float(u.max()) <= LARGEST_U:
-        return np.asarray(covariance)
+        return np.asarray(covariance, dtype=np.float64)
     directions = unit(accel_g)
     faces = {
         f"{sign}{a}": float((s * directions[:, i]).max())
