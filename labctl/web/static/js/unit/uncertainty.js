@@ -11,6 +11,8 @@ import { atPlace, joined, shown, titleOf, unknown } from "./uncertainty_parts.js
 
 /** @import { AxisUncertainty, Uncertainty, Validity, Version } from "../../../types/api.js" */
 
+/** Where no thermometer was, any temperature is like another, deg C. */
+const ANY_C = 25;
 const PATH = "/api/units/{serial}/calibrations/{version}/uncertainty";
 /** @param {string} text */
 const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
@@ -55,7 +57,10 @@ function placeOf({ rate_dps, temperature_c }) {
   const given = (text, otherwise) => (text && Number.isFinite(Number(text)) ? Number(text) : otherwise);
   return {
     rate_dps: given(asked.rate, Number(((rate_dps[1] ?? 0) / 2).toPrecision(3))),
-    temperature_c: given(asked.temperature, Number(((temperature_c[0] + temperature_c[1]) / 2).toFixed(1))),
+    temperature_c: given(
+      asked.temperature,
+      Number((((temperature_c[0] ?? ANY_C) + (temperature_c[1] ?? ANY_C)) / 2).toFixed(1)),
+    ),
   };
 }
 
