@@ -56,9 +56,7 @@ def print_poses(poses: PosesJson) -> None:
     for axis, coefficients in poses["accelerometer"]["axes"].items():
         for name, entry in coefficients.items():
             shown = rounded_to_uncertainty(entry["value"], entry["u"])
-            rows.add_row(
-                axis, name, entry["unit"], shown.value + shown.power, f"{shown.u}{shown.power}" if shown.u else "?"
-            )
+            rows.add_row(axis, name, entry["unit"], shown.value + shown.power, (shown.u or "-") + shown.power)
     console.print(rows)
     console.print(
         f"{rests['count']} rests in {rests['poses']} poses; {moves['used']} of {moves['count']} turns used; gravity "

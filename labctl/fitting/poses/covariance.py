@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.accelerometer import Accelerometer
-from labctl.fitting.poses.bias import Bias
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
+from labctl.fitting.poses.at_rest.bias import Bias
 from labctl.fitting.poses.equations import Equations, rate_without_bias
 from labctl.fitting.poses.moves import Moves
 from labctl.fitting.poses.rotation import integrate, integration_u

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from labctl.fitting.poses.accelerometer import Accelerometer, different_poses
-from labctl.fitting.poses.bias import Bias
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, different_poses
+from labctl.fitting.poses.at_rest.bias import Bias
+from labctl.fitting.poses.at_rest.rests import FACTOR, WINDOW_S, Rests
 from labctl.fitting.poses.determination import condition_of, turned_deg
 from labctl.fitting.poses.gyroscope import Gyroscope
 from labctl.fitting.poses.moves import Moves
 from labctl.fitting.poses.readings import AXES, PoseReadings
-from labctl.fitting.poses.rests import FACTOR, WINDOW_S, Rests
 from labctl.fitting.poses.triad import UPPER
 from labctl.json_types.poses import (
     AccelerometerCoefficient,

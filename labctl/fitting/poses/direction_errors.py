@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.accelerometer import Accelerometer, calibrate_accelerometer
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer
+from labctl.fitting.poses.at_rest.rests import find_rests
 from labctl.fitting.poses.moves import Moves, moves_between
 from labctl.fitting.poses.readings import readings_of
-from labctl.fitting.poses.rests import find_rests
 from labctl.fitting.poses.rotation import integrate, seen_at_end
 from labctl.fitting.poses.triad import tangents
 from labctl.recording import Recording
@@ -45,7 +45,7 @@ def move_errors(recording: Recording, correct: Correct) -> MoveErrors:
     found = uncorrected_errors(moves, accelerometer)
     there = accelerometer.up[moves.before + 1]
     # a small rotation by r turns gravity by r x up, so r = up x what gravity is off by
-    about = np.cross(there, np.einsum("mc,mca->ma", found, tangents(there)))
+    about = np.asarray(np.cross(there, np.einsum("mc,mca->ma", found, tangents(there))), dtype=np.float64)
     counted = np.concatenate([[0], np.cumsum(outside)])
     within = np.searchsorted(readings.t_s, moves.t_s)
     return MoveErrors(

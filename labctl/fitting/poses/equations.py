@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.accelerometer import Accelerometer
-from labctl.fitting.poses.bias import Bias
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
+from labctl.fitting.poses.at_rest.bias import Bias
 from labctl.fitting.poses.moves import Moves
 from labctl.fitting.poses.rotation import Rotations, change_of_direction, integrate, seen_at_end
 from labctl.fitting.poses.triad import tangents

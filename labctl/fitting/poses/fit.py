@@ -11,8 +11,9 @@ from labctl.fitting.effects import Reference, Term
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.accelerometer import Accelerometer, calibrate_accelerometer
-from labctl.fitting.poses.bias import Bias, bias_of
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer
+from labctl.fitting.poses.at_rest.bias import Bias, bias_of
+from labctl.fitting.poses.at_rest.rests import Rests, find_rests
 from labctl.fitting.poses.covariance import move_covariance, of_readings
 from labctl.fitting.poses.description import describe
 from labctl.fitting.poses.determination import require_determined, require_moves
@@ -21,7 +22,6 @@ from labctl.fitting.poses.equations import equations_of
 from labctl.fitting.poses.gyroscope import Gyroscope, fit_gyroscope
 from labctl.fitting.poses.moves import Moves, moves_between
 from labctl.fitting.poses.readings import AXES, PoseReadings, readings_of
-from labctl.fitting.poses.rests import Rests, find_rests
 from labctl.fitting.poses.result import PosesFit
 from labctl.fitting.poses.triad import corrected
 from labctl.recording import Recording

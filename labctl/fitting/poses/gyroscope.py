@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.accelerometer import Accelerometer
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
+from labctl.fitting.poses.at_rest.bias import Bias
 from labctl.fitting.poses.between import between_variance, gls
-from labctl.fitting.poses.bias import Bias
 from labctl.fitting.poses.covariance import move_covariance
 from labctl.fitting.poses.determination import LEAST_MOVES
 from labctl.fitting.poses.equations import Equations, equations_of

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.at_rest.rests import Rests
 from labctl.fitting.poses.readings import AXES, PoseReadings
-from labctl.fitting.poses.rests import Rests
 
 #: An output is at its rail where so many readings in a row are within this share of the axis' extreme, and the
 #: reading before or after them is further off than so many times that and the noise: a smooth peak fades, a
@@ -48,11 +48,16 @@ class Moves:
 
     def take(self, rows: NDArray[np.bool_]) -> Moves:
         """Return some of the moves, by mask (m,)."""
-        kept = tuple(why for why, keep in zip(self.why_not, rows, strict=True) if keep)
-        return Moves(
-            self.before[rows], self.t_s[rows], self.rate_dps[rows], self.step_s[rows], self.share[rows],
-            self.jitter_s[rows], self.density, kept,
-        )  # fmt: skip
+        return replace(
+            self,
+            before=self.before[rows],
+            t_s=self.t_s[rows],
+            rate_dps=self.rate_dps[rows],
+            step_s=self.step_s[rows],
+            share=self.share[rows],
+            jitter_s=self.jitter_s[rows],
+            why_not=tuple(why for why, keep in zip(self.why_not, rows, strict=True) if keep),
+        )
 
 
 def moves_between(readings: PoseReadings, rests: Rests, gyro_dps: NDArray[np.float64] | None = None) -> Moves:

@@ -14,12 +14,12 @@ UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 def corrected(readings: NDArray[np.float64], errors: NDArray[np.float64], bias: Array) -> NDArray[np.float64]:
     """Return the truth (n, 3) behind readings (n, 3) of axes with errors (3, 3) and bias (3,)."""
-    return np.asarray(np.linalg.solve(np.eye(3) + errors, (readings - bias).T).T)
+    return np.asarray(np.linalg.solve(np.eye(3) + errors, (readings - bias).T).T, dtype=np.float64)
 
 
 def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the directions of vectors (n, 3)."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None], dtype=np.float64)
 
 
 def cross_matrix(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1164,6 +1164,38 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
+         * AccelerometerCoefficient
+         * @description One number with its standard uncertainty `u`.
+         */
+        AccelerometerCoefficient: {
+            /** Value */
+            value: number;
+            /** U */
+            u: number;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * AccelerometerJson
+         * @description The accelerometer by gravity: reading = bias + force + scale_factor x own force + misalignment x another.
+         */
+        AccelerometerJson: {
+            /** Axes */
+            axes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["AccelerometerCoefficient"];
+                };
+            };
+            /** Gravity G */
+            gravity_g: number;
+            /** Gravity Source */
+            gravity_source: string;
+            /** Residual G */
+            residual_g: number;
+            /** Frame */
+            frame: string;
+        };
+        /**
          * AdviceResponse
          * @description A failed campaign in words: three short sentences.
          */
@@ -2759,6 +2791,8 @@ export interface components {
              * @description The recording that it was fitted to.
              */
             recording: number | null;
+            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            poses: components["schemas"]["PosesJson"] | null;
             /** Version */
             version: number;
             /**
@@ -2844,6 +2878,18 @@ export interface components {
              * @description Time since the last answer of the process that drives the bench, s.
              */
             heard_s: number;
+        };
+        /**
+         * HeldOutMovesJson
+         * @description Each used move predicted by a fit to the others: root mean square, and the share within U = 2 u.
+         */
+        HeldOutMovesJson: {
+            /** Rms Deg */
+            rms_deg: number;
+            /** Within 2U */
+            within_2u: number;
+            /** Components */
+            components: number;
         };
         /**
          * ImportResponse
@@ -2948,6 +2994,8 @@ export interface components {
              * @description The recording that it was fitted to.
              */
             recording: number | null;
+            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            poses: components["schemas"]["PosesJson"] | null;
             /**
              * Improved From
              * @description The version that was changed.
@@ -3018,6 +3066,8 @@ export interface components {
              * @description The recording that it was fitted to.
              */
             recording: number | null;
+            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            poses: components["schemas"]["PosesJson"] | null;
             /**
              * Improved From
              * @description The version that was changed.
@@ -3397,6 +3447,48 @@ export interface components {
             reference: components["schemas"]["ReferenceJson"] | null;
         };
         /**
+         * MoveLeftOutJson
+         * @description A move that the fit did without, and why.
+         */
+        MoveLeftOutJson: {
+            /** From S */
+            from_s: number;
+            /** Until S */
+            until_s: number;
+            /** Why */
+            why: string;
+        };
+        /**
+         * MovesJson
+         * @description The moves between rests, and what is left of them; a residual is one of two components square to gravity.
+         *
+         *     `applied_rms_dps` is what the exported calibration leaves: one bias throughout, no sensitivity to specific force.
+         */
+        MovesJson: {
+            /** Count */
+            count: number;
+            /** Used */
+            used: number;
+            /** Left Out */
+            left_out: components["schemas"]["MoveLeftOutJson"][];
+            /** Turned Deg */
+            turned_deg: {
+                [key: string]: number;
+            };
+            /** Residual Deg */
+            residual_deg: number;
+            /** Applied Rms Dps */
+            applied_rms_dps: number;
+            /** Known Deg */
+            known_deg: number;
+            /** Extra Deg */
+            extra_deg: number;
+            /** Condition */
+            condition: number;
+            /** Jitter S */
+            jitter_s: number;
+        };
+        /**
          * NewKeyResponse
          * @description A key that was just made. This is the only time that it is shown.
          */
@@ -3605,6 +3697,18 @@ export interface components {
             timeline: components["schemas"]["TimelineColumns"];
         };
         /**
+         * PosesJson
+         * @description All of it.
+         */
+        PosesJson: {
+            rests: components["schemas"]["RestsJson"];
+            accelerometer: components["schemas"]["AccelerometerJson"];
+            moves: components["schemas"]["MovesJson"];
+            held_out: components["schemas"]["HeldOutMovesJson"];
+            /** Not Determined */
+            not_determined: string;
+        };
+        /**
          * PresetJson
          * @description A model that a fit can be asked for by name.
          */
@@ -3655,6 +3759,8 @@ export interface components {
              * @description The recording that it was fitted to.
              */
             recording: number | null;
+            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            poses: components["schemas"]["PosesJson"] | null;
             /**
              * Improved From
              * @description The version that was changed.
@@ -4017,6 +4123,31 @@ export interface components {
             columns: components["schemas"]["ResidualColumns"];
         };
         /**
+         * RestsJson
+         * @description The rests that were found, and by which threshold.
+         */
+        RestsJson: {
+            /** Count */
+            count: number;
+            /** Poses */
+            poses: number;
+            /** Used */
+            used: number;
+            /** Window S */
+            window_s: number;
+            /** Factor */
+            factor: number;
+            noise: components["schemas"]["StaticNoiseJson"];
+            /** T S */
+            t_s: number[];
+            /** Duration S */
+            duration_s: number[];
+            /** Bias Dps */
+            bias_dps: {
+                [key: string]: number[];
+            };
+        };
+        /**
          * ResumeRequest
          * @description How a campaign that is paused or was interrupted goes on.
          */
@@ -4303,6 +4434,16 @@ export interface components {
             per_step?: (number | null)[];
             /** Per Step Band */
             per_step_band?: (number | null)[];
+        };
+        /**
+         * StaticNoiseJson
+         * @description Noise of one reading at rest, by axis.
+         */
+        StaticNoiseJson: {
+            /** Accel G */
+            accel_g: number[];
+            /** Gyro Dps */
+            gyro_dps: number[];
         };
         /**
          * StaticRecordJson
@@ -4769,6 +4910,8 @@ export interface components {
              * @description The recording that it was fitted to.
              */
             recording: number | null;
+            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            poses: components["schemas"]["PosesJson"] | null;
             /** Version */
             version: number;
             /**

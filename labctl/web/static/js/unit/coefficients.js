@@ -4,6 +4,7 @@ import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number, resultTexts, unitText, idText, withUncertainty } from "../core/format.js";
 import { factList, table } from "../core/components.js";
+import { byHand } from "./by_hand.js";
 import { coefficientColumns, isSingle } from "./coefficient_table.js";
 
 /** @import { Coefficient, Version } from "../../../types/api.js" */
@@ -54,7 +55,8 @@ export function comparison(first, second) {
  * @param {Version | null} second
  */
 export function coefficients(first, second) {
-  return coefficientColumns(first).length ? overTemperature(first, second) : list(first, second);
+  if (coefficientColumns(first).length) return overTemperature(first, second);
+  return h("div", { class: "stack" }, list(first, second), byHand(first));
 }
 
 /**

@@ -11,6 +11,8 @@ import { atPlace, joined, shown, titleOf, unknown } from "./uncertainty_parts.js
 
 /** @import { AxisUncertainty, Uncertainty, Validity, Version } from "../../../types/api.js" */
 
+/** Where no thermometer was, any temperature is like another, deg C. */
+const ANY_C = 25;
 const PATH = "/api/units/{serial}/calibrations/{version}/uncertainty";
 /** @param {string} text */
 const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);

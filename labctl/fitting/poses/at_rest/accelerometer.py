@@ -14,10 +14,10 @@ from scipy.optimize import least_squares
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.at_rest.gravity import local_gravity_g
+from labctl.fitting.poses.at_rest.rests import Rests
 from labctl.fitting.poses.between import between_variance
-from labctl.fitting.poses.gravity import local_gravity_g
 from labctl.fitting.poses.readings import AXES, PoseReadings
-from labctl.fitting.poses.rests import Rests
 from labctl.fitting.poses.triad import UPPER, corrected, unit
 
 PARAMETERS = 3 + len(UPPER)
@@ -146,7 +146,7 @@ def _covariance(serial: str, jacobian: NDArray[np.float64], accel_g: NDArray[np.
     rank = np.linalg.matrix_rank(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300), tol=1e-6)
     u = np.sqrt(np.diag(covariance))
     if rank == PARAMETERS and float(u.max()) <= LARGEST_U:
-        return np.asarray(covariance)
+        return np.asarray(covariance, dtype=np.float64)
     directions = unit(accel_g)
     faces = {
         f"{sign}{a}": float((s * directions[:, i]).max())

@@ -11,8 +11,8 @@ from labctl.fitting.data.earth import EARTH_RATE_DPS, up_rate_dps
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.fitting.numeric.least_squares import Solution, solve
+from labctl.fitting.poses.at_rest.rests import Rests
 from labctl.fitting.poses.readings import PoseReadings
-from labctl.fitting.poses.rests import Rests
 from labctl.fitting.poses.triad import unit
 
 

@@ -131,8 +131,8 @@ def _require_quiet(serial: str, noise: Array) -> None:
     if accel > NOISIEST_G or gyro > NOISIEST_DPS:
         raise NotEnoughData(
             f"{serial}: nothing rests in the recording: its quietest half seconds scatter by {accel:.2g} g and "
-            f"{gyro:.2g} deg/s (at rest at most {NOISIEST_G:g} g and {NOISIEST_DPS:g} deg/s); lay the unit "
-            "down between turns for 2 s or more, in many poses"
+            f"{gyro:.2g} deg/s (at rest at most {NOISIEST_G:g} g and {NOISIEST_DPS:g} deg/s); lay the unit down "
+            "between turns for 2 s or more, in many poses"
         )
 
 

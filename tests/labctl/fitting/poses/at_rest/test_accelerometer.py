@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.poses.accelerometer import calibrate_accelerometer
-from labctl.fitting.poses.gravity import STANDARD_GRAVITY, local_gravity_g
+from labctl.fitting.poses.at_rest.accelerometer import calibrate_accelerometer
+from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY, local_gravity_g
+from labctl.fitting.poses.at_rest.rests import find_rests
 from labctl.fitting.poses.readings import readings_of
-from labctl.fitting.poses.rests import find_rests
 from labctl.fitting.poses.triad import UPPER
 from studies.poses_simulation import Session, simulate_session
 

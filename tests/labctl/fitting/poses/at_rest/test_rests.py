@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from labctl.errors import NotEnoughData
+from labctl.fitting.poses.at_rest.rests import find_rests
 from labctl.fitting.poses.readings import PoseReadings, readings_of
-from labctl.fitting.poses.rests import find_rests
 from labctl.recording import Recording
 from studies.poses_simulation import Session, simulate_session
 
