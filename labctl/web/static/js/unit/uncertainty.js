@@ -51,7 +51,7 @@ export function uncertaintyInUse(serial, signal) {
 function placeOf({ rate_dps, temperature_c }) {
   const asked = query();
   // without a thermometer, and so without limits, one temperature is like any other
-  const [cold, warm] = [temperature_c[0] ?? 25, temperature_c[1] ?? 25];
+  const [cold, warm] = [temperature_c[0] ?? ANY_C, temperature_c[1] ?? ANY_C];
   /**
    * @param {string | undefined} text
    * @param {number} otherwise
