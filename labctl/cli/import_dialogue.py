@@ -99,11 +99,13 @@ class Acceptance:
     def _decide(self) -> None:
         from labctl.errors import BadInput
 
-        choices = "--accept-map imports by it, --write-map MAP.toml writes it, to correct and give with --map MAP.toml"
+        advice = (
+            "add --accept-map to import by it, or --write-map MAP.toml to write it, and give it with --map MAP.toml"
+        )
         if self.quiet or not sys.stdin.isatty():
-            raise BadInput(f"{self.path}: this map is proposed and not yet accepted; {choices}")
+            raise BadInput(f"{self.path}: this map is proposed and not yet accepted; {advice}")
         if not typer.confirm("import by this map?", default=False, err=True):
-            stderr.print(f"nothing was imported; {choices}", style="dim")
+            stderr.print(f"nothing was imported; {advice}", style="dim")
             raise typer.Exit(1)
 
 

@@ -23,7 +23,7 @@ def read_map(path: Path) -> ColumnMap:
     except OSError as error:
         raise BadInput(f"--map {path}: {error.strerror or error}; name a file that is there") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise BadInput(f"--map {path}: not TOML: {error}") from error
+        raise BadInput(f"--map {path}: not TOML: {error}; correct the map") from error
     return parse_map(text, f"--map {path}")
 
 
@@ -32,7 +32,7 @@ def parse_map(text: str, name: str = "map") -> ColumnMap:
     try:
         document = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{name}: not TOML: {error}") from error
+        raise BadInput(f"{name}: not TOML: {error}; correct the map") from error
     return checked_map(document, name)
 
 
@@ -43,7 +43,7 @@ def checked_map(document: object, name: str = "map") -> ColumnMap:
     except ValidationError as error:
         # a misspelt key is both unknown and missing: the unknown one is what a person looks for
         each = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-        raise BadInput(f"{name}: {'; '.join(_line(found) for found in each[:5])}") from error
+        raise BadInput(f"{name}: {'; '.join(_line(found) for found in each[:5])}; correct the map") from error
 
 
 def _line(error: Any) -> str:

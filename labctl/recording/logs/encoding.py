@@ -30,8 +30,8 @@ def encoding_of(path: Path, head: bytes) -> str:
     for position, byte in enumerate(head):
         if byte < 32 and byte not in _ALLOWED:
             raise BadRecording(
-                f"{path}: byte {position + 1} is {byte:#04x}, which no text has: a binary file; no installed importer "
-                "knows it: convert it to CSV, or install the package of an importer that reads it"
+                f"{path}: byte {position + 1} is {byte:#04x}, which no text has: a binary file that no installed "
+                "importer knows; export it as CSV, or install the package of an importer that reads it"
             )
     try:
         codecs.getincrementaldecoder("utf-8-sig")().decode(head)
@@ -88,7 +88,7 @@ class TextStream:
         if "\0" in text:
             raise BadRecording(
                 f"{self.path}: a NUL byte after byte {self._taken}: binary, or a log whose end was lost at power-off; "
-                "cut it off there"
+                "remove what follows"
             )
         self._taken += len(block)
         if not self.blanks:

@@ -104,7 +104,9 @@ def _blocks(path: Path, layout: FileLayout, names: list[str]) -> tuple[list[Any]
                     refuse_too_many(path, rows, len(names))
                     blocks.append(block)
         except pa.ArrowInvalid as error:
-            raise BadRecording(f"{path}: row {rows + 1} or later: {str(error).splitlines()[0][:200]}") from error
+            raise BadRecording(
+                f"{path}: row {rows + 1} or later: {str(error).splitlines()[0][:200]}; correct it"
+            ) from error
     return blocks, ragged
 
 

@@ -108,7 +108,9 @@ def _gyro(path: Path, topic: str, data: Mapping[str, Any]) -> dict[str, Array]:
             dt_s = np.where(dt_s > 0, dt_s, np.nan)
             rates = [np.asarray(data[f"delta_angle[{index}]"], dtype=np.float64) / dt_s for index in range(3)]
     except KeyError as error:
-        raise BadRecording(f"{path}: {topic} has no field {error}; its definition is not one that PX4 wrote") from error
+        raise BadRecording(
+            f"{path}: {topic} has no field {error}; choose another topic with --option topic=NAME"
+        ) from error
     if not len(stamps):
         raise BadRecording(f"{path}: {topic} holds no reading; take another log, or another topic")
     columns = {"timestamp": stamps}

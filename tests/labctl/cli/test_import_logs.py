@@ -29,7 +29,7 @@ def test_nothing_is_kept_before_the_map_is_accepted(lab: Lab, log: Path) -> None
     refused = lab.run("import", str(log), status=2)
     assert "temperature_c" in refused.stdout
     assert "motion rest" in refused.stdout
-    assert "--accept-map imports by it" in refused.stderr
+    assert "add --accept-map to import by it" in refused.stderr
     assert not (lab.folder / "lab.sqlite").exists()
     taken = lab.run("import", str(log), "--accept-map")
     assert "recording 1 of chamber: 1 data sets, 400 readings" in taken.stdout

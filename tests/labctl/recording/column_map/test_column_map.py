@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from labctl.recording import Recording
 from labctl.recording.column_map import FileKeys, completed, map_text, parse_map, propose, recording_of
 from labctl.recording.logs.text import TextOptions, read_text
 from labctl.recording.raw_table import RawTable
+from tests.helpers.paths import ROOT
 from tests.helpers.written_logs import HEADER, at_rest, csv_text, in_poses, moved
 
 
@@ -282,3 +284,11 @@ def test_a_proposed_map_reads_back_as_it_was_written(tmp_path: Path) -> None:
     again = parse_map(map_text(proposed))
     assert again == proposed
     assert again.file == FileKeys(separator=";", decimal=",", header=1, data=2, encoding="utf-8")
+
+
+def test_the_maps_of_the_how_to_are_maps() -> None:
+    text = (ROOT / "docs" / "how-to" / "importing-logs.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert len(blocks) == 3
+    for block in blocks:
+        assert parse_map(block).serial
