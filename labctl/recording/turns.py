@@ -27,7 +27,9 @@ def check_turns(path: Path, info: RecordingInfo, columns: Columns) -> None:
     wrong = ~(u_deg >= 0)
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise BadRecording(f"{path}: column 'turn_u_deg', row {row + 1}: {u_deg[row]:g} deg; it is at least 0 deg")
+        raise BadRecording(
+            f"{path}: column 'turn_u_deg', row {row + 1}: {u_deg[row]:g} deg; give an uncertainty of at least 0 deg"
+        )
     if info.kind == "points":
         _check_means(path, info, columns)
         return
@@ -47,7 +49,7 @@ def check_turns(path: Path, info: RecordingInfo, columns: Columns) -> None:
         row = int(starts[np.argmax(short)])
         raise BadRecording(
             f"{path}: column 'turn_deg', row {row + 1}: data set {number[row]} has {int(counts[short][0])} valid "
-            f"readings; the integral over a turn takes at least {LEAST}"
+            f"readings; the integral over a turn takes at least {LEAST}: leave the data set out, or turn again"
         )
 
 
@@ -56,15 +58,16 @@ def _check_means(path: Path, info: RecordingInfo, columns: Columns) -> None:
     for name in ("n", *(f"gyro_{axis}_std" for axis in info.axes)):
         if name not in columns:
             raise BadRecording(
-                f"{path}: column {name!r} is missing; of turns it says how much better a rest is known than a turn"
+                f"{path}: column {name!r} is missing; it says how much better a rest is known than a turn: add the "
+                "column, or give the readings (kind = 'samples')"
             )
     duration_s = np.asarray(columns["duration_s"], dtype=np.float64)
     wrong = ~(duration_s > 0)
     if wrong.any():
         row = int(np.argmax(wrong))
         raise BadRecording(
-            f"{path}: column 'duration_s', row {row + 1}: {duration_s[row]:g} s; the time over which a mean was taken "
-            "is more than 0 s"
+            f"{path}: column 'duration_s', row {row + 1}: {duration_s[row]:g} s; give the time over which the mean "
+            "was taken, more than 0 s"
         )
 
 

@@ -76,7 +76,10 @@ def test_scattered_time_stamps_leave_something_in_a_mean() -> None:
     ("columns", "message"),
     [
         ({"turn_deg": np.arange(21.0)}, "'turn_deg', row 2: 1 deg in data set 1, which began with 0 deg; a data set"),
-        ({"turn_u_deg": np.full(21, -1.0)}, "'turn_u_deg', row 1: -1 deg; it is at least 0 deg"),
+        (
+            {"turn_u_deg": np.full(21, -1.0)},
+            "'turn_u_deg', row 1: -1 deg; give an uncertainty of at least 0 deg",
+        ),
         ({"turn_u_deg": np.arange(21.0)}, "'turn_u_deg', row 2: 1 deg in data set 1"),
         ({"valid": np.repeat([1, 0], [11, 10])}, "'turn_deg', row 11: data set 2 has 1 valid readings"),
     ],
@@ -90,7 +93,7 @@ def test_what_is_no_turn_is_refused(columns: dict[str, object], message: str) ->
 def test_means_of_turns_need_their_length() -> None:
     info = INFO.model_copy(update={"kind": "points"})
     columns = {"dataset": np.array([1, 2]), "turn_deg": np.array([0.0, 360.0]), "gyro_z": np.array([0.1, 72.1])}
-    with pytest.raises(BadRecording, match="'gyro_z_std' is missing; of turns it says how much better"):
+    with pytest.raises(BadRecording, match="'gyro_z_std' is missing; it says how much better"):
         checked(Path("turns.csv"), info, {**columns, "n": np.array([9, 9]), "duration_s": np.array([5.0, 5.0])})
     columns |= {"n": np.array([500, 500]), "gyro_z_std": np.array([0.1, 60.0])}
     with pytest.raises(BadRecording, match="'duration_s' is missing"):
