@@ -8,6 +8,7 @@ import sys
 STUDIES = (
     "coverage",
     "use_coverage",
+    "joint_recordings",
     "criticism",
     "crash_recovery",
     "process_kill",

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from labctl.cli.output import console, format_number, print_warnings, table
+from labctl.cli.output import console, format_number, print_joint, print_warnings, table
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
 if TYPE_CHECKING:
-    from labctl.json_types.joint import JointJson
     from labctl.json_types.models import Coefficients, Entry
     from labctl.services.schemas.calibrations import FitResponse
     from labctl.services.schemas.certification import CertificationResponse
@@ -41,19 +40,6 @@ def print_fit(answer: FitResponse) -> None:
             shown = rounded_to_uncertainty(value, u)
             rows.add_row(name, unit, shown.value + shown.power, shown.u + shown.power if shown.u else "-")
         console.print(rows)
-
-
-def print_joint(joint: JointJson | None) -> None:
-    """Print what several recordings say together, if there are several."""
-    if joint is None:
-        return
-    numbers = ", ".join(map(str, joint["recordings"]))
-    console.print(f"  recordings         {numbers}, fitted together")
-    for line in joint["held_out"]:
-        error = f"{format_number(line['rms_dps'])} deg/s RMS" if line["rms_dps"] is not None else line["why"]
-        console.print(f"  without {line['recording']:<10} {error} on it, by a fit to the others", markup=False)
-    for sentence in joint["text"]:
-        console.print(f"  {sentence}", markup=False, soft_wrap=True)
 
 
 def print_certification(answer: CertificationResponse) -> None:

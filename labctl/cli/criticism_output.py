@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import log10
 from typing import TYPE_CHECKING
 
-from labctl.cli.output import console, format_number, print_warnings, table
+from labctl.cli.output import console, format_number, print_joint, print_warnings, table
 
 if TYPE_CHECKING:
     from labctl.json_types.criticism import ResidualMap, Suspect
@@ -136,8 +136,6 @@ def _print_map(picture: ResidualMap, columns: int = 21) -> None:
 def print_improvement(answer: ImproveResponse) -> None:
     """Print what a change brought."""
     before = answer.before
-    from labctl.cli.calibration_output import print_joint
-
     print_warnings(answer.warnings)
     console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {answer.parent}: {answer.model.name}")
     print_joint(answer.joint)

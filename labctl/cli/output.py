@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from labctl.json_types.joint import JointJson
     from labctl.services.schemas.warnings import DataWarning
 
 #: Where nobody looks at a terminal, lines are not cut to its width.
@@ -52,3 +53,16 @@ def table(title: str, *columns: str, numbers: int = 0) -> Table:
 def format_number(value: float | None, digits: int = 4) -> str:
     """Write a number with `digits` significant digits, or a dash where there is none."""
     return "–" if value is None else f"{value:.{digits}g}"
+
+
+def print_joint(joint: JointJson | None) -> None:
+    """Print what several recordings say together, if there are several."""
+    if joint is None:
+        return
+    numbers = ", ".join(map(str, joint["recordings"]))
+    console.print(f"  recordings         {numbers}, fitted together")
+    for line in joint["held_out"]:
+        error = f"{format_number(line['rms_dps'])} deg/s RMS" if line["rms_dps"] is not None else line["why"]
+        console.print(f"  without {line['recording']:<10} {error} on it, by a fit to the others", markup=False)
+    for sentence in joint["text"]:
+        console.print(f"  {sentence}", markup=False, soft_wrap=True)

@@ -2187,6 +2187,13 @@ export interface components {
             /** Recording */
             recording: number;
             /**
+             * Recordings
+             * @description All recordings; `recording` is the newest.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
+            /**
              * Verdict
              * @enum {string}
              */
@@ -2391,6 +2398,30 @@ export interface components {
             version: string;
         };
         /**
+         * EffectAgreement
+         * @description Whether recordings, each fitted alone, agree on an effect: chi2 of the differences; null without freedom.
+         */
+        EffectAgreement: {
+            /** Effect */
+            effect: string;
+            /** Chi2 */
+            chi2: number;
+            /** Freedom */
+            freedom: number;
+            /** P Value */
+            p_value: number | null;
+            /** Chi2 Beside Shifts */
+            chi2_beside_shifts: number | null;
+            /** Freedom Beside Shifts */
+            freedom_beside_shifts: number | null;
+            /** P Value Beside Shifts */
+            p_value_beside_shifts: number | null;
+            /** Shift */
+            shift: string | null;
+            /** Agree */
+            agree: boolean;
+        };
+        /**
          * ErrorFigures
          * @description Input-referred errors in deg/s, one value per data set and axis, root mean square over all.
          */
@@ -2560,6 +2591,11 @@ export interface components {
              */
             recording?: number | null;
             /**
+             * Recordings
+             * @description Several recordings of the unit, fitted together; instead of `recording`.
+             */
+            recordings?: number[];
+            /**
              * Model
              * @description ojeda2000, yang2018, single_temperature, weiss1995 ...
              */
@@ -2617,6 +2653,13 @@ export interface components {
              * @description The recording that it was fitted to.
              */
             recording: number | null;
+            /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
             /**
@@ -2704,6 +2747,18 @@ export interface components {
             heard_s: number;
         };
         /**
+         * HeldOutRecording
+         * @description Errors of a fit to all other recordings on this one, applied as it is, deg/s.
+         */
+        HeldOutRecording: {
+            /** Recording */
+            recording: number;
+            /** Rms Dps */
+            rms_dps: number | null;
+            /** Why */
+            why: string;
+        };
+        /**
          * ImportResponse
          * @description A recording that is now in the database.
          */
@@ -2759,6 +2814,11 @@ export interface components {
              */
             recording?: number | null;
             /**
+             * Recordings
+             * @description Several recordings of the unit, fitted together; instead of `recording`. Default: those of a joint version.
+             */
+            recordings?: number[];
+            /**
              * Accept Warnings
              * @description Fit also what is certainly wrong, or worse than no correction; the answer still holds the warnings.
              * @default false
@@ -2806,6 +2866,13 @@ export interface components {
              * @description The recording that it was fitted to.
              */
             recording: number | null;
+            /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
              * @description The version that was changed.
@@ -2877,6 +2944,13 @@ export interface components {
              */
             recording: number | null;
             /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
+            /**
              * Improved From
              * @description The version that was changed.
              */
@@ -2918,6 +2992,28 @@ export interface components {
             due: string | null;
             /** @description The newest act on this version; null: there was none. */
             certification: components["schemas"]["CertificationResponse"] | null;
+        };
+        /**
+         * JointJson
+         * @description What several recordings say together.
+         */
+        JointJson: {
+            /** Recordings */
+            recordings: number[];
+            /** Repeatability */
+            repeatability: {
+                [key: string]: components["schemas"]["RepeatabilityJson"][];
+            };
+            /** Agreement */
+            agreement: components["schemas"]["EffectAgreement"][];
+            /** Not Compared */
+            not_compared: string;
+            /** Held Out */
+            held_out: components["schemas"]["HeldOutRecording"][];
+            /** Heldout Rms Dps */
+            heldout_rms_dps: number | null;
+            /** Text */
+            text: string[];
         };
         JsonValue: unknown;
         /**
@@ -2970,6 +3066,11 @@ export interface components {
              * @description The recording of all steps.
              */
             recording: number | null;
+            /**
+             * Recordings
+             * @description All recordings of the steps.
+             */
+            recordings: number[];
             /** Steps */
             steps: components["schemas"]["LadderRow"][];
             /**
@@ -2994,6 +3095,11 @@ export interface components {
              * @description The recording that the version was fitted to.
              */
             recording: number | null;
+            /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
             /** Model */
             model: string;
             /** Effects */
@@ -3363,6 +3469,13 @@ export interface components {
              */
             recording: number | null;
             /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
+            /**
              * Improved From
              * @description The version that was changed.
              */
@@ -3609,6 +3722,37 @@ export interface components {
             depends_on: string[];
         };
         /**
+         * RepeatabilityJson
+         * @description Standard deviation of what is different after each power-on, day or mounting, on one axis.
+         */
+        RepeatabilityJson: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "turn_on" | "day_to_day" | "mounting";
+            /** Term */
+            term: string;
+            /** Unit */
+            unit: string;
+            /** Value */
+            value: number;
+            /** U */
+            u: number;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+            /** Freedom */
+            freedom: number;
+            /** P Value */
+            p_value: number;
+            /** Seen */
+            seen: boolean;
+            /** Shifts */
+            shifts: components["schemas"]["ShiftJson"][];
+        };
+        /**
          * Repeats
          * @description How far data sets at one rate, temperature and position scatter, deg/s; `apart_s` only where times are known.
          */
@@ -3637,6 +3781,11 @@ export interface components {
          * @description One row per data set and axis, as lists of equal length. A data set far longer than the others is in pieces.
          */
         ResidualColumns: {
+            /**
+             * Recording
+             * @description Of several recordings; empty for a single one.
+             */
+            recording: number[];
             /** Dataset */
             dataset: number[];
             /** Axis */
@@ -3721,6 +3870,11 @@ export interface components {
             version: number;
             /** Recording */
             recording: number;
+            /**
+             * Recordings
+             * @description All recordings; `recording` is the newest.
+             */
+            recordings: number[];
             columns: components["schemas"]["ResidualColumns"];
         };
         /**
@@ -3886,6 +4040,22 @@ export interface components {
             confirmed_by: string;
             /** @description When the next start needs a person; null: never, or not known. */
             attendance: components["schemas"]["AttendanceResponse"] | null;
+        };
+        /**
+         * ShiftJson
+         * @description By how much one run, day or mounting is off the common coefficient.
+         */
+        ShiftJson: {
+            /** Recording */
+            recording: number;
+            /** Number */
+            number: number;
+            /** Along */
+            along: string;
+            /** Value */
+            value: number;
+            /** U */
+            u: number;
         };
         /**
          * SimulatedRecordingResponse
@@ -4475,6 +4645,13 @@ export interface components {
              * @description The recording that it was fitted to.
              */
             recording: number | null;
+            /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
             /**
@@ -5075,6 +5252,8 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
+                /** @description Several recordings of the unit as one; instead of `recording`. */
+                recordings?: number[] | null;
                 /** @description The recording may be of another unit. */
                 other_unit?: boolean;
                 /** @description Effects of your own that compete: 'name: expr'. */
@@ -5114,6 +5293,8 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
+                /** @description Several recordings of the unit as one; instead of `recording`. */
+                recordings?: number[] | null;
                 /** @description The recording may be of another unit. */
                 other_unit?: boolean;
                 /** @description Effects of your own that compete: 'name: expr'. */
@@ -5153,6 +5334,8 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
+                /** @description Several recordings of the unit as one; instead of `recording`. */
+                recordings?: number[] | null;
             };
             header?: never;
             path: {

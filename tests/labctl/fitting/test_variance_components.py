@@ -17,7 +17,9 @@ def group_fit(offsets: list[float], noise: float = 1e-4, each: int = 40):
     rng = np.random.default_rng(4)
     member = np.repeat(np.eye(groups), each, axis=0)
     y = member @ np.array(offsets) + rng.normal(0, noise, groups * each)
-    design = np.vstack([np.column_stack([np.ones(len(y)), member]), np.column_stack([np.zeros(groups), np.eye(groups)])])
+    design = np.vstack(
+        [np.column_stack([np.ones(len(y)), member]), np.column_stack([np.zeros(groups), np.eye(groups)])]
+    )
     white = np.concatenate([np.full(len(y), noise**2), np.full(groups, wide**2)])
     m = len(design)
     scatter = Scatter(np.arange(float(m)), np.arange(m), np.zeros(m), white)
