@@ -125,7 +125,8 @@ def _of_cell(cell: str, days: int, found: Sequence[Found]) -> str:
     return (
         f"{days} recordings, shifts {cell}, {len(found)} units: % within U(k=2): {inside}; "
         f"all {100 * np.mean(z < 2):.1f}; shift of bias seen {100 * seen[0]:.1f} %, of scale factor "
-        f"{100 * seen[1]:.1f} %; standard deviation inside its 95 %: {100 * covered[0]:.1f} % and {100 * covered[1]:.1f} %; a disagreement in {100 * apart:.1f} %"
+        f"{100 * seen[1]:.1f} %; standard deviation inside its 95 %: {100 * covered[0]:.1f} % and "
+        f"{100 * covered[1]:.1f} %; a disagreement in {100 * apart:.1f} %"
     )
 
 
