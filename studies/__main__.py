@@ -10,6 +10,7 @@ STUDIES = (
     "use_coverage",
     "hand_turns",
     "poses",
+    "joint_recordings",
     "criticism",
     "rest_loops",
     "rest_peers",

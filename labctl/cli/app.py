@@ -26,6 +26,7 @@ from labctl.cli.commands import (
     recordings,
     schedule,
     server,
+    trend,
 )
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import process_of_one_command
@@ -60,6 +61,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "criticise": criticism.criticise,
     "improve": criticism.improve,
     "ladder": criticism.ladder,
+    "trend": trend.trend,
     "certify": calibrations.certify,
     "revoke": calibrations.revoke,
     "certifications": calibrations.certifications,

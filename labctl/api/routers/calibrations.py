@@ -23,6 +23,7 @@ from labctl.services.criticism.comparison import compare_version
 from labctl.services.criticism.criticise import criticise_unit, residuals_unit
 from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
+from labctl.services.criticism.trend import trend_unit
 from labctl.services.criticism.verification import verify_unit
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
@@ -50,6 +51,7 @@ from labctl.services.schemas.criticism import (
     StageResponse,
     VerificationResponse,
 )
+from labctl.services.schemas.trend import TrendResponse
 from labctl.services.schemas.uncertainty import UncertaintyResponse
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
@@ -267,6 +269,22 @@ async def ladder(
     """The errors of the versions fitted to one recording, each after the version it was changed from, and the
     noise floor."""
     return await while_connected(request, service, ladder_of, serial, recording)
+
+
+@router.get("/trend", summary="A unit's calibrations over the years")
+async def trend(
+    request: Request,
+    serial: str,
+    service: ServiceDep,
+    version: Annotated[
+        int | None, Query(description="Version held against all recordings; default: the first.")
+    ] = None,
+    limit_dps: Annotated[
+        float | None, Query(gt=0, description="Limit of the bias, deg/s; default: twice the error that it states.")
+    ] = None,
+) -> TrendResponse:
+    """As found and as left by recording, drift per year with its uncertainty, and when the bias leaves the limit."""
+    return await while_connected(request, service, trend_unit, serial, version, limit_dps)
 
 
 @command_route(router, CERTIFY, "Certify a version", dependencies=[NEEDS_APPROVER])

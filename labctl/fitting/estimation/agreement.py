@@ -18,6 +18,7 @@ from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.models.error_model import ErrorModel, is_exported
 from labctl.fitting.models.fitted_model import AxisFit
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.least_squares import Solution
 from labctl.json_types.joint import EffectAgreement
 
 #: The effects that a shift between recordings adds to, by kind of shift.
@@ -50,16 +51,19 @@ def of_each_recording(data: FitData) -> dict[int, FitData]:
     return {number: data.take(of == number) for number in recordings_in(data.channels.columns)}
 
 
-def agreement_of(data: FitData, model: ErrorModel) -> tuple[list[EffectAgreement], str]:
+def agreement_of(
+    data: FitData, model: ErrorModel, together: Mapping[str, Solution]
+) -> tuple[list[EffectAgreement], str]:
     """Return how well recordings agree on each effect of the unit's model, and why not where they cannot be compared.
 
+    Each is weighted by the noise of the fit to all of them, `together`: one alone may take its drift for too small.
     The chi2 of an effect that is shifted from recording to recording is given with and without what a shift takes up.
     """
     fits: dict[int, Mapping[str, AxisFit]] = {}
     for number, alone in of_each_recording(data).items():
         try:
             require_enough_data(alone, model)
-            fits[number] = solve_axes(alone, model).fits
+            fits[number] = solve_axes(alone, model, together).fits
         except LabctlError as error:
             return [], f"recording {number} alone does not determine the model: {error}"
     ours = [term.effect for term in model.terms if is_exported(term)]

@@ -33,7 +33,7 @@ def joint_findings(data: FitData, model: ErrorModel, preset: Preset, found: Axis
     if len(recordings) < 2:
         return None
     repeatability = {axis: _repeatability(data, axis, found) for axis in data.outputs}
-    agreement, not_compared = agreement_of(data, model)
+    agreement, not_compared = agreement_of(data, model, found.solutions)
     held_out, pooled = _held_out(data, preset)
     return {
         "recordings": recordings,

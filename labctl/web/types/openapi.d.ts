@@ -524,6 +524,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/trend": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A unit's calibrations over the years
+         * @description As found and as left by recording, drift per year with its uncertainty, and when the bias leaves the limit.
+         */
+        get: operations["trend_api_units__serial__trend_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/units/{serial}/calibrations/{version}/certify": {
         parameters: {
             query?: never;
@@ -1301,6 +1321,20 @@ export interface components {
             stepper_lines: components["schemas"]["AngleLine"][];
         };
         /**
+         * AppliedVersion
+         * @description A version applied as it is to a recording.
+         */
+        AppliedVersion: {
+            /** Version */
+            version: number;
+            /** Rms Dps */
+            rms_dps: number;
+            /** Max Dps */
+            max_dps: number;
+            /** Bias Dps */
+            bias_dps: number;
+        };
+        /**
          * AssessmentResponse
          * @description What is known of a version when it is to be certified.
          */
@@ -1435,6 +1469,23 @@ export interface components {
             per_rate: number;
             /** Covariance Scale */
             covariance_scale: number | null;
+        };
+        /**
+         * AxisPoint
+         * @description What a version leaves on one axis: a line over the rate.
+         */
+        AxisPoint: {
+            /** Bias Dps */
+            bias_dps: number;
+            /** U Bias Dps */
+            u_bias_dps: number;
+            /**
+             * Scale Factor
+             * @description Left error over rate; null: there was one rate.
+             */
+            scale_factor: number | null;
+            /** U Scale Factor */
+            u_scale_factor: number | null;
         };
         /**
          * AxisUncertainty
@@ -2356,6 +2407,13 @@ export interface components {
             /** Recording */
             recording: number;
             /**
+             * Recordings
+             * @description All recordings; `recording` is the newest.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
+            /**
              * Verdict
              * @enum {string}
              */
@@ -2548,6 +2606,50 @@ export interface components {
             text: string;
         };
         /**
+         * Drift
+         * @description A straight line through the figures of the recordings; repeatability from day to day is its noise.
+         */
+        Drift: {
+            /**
+             * Axis
+             * @description x, y or z; 'all': the RMS error over all axes.
+             */
+            axis: string;
+            /**
+             * What
+             * @description bias, scale_factor or error.
+             */
+            what: string;
+            /** Unit */
+            unit: string;
+            /** Points */
+            points: number;
+            /** Per Year */
+            per_year: number;
+            /**
+             * U
+             * @description Standard uncertainty; null: it takes three recordings.
+             */
+            u: number | null;
+            /**
+             * Low
+             * @description 95 %, by Student's t, from.
+             */
+            low: number | null;
+            /** High */
+            high: number | null;
+            /**
+             * Repeatability
+             * @description Standard deviation from recording to recording.
+             */
+            repeatability: number | null;
+            /**
+             * Significant
+             * @description Whether 0 is outside the interval.
+             */
+            significant: boolean;
+        };
+        /**
          * DriverResponse
          * @description The driver of an instrument, and the distribution that it came from.
          */
@@ -2558,6 +2660,30 @@ export interface components {
             distribution: string;
             /** Version */
             version: string;
+        };
+        /**
+         * EffectAgreement
+         * @description Whether recordings, each fitted alone, agree on an effect: chi2 of the differences; null without freedom.
+         */
+        EffectAgreement: {
+            /** Effect */
+            effect: string;
+            /** Chi2 */
+            chi2: number;
+            /** Freedom */
+            freedom: number;
+            /** P Value */
+            p_value: number | null;
+            /** Chi2 Beside Shifts */
+            chi2_beside_shifts: number | null;
+            /** Freedom Beside Shifts */
+            freedom_beside_shifts: number | null;
+            /** P Value Beside Shifts */
+            p_value_beside_shifts: number | null;
+            /** Shift */
+            shift: string | null;
+            /** Agree */
+            agree: boolean;
         };
         /**
          * ErrorFigures
@@ -2734,6 +2860,11 @@ export interface components {
              */
             recording?: number | null;
             /**
+             * Recordings
+             * @description Several recordings of the unit, fitted together; instead of `recording`.
+             */
+            recordings?: number[];
+            /**
              * Model
              * @description ojeda2000, yang2018, single_temperature, weiss1995 ...
              */
@@ -2793,6 +2924,13 @@ export interface components {
             recording: number | null;
             /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
+            /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
             /**
@@ -2892,6 +3030,18 @@ export interface components {
             components: number;
         };
         /**
+         * HeldOutRecording
+         * @description Errors of a fit to all other recordings on this one, applied as it is, deg/s.
+         */
+        HeldOutRecording: {
+            /** Recording */
+            recording: number;
+            /** Rms Dps */
+            rms_dps: number | null;
+            /** Why */
+            why: string;
+        };
+        /**
          * ImportResponse
          * @description A recording that is now in the database.
          */
@@ -2947,6 +3097,11 @@ export interface components {
              */
             recording?: number | null;
             /**
+             * Recordings
+             * @description Several recordings of the unit, fitted together; instead of `recording`. Default: those of a joint version.
+             */
+            recordings?: number[];
+            /**
              * Accept Warnings
              * @description Fit also what is certainly wrong, or worse than no correction; the answer still holds the warnings.
              * @default false
@@ -2996,6 +3151,13 @@ export interface components {
             recording: number | null;
             /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
+            /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
              * @description The version that was changed.
@@ -3069,6 +3231,13 @@ export interface components {
             /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
+            /**
              * Improved From
              * @description The version that was changed.
              */
@@ -3110,6 +3279,28 @@ export interface components {
             due: string | null;
             /** @description The newest act on this version; null: there was none. */
             certification: components["schemas"]["CertificationResponse"] | null;
+        };
+        /**
+         * JointJson
+         * @description What several recordings say together.
+         */
+        JointJson: {
+            /** Recordings */
+            recordings: number[];
+            /** Repeatability */
+            repeatability: {
+                [key: string]: components["schemas"]["RepeatabilityJson"][];
+            };
+            /** Agreement */
+            agreement: components["schemas"]["EffectAgreement"][];
+            /** Not Compared */
+            not_compared: string;
+            /** Held Out */
+            held_out: components["schemas"]["HeldOutRecording"][];
+            /** Heldout Rms Dps */
+            heldout_rms_dps: number | null;
+            /** Text */
+            text: string[];
         };
         JsonValue: unknown;
         /**
@@ -3162,6 +3353,11 @@ export interface components {
              * @description The recording of all steps.
              */
             recording: number | null;
+            /**
+             * Recordings
+             * @description All recordings of the steps.
+             */
+            recordings: number[];
             /** Steps */
             steps: components["schemas"]["LadderRow"][];
             /**
@@ -3186,6 +3382,11 @@ export interface components {
              * @description The recording that the version was fitted to.
              */
             recording: number | null;
+            /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
             /** Model */
             model: string;
             /** Effects */
@@ -3203,6 +3404,20 @@ export interface components {
             heldout_rms_dps: number | null;
             /** Noise Floor Dps */
             noise_floor_dps: number | null;
+        };
+        /**
+         * Leaving
+         * @description When the bias of an axis leaves the limit; null: not within 50 years, or not known.
+         */
+        Leaving: {
+            /** Axis */
+            axis: string;
+            /** Expected */
+            expected: string | null;
+            /** Earliest */
+            earliest: string | null;
+            /** Latest */
+            latest: string | null;
         };
         /**
          * LeftOut
@@ -3762,6 +3977,13 @@ export interface components {
             /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
+            /**
              * Improved From
              * @description The version that was changed.
              */
@@ -4008,6 +4230,37 @@ export interface components {
             depends_on: string[];
         };
         /**
+         * RepeatabilityJson
+         * @description Standard deviation of what is different after each power-on, day or mounting, on one axis.
+         */
+        RepeatabilityJson: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "turn_on" | "day_to_day" | "mounting";
+            /** Term */
+            term: string;
+            /** Unit */
+            unit: string;
+            /** Value */
+            value: number;
+            /** U */
+            u: number;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+            /** Freedom */
+            freedom: number;
+            /** P Value */
+            p_value: number;
+            /** Seen */
+            seen: boolean;
+            /** Shifts */
+            shifts: components["schemas"]["ShiftJson"][];
+        };
+        /**
          * Repeats
          * @description How far data sets at one rate, temperature and position scatter, deg/s; `apart_s` only where times are known.
          */
@@ -4036,6 +4289,11 @@ export interface components {
          * @description One row per data set and axis, as lists of equal length. A data set far longer than the others is in pieces.
          */
         ResidualColumns: {
+            /**
+             * Recording
+             * @description Of several recordings; empty for a single one.
+             */
+            recording: number[];
             /** Dataset */
             dataset: number[];
             /** Axis */
@@ -4120,6 +4378,11 @@ export interface components {
             version: number;
             /** Recording */
             recording: number;
+            /**
+             * Recordings
+             * @description All recordings; `recording` is the newest.
+             */
+            recordings: number[];
             columns: components["schemas"]["ResidualColumns"];
         };
         /**
@@ -4310,6 +4573,22 @@ export interface components {
             confirmed_by: string;
             /** @description When the next start needs a person; null: never, or not known. */
             attendance: components["schemas"]["AttendanceResponse"] | null;
+        };
+        /**
+         * ShiftJson
+         * @description By how much one run, day or mounting is off the common coefficient.
+         */
+        ShiftJson: {
+            /** Recording */
+            recording: number;
+            /** Number */
+            number: number;
+            /** Along */
+            along: string;
+            /** Value */
+            value: number;
+            /** U */
+            u: number;
         };
         /**
          * SimulatedRecordingResponse
@@ -4697,6 +4976,61 @@ export interface components {
             channels: string[];
         };
         /**
+         * TrendPoint
+         * @description One recording of the unit.
+         */
+        TrendPoint: {
+            /** Recording */
+            recording: number;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** @description The newest version of before; null: there was none. */
+            as_found: components["schemas"]["AppliedVersion"] | null;
+            /** @description The newest version fitted to it; null: none was. */
+            as_left: components["schemas"]["AppliedVersion"] | null;
+            /**
+             * Rms Dps
+             * @description Error of the version that the trend is of; null: not applicable.
+             */
+            rms_dps: number | null;
+            /**
+             * Axes
+             * @description axis -> what that version leaves of bias and scale factor.
+             */
+            axes: {
+                [key: string]: components["schemas"]["AxisPoint"];
+            };
+            /**
+             * Why
+             * @description Why the version cannot be applied; empty where it can.
+             * @default
+             */
+            why: string;
+        };
+        /**
+         * TrendResponse
+         * @description A version held against all recordings of its unit, in order of time.
+         */
+        TrendResponse: {
+            /** Serial */
+            serial: string;
+            /** Version */
+            version: number;
+            /** Limit Dps */
+            limit_dps: number | null;
+            /** Points */
+            points: components["schemas"]["TrendPoint"][];
+            /** Drifts */
+            drifts: components["schemas"]["Drift"][];
+            /** Leaves */
+            leaves: components["schemas"]["Leaving"][];
+            /** Text */
+            text: string[];
+        };
+        /**
          * UncertaintyGrid
          * @description The same over what was calibrated.
          */
@@ -4912,6 +5246,13 @@ export interface components {
             recording: number | null;
             /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
+            /**
+             * Recordings
+             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             */
+            recordings: number[];
+            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
             /**
@@ -5512,6 +5853,8 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
+                /** @description Several recordings of the unit as one; instead of `recording`. */
+                recordings?: number[] | null;
                 /** @description Accept a recording of another unit. */
                 other_unit?: boolean;
                 /** @description Your own effects to include in the comparison: 'name: expr'. */
@@ -5551,6 +5894,8 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
+                /** @description Several recordings of the unit as one; instead of `recording`. */
+                recordings?: number[] | null;
                 /** @description Accept a recording of another unit. */
                 other_unit?: boolean;
                 /** @description Your own effects to include in the comparison: 'name: expr'. */
@@ -5590,6 +5935,8 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
+                /** @description Several recordings of the unit as one; instead of `recording`. */
+                recordings?: number[] | null;
             };
             header?: never;
             path: {
@@ -5823,6 +6170,42 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LadderResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    trend_api_units__serial__trend_get: {
+        parameters: {
+            query?: {
+                /** @description Version held against all recordings; default: the first. */
+                version?: number | null;
+                /** @description Limit of the bias, deg/s; default: twice the error that it states. */
+                limit_dps?: number | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TrendResponse"];
                 };
             };
             /** @description Validation Error */

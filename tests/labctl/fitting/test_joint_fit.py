@@ -134,7 +134,7 @@ def test_shifts_between_recordings_are_no_missing_effect(days: tuple[float, ...]
 
 
 def test_an_effect_hidden_in_two_recordings_has_more_evidence_than_in_one() -> None:
-    parts = recordings(10, quadratic=1.2e-8)
+    parts = recordings(11, quadratic=3e-8)
     model = fit(parts[1], None, EFFECTS).fitted.model
 
     def evidence(recording: Recording) -> float:

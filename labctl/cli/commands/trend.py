@@ -1,0 +1,56 @@
+"""`labctl trend`: a unit's calibrations over the years."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import Database, Json, Serial
+from labctl.cli.output import console, format_number, print_json, table
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.trend import AppliedVersion, TrendResponse
+
+
+def trend(
+    serial: Serial,
+    version: Annotated[
+        int | None,
+        typer.Option("--version", metavar="N", help="Version held against all recordings; default: the first."),
+    ] = None,
+    limit_dps: Annotated[
+        float | None,
+        typer.Option("--limit-dps", metavar="X", help="Limit of the bias; default: twice the error that it states."),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Show a unit over the years: as found, as left, drift per year, and when its bias leaves a limit."""
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.criticism.trend import trend_unit
+
+    with one_clear_line(), open_readonly(database) as store:
+        answer = trend_unit(store, serial, version, limit_dps)
+    if as_json:
+        print_json(answer)
+    else:
+        _print(answer)
+
+
+def _print(answer: TrendResponse) -> None:
+    console.print(f"[bold]{answer.serial}[/], version {answer.version} held against every recording, deg/s RMS")
+    rows = table("", "recording", "date", "as found", "as left", f"version {answer.version}", numbers=3)
+    for point in answer.points:
+        rows.add_row(
+            str(point.recording), f"{point.at:%Y-%m-%d}", _said(point.as_found), _said(point.as_left),
+            format_number(point.rms_dps),
+        )  # fmt: skip
+    console.print(rows)
+    for line in answer.text:
+        console.print(line, markup=False, soft_wrap=True)
+
+
+def _said(applied: AppliedVersion | None) -> str:
+    return "-" if applied is None else f"{format_number(applied.rms_dps)} (version {applied.version})"

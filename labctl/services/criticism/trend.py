@@ -1,0 +1,181 @@
+"""Trend of a unit: its versions applied as they are to its recordings, and the drift of what one of them leaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from labctl.calibration import read_calibration
+from labctl.errors import BadInput, LabctlError
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.trend_line import LEAST_POINTS, TrendLine, trend_line
+from labctl.services.cache import UNNAMED, compute
+from labctl.services.criticism.measurements import Measurements
+from labctl.services.criticism.verification import LARGEST_RATIO, applied_errors, verify
+from labctl.services.criticism.versions import version_of
+from labctl.services.schemas.trend import AppliedVersion, AxisPoint, Drift, Leaving, TrendPoint, TrendResponse
+from labctl.store import CalibrationRecord, RecordingRow, Store
+
+YEAR = timedelta(days=365.25)
+#: Data sets at less different rates than this show no scale factor.
+LEAST_RATES = 2
+
+
+def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps: float | None = None) -> TrendResponse:
+    """Return the trend of a unit by one of its versions (default: its first), over all its recordings in time.
+
+    The limit is of the bias, deg/s; default: twice the error that the version states. Raises NotFound, BadInput.
+    """
+    compute(UNNAMED)
+    rows = sorted(store.calibrations.of_unit(store.units.get(serial).serial), key=lambda row: row.version)
+    reference = version_of(store, serial, version if version is not None or not rows else rows[0].version)
+    if limit_dps is not None and not (math.isfinite(limit_dps) and limit_dps > 0):
+        raise BadInput(f"limit {limit_dps} deg/s: must be a number above 0")
+    measured = sorted(
+        (
+            row
+            for row in store.recordings.of_unit(serial)
+            if row.kind == "points" or (row.kind == "samples" and row.datasets)
+        ),
+        key=_start,
+    )
+    points = [_point(store, row, reference, rows, measured) for row in measured]
+    lines = list(_lines(points))
+    limit = limit_dps if limit_dps is not None else _stated(reference)
+    leaves = list(_leaving(lines, points, limit)) if limit else []
+    drifts = [_drift(axis, what, unit, line) for axis, what, unit, line in lines]
+    return TrendResponse(
+        serial=serial, version=reference.version, limit_dps=limit, points=points, drifts=drifts, leaves=leaves,
+        text=[*_text(drifts, len(points)), *_leaving_text(leaves, limit)],
+    )  # fmt: skip
+
+
+def _start(row: RecordingRow) -> datetime:
+    return datetime.fromisoformat(str(row.info["started_at"]))
+
+
+def _stated(row: CalibrationRecord) -> float | None:
+    error = row.answer["error"]
+    known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"]) if figure]
+    return LARGEST_RATIO * max(known) if known else None
+
+
+def _point(
+    store: Store, row: RecordingRow, reference: CalibrationRecord, versions: Sequence[CalibrationRecord],
+    measured: Sequence[RecordingRow],
+) -> TrendPoint:  # fmt: skip
+    """Return what the versions leave of one recording."""
+    data = Measurements(store, (row,))
+    at = {each.id: _start(each) for each in measured}
+    before = [v for v in versions if v.recordings and all(at[n] < at[row.id] for n in v.recordings if n in at)]
+    own = [v for v in versions if row.id in v.recordings]
+    found = TrendPoint(
+        recording=row.id, at=at[row.id], as_found=_applied(store, before[-1:], data),
+        as_left=_applied(store, own[-1:], data), rms_dps=None, axes={},
+    )  # fmt: skip
+    try:
+        errors, _ = applied_errors(read_calibration(reference.document), data.points)
+        channels = fit_data_of(data.points)
+    except LabctlError as error:
+        return found.model_copy(update={"why": str(error)})
+    axes = {axis: _left(values, channels.true_rate_dps(axis)) for axis, values in errors.items()}
+    pooled = np.concatenate(list(errors.values()))
+    return found.model_copy(update={"rms_dps": float(np.sqrt(np.mean(pooled**2))), "axes": axes})
+
+
+def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measurements) -> AppliedVersion | None:
+    if not version:
+        return None
+    try:
+        found = verify(store, version[0], data)
+    except LabctlError:
+        return None
+    return AppliedVersion(
+        version=version[0].version, rms_dps=found.rms_dps, max_dps=found.max_dps, bias_dps=found.bias_dps
+    )
+
+
+def _left(error_dps: Array, rate_dps: Array) -> AxisPoint:
+    """Return what is left of bias and scale factor on one axis: a straight line over the rate, by least squares."""
+    turned = len(np.unique(np.round(rate_dps, 3))) >= LEAST_RATES
+    columns = np.column_stack([np.ones(len(rate_dps)), rate_dps] if turned else [np.ones(len(rate_dps))])
+    found, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
+    left = error_dps - columns @ found
+    variance = float(left @ left) / max(len(left) - columns.shape[1], 1)
+    u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
+    return AxisPoint(
+        bias_dps=float(found[0]), u_bias_dps=float(u[0]),
+        scale_factor=float(found[1]) if turned else None, u_scale_factor=float(u[1]) if turned else None,
+    )  # fmt: skip
+
+
+def _lines(points: Sequence[TrendPoint]) -> Iterator[tuple[str, str, str, TrendLine]]:
+    """Yield (axis, what, unit, line over the years since the first recording)."""
+    series: dict[tuple[str, str, str], list[tuple[float, float, float]]] = {}
+    for point in points:
+        years = (point.at - points[0].at) / YEAR
+        for axis, left in point.axes.items():
+            series.setdefault((axis, "bias", "deg/s"), []).append((years, left.bias_dps, left.u_bias_dps))
+            if left.scale_factor is not None and left.u_scale_factor is not None:
+                series.setdefault((axis, "scale_factor", "1"), []).append(
+                    (years, left.scale_factor, left.u_scale_factor)
+                )
+        if point.rms_dps is not None:
+            series.setdefault(("all", "error", "deg/s"), []).append((years, point.rms_dps, 0.0))
+    for (axis, what, unit), rows in series.items():
+        time, values, u = np.array(rows).T
+        if (line := trend_line(time, values, u)) is not None:
+            yield axis, what, unit, line
+
+
+def _drift(axis: str, what: str, unit: str, line: TrendLine) -> Drift:
+    known = line.freedom > 0
+    half = line.factor * line.u_slope
+    return Drift(
+        axis=axis, what=what, unit=f"{unit}/year" if unit != "1" else "1/year", points=line.freedom + 2,
+        per_year=line.slope, u=line.u_slope if known else None,
+        low=line.slope - half if known else None, high=line.slope + half if known else None,
+        repeatability=line.repeatability, significant=known and abs(line.slope) > half,
+    )  # fmt: skip
+
+
+def _leaving(
+    lines: Sequence[tuple[str, str, str, TrendLine]], points: Sequence[TrendPoint], limit: float
+) -> Iterator[Leaving]:
+    last = (points[-1].at - points[0].at) / YEAR
+
+    def at(years: float | None) -> datetime | None:
+        return None if years is None else (points[0].at + years * YEAR).astimezone(UTC)
+
+    for axis, what, _, line in lines:
+        if what == "bias":
+            expected, earliest, latest = map(at, line.leaves(limit, last))
+            yield Leaving(axis=axis, expected=expected, earliest=earliest, latest=latest)
+
+
+def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
+    if not drifts:
+        yield f"{points} recording{'s' if points != 1 else ''} in time: a drift takes two, and its uncertainty three."
+    for each in drifts:
+        said = f"Axis {each.axis}, {each.what}" if each.axis != "all" else "RMS error over all axes"
+        if each.u is None or each.low is None or each.high is None:
+            yield f"{said}: {each.per_year:.2g} {each.unit} by two recordings; an uncertainty takes {LEAST_POINTS}."
+        else:
+            is_drift = "drifts by" if each.significant else "no drift beyond repeatability:"
+            yield f"{said}: {is_drift} {each.per_year:.2g} {each.unit} (95 %: {each.low:.2g} to {each.high:.2g})."
+
+
+def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[str]:
+    for each in leaves:
+        when: Mapping[str, str] = {
+            name: f"{value:%Y-%m-%d}" if value else "not within 50 years"
+            for name, value in (("expected", each.expected), ("earliest", each.earliest), ("latest", each.latest))
+        }
+        yield (
+            f"Axis {each.axis}: the bias leaves {limit:.3g} deg/s: expected {when['expected']}, earliest "
+            f"{when['earliest']}, latest {when['latest']}."
+        )
