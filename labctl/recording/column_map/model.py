@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, get_args
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, field_validator, model_validator
+from pydantic import (
+    AliasChoices,
+    AwareDatetime,
+    BaseModel,
+    ConfigDict,
+    Field,
+    JsonValue,
+    field_validator,
+    model_validator,
+)
 
 from labctl.recording.column_map.units import LSB, QUANTITIES, find_unit, is_lsb, names_of, unit_of_target
 from labctl.recording.columns import BY_NAME
@@ -46,7 +55,8 @@ class MappedColumn(_Strict):
     recording's column (deg/s, deg C, g), `offset` in words, `at_zero` in that unit.
     """
 
-    source: str | int = Field(alias="from")  #: name in the file, or its number from 1
+    #: Name in the file, or its number from 1.
+    source: str | int = Field(validation_alias=AliasChoices("from", "source"), serialization_alias="from")
     unit: str = ""
     scale: float | None = None
     offset: float = 0.0

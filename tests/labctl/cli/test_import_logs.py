@@ -8,7 +8,7 @@ import pytest
 
 from labctl.cli import import_dialogue
 from tests.helpers.lab import Lab
-from tests.helpers.written_logs import at_rest, csv_text, moved, resting_ulog
+from tests.helpers.written_logs import at_rest, csv_text, in_poses, moved, resting_ulog
 
 NAMES = "time (s),gyro_x,gyro_y,gyro_z,temperature (degC)"
 
@@ -114,3 +114,11 @@ def test_a_map_for_a_folder_in_the_interchange_format_is_refused(lab: Lab, log: 
     file.write_text("", encoding="utf-8")
     refused = lab.run("import", str(EXAMPLES / "osu-fog"), "--map", str(file), status=2)
     assert "leave the map out" in refused.stderr
+
+
+def test_a_log_of_poses_is_kept_without_warnings_about_rates(lab: Lab, tmp_path: Path) -> None:
+    log = tmp_path / "poses.csv"
+    header = "time (s),wx (deg/s),wy (deg/s),wz (deg/s),ax (m/s2),ay (m/s2),az (m/s2)"
+    log.write_text(csv_text(in_poses(), header), encoding="utf-8")
+    answer = lab.json("import", str(log), "--accept-map")
+    assert (answer["datasets"], answer["readings"], answer["warnings"]) == (1, 3600, [])
