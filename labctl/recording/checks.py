@@ -162,11 +162,7 @@ def _defaults(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> di
     n = len(columns["dataset"])
     if info.motion == "rest":
         columns.setdefault("table_rate_dps", np.zeros(n))
-        if "position" not in columns and len(info.axes) > 1 and info.latitude_deg is not None:
-            raise BadRecording(
-                f"{path}: column 'position' is missing, and latitude_deg = {info.latitude_deg:g} is given: which body "
-                "axis points up says which output the Earth turns; add the column, or leave latitude_deg out"
-            )
+        _refuse_unknown_up(path, info, columns)
     if info.motion == "turns":
         columns["table_rate_dps"] = mean_rate_dps(info, columns)
     if "position" not in columns:
@@ -179,6 +175,14 @@ def _defaults(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> di
     if "power_s" not in columns and info.power_on_s is not None and "t_s" in columns and (columns["run"] == 1).all():
         columns["power_s"] = np.asarray(columns["t_s"], dtype=np.float64) - info.power_on_s
     return columns
+
+
+def _refuse_unknown_up(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> None:
+    if "position" not in columns and len(info.axes) > 1 and info.latitude_deg is not None:
+        raise BadRecording(
+            f"{path}: column 'position' is missing, and latitude_deg = {info.latitude_deg:g} is given: which body "
+            "axis points up says which output the Earth turns; add the column, or leave latitude_deg out"
+        )
 
 
 def _positions(path: Path, position: Column) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.joined import recordings_in
-from labctl.fitting.data.shifts import KINDS, shifts_of
+from labctl.fitting.data.shifts import KINDS, ShiftKind, shifts_of
 from labctl.fitting.estimation.agreement import agreement_of, of_each_recording
 from labctl.fitting.estimation.axis_solutions import AxisSolutions, fit_turning, residuals, solve_axes
 from labctl.fitting.estimation.error_metrics import rms
@@ -52,7 +52,8 @@ def _repeatability(data: FitData, axis: str, found: AxisSolutions) -> list[Repea
     begin = len(solution.values) - len(shifts)
     u = np.sqrt(np.maximum(np.diag(solution.covariance)[begin:], 0.0))
     lines: list[RepeatabilityJson] = []
-    for kind, component in zip(sorted({shift.kind for shift in shifts}), solution.components, strict=True):
+    present: set[ShiftKind] = {shift.kind for shift in shifts}
+    for kind, component in zip(sorted(present), solution.components, strict=True):
         own: list[ShiftJson] = [
             {
                 "recording": shift.recording, "number": shift.number, "along": shift.along,

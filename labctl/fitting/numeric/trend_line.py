@@ -88,7 +88,7 @@ def _weighted(time: Array, values: Array, variance: Array) -> tuple[float, float
     """Return value at 0, slope, their covariance and chi2."""
     root = 1.0 / np.sqrt(variance)
     columns = np.column_stack([root, root * time])
-    covariance = np.asarray(np.linalg.pinv(columns.T @ columns))
+    covariance: NDArray[np.float64] = np.asarray(np.linalg.pinv(columns.T @ columns), dtype=np.float64)
     found = covariance @ (columns.T @ (root * values))
     left = root * values - columns @ found
     return float(found[0]), float(found[1]), covariance, float(left @ left)

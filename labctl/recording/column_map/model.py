@@ -65,6 +65,11 @@ class MappedColumn(_Strict):
     signed_bits: Bits | None = None  #: words without sign stand for signed ones of so many bits
     wrap_bits: Bits | None = None  #: a counter that begins again at 0 after so many bits
 
+    @classmethod
+    def of(cls, source: str | int, unit: str = "", scale: float | None = None) -> MappedColumn:
+        """Return a column by its name in the file. Raises ValidationError."""
+        return cls.model_validate({"from": source, "unit": unit, "scale": scale})
+
     @model_validator(mode="after")
     def _scale_with_lsb(self) -> MappedColumn:
         if self.scale == 0:
@@ -155,7 +160,7 @@ class ColumnMap(_Strict):
                 "temperature": "c",
             }.get(quantity, "")
             MappedColumn.model_validate({"from": 1, **keys.model_dump(exclude_unset=True)})
-            _check_unit(example, MappedColumn(source=1, unit=keys.unit, scale=keys.scale))
+            _check_unit(example, MappedColumn.of(1, keys.unit, keys.scale))
         return self
 
     @model_validator(mode="after")

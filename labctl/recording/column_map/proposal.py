@@ -35,7 +35,7 @@ class Proposal:
 def propose(table: RawTable, serial: str | None = None) -> Proposal:
     """Return a map of a log, as far as the file shows it; what it cannot show stays open and is a problem later."""
     guesses: list[str] = []
-    columns = {target: MappedColumn(source=name) for name, target in table.targets.items() if name in table.columns}
+    columns = {target: MappedColumn.of(name) for name, target in table.targets.items() if name in table.columns}
     if not columns:
         columns = _by_names(table, guesses)
     found = {target: table.columns[str(mapped.source)] for target, mapped in columns.items()}
@@ -92,9 +92,9 @@ def _with_unit(name: str, target: str, unit: str, column: RawColumn, guesses: li
     """Return the mapped column; None for one that is of no use without a unit that is known."""
     quantity = unit_of_target(target)
     if target == "t_s" and column.is_text:
-        return MappedColumn(source=name, unit="date-time") if _dates(column) else None
+        return MappedColumn.of(name, "date-time") if _dates(column) else None
     if column.is_text:
-        return MappedColumn(source=name) if target == "position" else None
+        return MappedColumn.of(name) if target == "position" else None
     why = ""
     if target == "t_s":
         guessed, why = time_unit(column.values)
@@ -108,7 +108,7 @@ def _with_unit(name: str, target: str, unit: str, column: RawColumn, guesses: li
         guesses.append(f"column {name!r}: unit taken for {unit} ({why})")
     if quantity in {"deg C", "V", "microtesla", "deg"} and (not unit or is_lsb(unit)):
         return None  # nothing needs it so much that its unit is asked for
-    return MappedColumn(source=name, unit="" if is_lsb(unit) else unit)
+    return MappedColumn.of(name, "" if is_lsb(unit) else unit)
 
 
 def _has_unit(target: str, mapped: MappedColumn) -> bool:
