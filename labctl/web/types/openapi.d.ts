@@ -516,6 +516,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/trend": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A unit's calibrations over the years
+         * @description As found and as left by recording, drift per year with its uncertainty, and when the bias leaves the limit.
+         */
+        get: operations["trend_api_units__serial__trend_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/units/{serial}/calibrations/{version}/certify": {
         parameters: {
             query?: never;
@@ -1186,6 +1206,20 @@ export interface components {
             stepper_lines: components["schemas"]["AngleLine"][];
         };
         /**
+         * AppliedVersion
+         * @description A version applied as it is to a recording.
+         */
+        AppliedVersion: {
+            /** Version */
+            version: number;
+            /** Rms Dps */
+            rms_dps: number;
+            /** Max Dps */
+            max_dps: number;
+            /** Bias Dps */
+            bias_dps: number;
+        };
+        /**
          * AssessmentResponse
          * @description What is known of a version when it is to be certified.
          */
@@ -1320,6 +1354,23 @@ export interface components {
             per_rate: number;
             /** Covariance Scale */
             covariance_scale: number | null;
+        };
+        /**
+         * AxisPoint
+         * @description What a version leaves on one axis: a line over the rate.
+         */
+        AxisPoint: {
+            /** Bias Dps */
+            bias_dps: number;
+            /** U Bias Dps */
+            u_bias_dps: number;
+            /**
+             * Scale Factor
+             * @description Left error over rate; null: there was one rate.
+             */
+            scale_factor: number | null;
+            /** U Scale Factor */
+            u_scale_factor: number | null;
         };
         /**
          * AxisUncertainty
@@ -2386,6 +2437,50 @@ export interface components {
             text: string;
         };
         /**
+         * Drift
+         * @description A straight line through the figures of the recordings; repeatability from day to day is its noise.
+         */
+        Drift: {
+            /**
+             * Axis
+             * @description x, y or z; 'all': the RMS error over all axes.
+             */
+            axis: string;
+            /**
+             * What
+             * @description bias, scale_factor or error.
+             */
+            what: string;
+            /** Unit */
+            unit: string;
+            /** Points */
+            points: number;
+            /** Per Year */
+            per_year: number;
+            /**
+             * U
+             * @description Standard uncertainty; null: it takes three recordings.
+             */
+            u: number | null;
+            /**
+             * Low
+             * @description 95 %, by Student's t, from.
+             */
+            low: number | null;
+            /** High */
+            high: number | null;
+            /**
+             * Repeatability
+             * @description Standard deviation from recording to recording.
+             */
+            repeatability: number | null;
+            /**
+             * Significant
+             * @description Whether 0 is outside the interval.
+             */
+            significant: boolean;
+        };
+        /**
          * DriverResponse
          * @description The driver of an instrument, and the distribution that it came from.
          */
@@ -3117,6 +3212,20 @@ export interface components {
             heldout_rms_dps: number | null;
             /** Noise Floor Dps */
             noise_floor_dps: number | null;
+        };
+        /**
+         * Leaving
+         * @description When the bias of an axis leaves the limit; null: not within 50 years, or not known.
+         */
+        Leaving: {
+            /** Axis */
+            axis: string;
+            /** Expected */
+            expected: string | null;
+            /** Earliest */
+            earliest: string | null;
+            /** Latest */
+            latest: string | null;
         };
         /**
          * LeftOut
@@ -4433,6 +4542,61 @@ export interface components {
             channels: string[];
         };
         /**
+         * TrendPoint
+         * @description One recording of the unit.
+         */
+        TrendPoint: {
+            /** Recording */
+            recording: number;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** @description The newest version of before; null: there was none. */
+            as_found: components["schemas"]["AppliedVersion"] | null;
+            /** @description The newest version fitted to it; null: none was. */
+            as_left: components["schemas"]["AppliedVersion"] | null;
+            /**
+             * Rms Dps
+             * @description Error of the version that the trend is of; null: not applicable.
+             */
+            rms_dps: number | null;
+            /**
+             * Axes
+             * @description axis -> what that version leaves of bias and scale factor.
+             */
+            axes: {
+                [key: string]: components["schemas"]["AxisPoint"];
+            };
+            /**
+             * Why
+             * @description Why the version cannot be applied; empty where it can.
+             * @default
+             */
+            why: string;
+        };
+        /**
+         * TrendResponse
+         * @description A version held against all recordings of its unit, in order of time.
+         */
+        TrendResponse: {
+            /** Serial */
+            serial: string;
+            /** Version */
+            version: number;
+            /** Limit Dps */
+            limit_dps: number | null;
+            /** Points */
+            points: components["schemas"]["TrendPoint"][];
+            /** Drifts */
+            drifts: components["schemas"]["Drift"][];
+            /** Leaves */
+            leaves: components["schemas"]["Leaving"][];
+            /** Text */
+            text: string[];
+        };
+        /**
          * UncertaintyGrid
          * @description The same over what was calibrated.
          */
@@ -5569,6 +5733,42 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LadderResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    trend_api_units__serial__trend_get: {
+        parameters: {
+            query?: {
+                /** @description Version held against all recordings; default: the first. */
+                version?: number | null;
+                /** @description Limit of the bias, deg/s; default: twice the error that it states. */
+                limit_dps?: number | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TrendResponse"];
                 };
             };
             /** @description Validation Error */
