@@ -174,8 +174,8 @@ class Calibrations:
                 fitted_to.setdefault(number, []).append(recording)
         return [
             CalibrationRecord(
-                row.serial, row.version, row.parent, row.recording_id, row.model, row.created_at, row.hash, row.document,
-                row.answer, tuple(fitted_to.get(row.id, ())),
+                row.serial, row.version, row.parent, row.recording_id, row.model, row.created_at, row.hash,
+                row.document, row.answer, tuple(fitted_to.get(row.id, ())),
             )
             for row in rows
         ]  # fmt: skip
