@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal
 
@@ -174,7 +174,13 @@ class Calibrations:
             rows = connection.execute(query.order_by(c.version.desc())).all()
             for number, recording in connection.execute(of.where(*conditions).order_by(r.recording_id)):
                 fitted_to.setdefault(number, []).append(recording)
-        return [replace(CalibrationRecord(*row[1:]), recordings=tuple(fitted_to.get(row.id, ()))) for row in rows]
+        return [
+            CalibrationRecord(
+                row.serial, row.version, row.parent, row.recording_id, row.model, row.created_at, row.hash,
+                row.document, row.answer, tuple(fitted_to.get(row.id, ())),
+            )
+            for row in rows
+        ]  # fmt: skip
 
     def certified_version(self, serial: str) -> int:
         """Return the version in force; raises NotCertified."""
