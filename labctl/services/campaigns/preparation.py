@@ -55,13 +55,14 @@ def operator_of(bench: Bench) -> Operator:
     )
 
 
-def refuse_profiles(recipe: Recipe) -> None:
-    """Raise BadInput for a recipe with courses of the rate, which no driver runs."""
+def _runnable(recipe: Recipe) -> Recipe:
+    """Return a recipe; raises BadInput for one with courses of the rate, which no driver runs."""
     if recipe.profiles:
         raise BadInput(
             f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can be simulated only (`labctl simulate`): "
             "no driver runs a table along a course of rates; leave them out"
         )
+    return recipe
 
 
 def refuse_unconfirmed(store: Store, bench: str) -> None:
@@ -125,8 +126,7 @@ def prepare(
     """
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
-    recipe = load_recipe(recipe_source)
-    refuse_profiles(recipe)
+    recipe = _runnable(load_recipe(recipe_source))
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:
