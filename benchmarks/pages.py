@@ -93,7 +93,7 @@ def _trace(control: str, url: str, recording: int) -> dict[str, float]:
 def _pick(control: str, url: str) -> dict[str, float]:
     """Press cells of the map; returns how soon the first and all pictures that show the pick are drawn again, ms."""
     with opened(control, url) as page:
-        plot = page.get_by_role("region", name="See where it fails").locator(".plot").first
+        plot = page.get_by_role("region", name="Where the model fails").locator(".plot").first
         plot.scroll_into_view_if_needed()
         page.wait_for_timeout(SETTLED_MS)
         page.evaluate(WATCH)

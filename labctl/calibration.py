@@ -171,11 +171,15 @@ def read_calibration(source: Path | bytes) -> Calibration:
         if whole != content.strip():
             json.loads(content, object_pairs_hook=_object)
     except OSError as error:
-        raise BadCalibrationFile(f"{name}: cannot be read ({error.strerror})") from error
+        raise BadCalibrationFile(f"{name}: cannot be read ({error.strerror}); check path and permissions") from error
     except RecursionError:
-        raise BadCalibrationFile(f"{name}: nested deeper than any calibration is; fetch it again") from None
+        raise BadCalibrationFile(
+            f"{name}: nested too deeply for a calibration; fetch it again with `labctl calibration`"
+        ) from None
     except ValueError as error:
-        raise BadCalibrationFile(f"{name}: not JSON, or cut short ({error}); fetch it again") from error
+        raise BadCalibrationFile(
+            f"{name}: not JSON, or truncated ({error}); fetch it again with `labctl calibration`"
+        ) from error
     written = document.get("hash")
     if found != written:
         raise BadCalibrationFile(
@@ -189,7 +193,7 @@ def _content(path: Path) -> bytes:
     with path.open("rb") as file:
         content = file.read(MOST_BYTES + 1)
     if len(content) > MOST_BYTES:
-        raise ValueError(f"larger than {MOST_BYTES} bytes, which is all that is read")
+        raise ValueError(f"larger than the limit of {MOST_BYTES} bytes; check that it is a calibration file")
     return content
 
 
@@ -205,7 +209,7 @@ def _object(pairs: list[tuple[str, object]]) -> dict[str, object]:
     if len(made) != len(pairs):
         keys = [key for key, _ in pairs]
         double = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"key {double[:80]!r} stands twice in one object, and parsers differ in which of them counts")
+        raise ValueError(f"key {double[:80]!r} is repeated in one object; remove one of the two")
     return made
 
 
@@ -217,5 +221,6 @@ def _reading(part: str) -> Iterator[None]:
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         first = str(error).partition("\n")[0][:200]
         raise BadCalibrationFile(
-            f"calibration: its {part} cannot be read ({type(error).__name__}: {first}); labctl did not write it so"
+            f"calibration: its {part} cannot be read ({type(error).__name__}: {first}); fetch it again with `labctl "
+            "calibration`"
         ) from error

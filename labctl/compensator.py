@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 Outside = Literal["clamp", "refuse"]
 #: Beyond the calibrated temperatures by no more than this counts as inside, K: a thermometer's last digits.
 MARGIN_C = 0.5
-#: The range of rates is taken wider by this share: it was measured in true rates and is looked at in the output's.
+#: The range of rates is taken wider by this share: it was measured in true rates and is compared with output rates.
 MARGIN_SHARE = 0.02
 Correct = Callable[[Array, Array, Mapping[str, Array]], Array]
 
@@ -55,7 +55,7 @@ class Compensator:
 
     def __init__(self, calibration: Calibration, outside: Outside = "clamp") -> None:
         if outside not in {"clamp", "refuse"}:
-            raise BadInput(f"outside = {outside!r}: either 'clamp' or 'refuse'")
+            raise BadInput(f"outside = {outside!r}: give 'clamp' or 'refuse'")
         self.calibration = calibration
         self.axes = calibration.axes
         self._outside = outside
@@ -103,7 +103,10 @@ class Compensator:
         if raw.size == 0:
             return Compensated(given, np.zeros(len(raw), dtype=bool))
         if raw.shape[1] != len(self.axes):
-            raise BadInput(f"rates of {raw.shape[1]} axes given; the calibration is of {', '.join(self.axes)}")
+            raise BadInput(
+                f"rates of {raw.shape[1]} axes given; the calibration has axes {', '.join(self.axes)}; give one rate "
+                "for each"
+            )
         warm = np.asarray(temperature_c, dtype=np.float64)
         lowest, highest = (float(np.min(warm)), float(np.max(warm))) if warm.size else (self._low_c, self._high_c)
         least, most = (float(np.min(raw)), float(np.max(raw))) if raw.size else (0.0, 0.0)

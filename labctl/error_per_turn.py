@@ -26,7 +26,7 @@ def error_per_turn(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]
     if np.any(slow):
         raise BadInput(
             f"rate {float(np.asarray(rate_dps)[slow][0]):g} deg/s: the error per turn is given from {LEAST_RATE_DPS:g} "
-            "deg/s on; look at the error in deg/s instead"
+            "deg/s on; use the error in deg/s instead"
         )
     return error_dps * 360.0 / np.abs(rate_dps)
 
@@ -79,6 +79,8 @@ def static_bias(at_rest_dps: NDArray[np.float64], instability_dps: float = 0.0) 
     """
     n = len(at_rest_dps)
     if n < LEAST_READINGS or not np.all(np.isfinite(at_rest_dps)):
-        raise NotEnoughData(f"a static bias needs at least {LEAST_READINGS} finite readings at rest; {n} were given")
+        raise NotEnoughData(
+            f"a static bias needs at least {LEAST_READINGS} finite readings at rest; {n} were given, record more"
+        )
     white = float(np.std(at_rest_dps, ddof=1)) / np.sqrt(n)
     return StaticBias(float(np.mean(at_rest_dps)), float(np.hypot(white, instability_dps)), n)

@@ -7,7 +7,7 @@ LabctlError              exit 2, HTTP 400
 │   ├── DataRefused      the data are certainly wrong, or a fit makes them worse     HTTP 422
 │   ├── BadBench         in a bench file
 │   └── BadCalibrationFile   edited, truncated or of an unknown format
-├── BenchInDoubt         a service has ended and its bench is not known to be safe      exit 1
+├── BenchUnconfirmed         a service has ended and its bench is not known to be safe      exit 1
 ├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
 │   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
@@ -24,7 +24,7 @@ LabctlError              exit 2, HTTP 400
 ├── ComputationEnded     a worker process ended before its result: memory, time, a crash     HTTP 503
 └── StoreError           the database cannot be used: newer, damaged, locked         HTTP 503
     ├── DatabaseUnreachable     its server does not answer: it is restarted, or the network is cut     HTTP 503
-    └── DiskFull         nothing of the act was kept                                 HTTP 507
+    └── DiskFull         nothing was stored                                 HTTP 507
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class Stopped(LabctlError):
     slug = "stopped"
 
 
-class BenchInDoubt(LabctlError):
+class BenchUnconfirmed(LabctlError):
     """A service has ended and it is not known that its bench is in the safe state; the text says what is not."""
 
     exit_status = 1
@@ -191,13 +191,13 @@ class StoreError(LabctlError):
 
 
 class DatabaseUnreachable(StoreError):
-    """The server of the database does not answer; nothing of the act was kept, and it can be tried again."""
+    """The server of the database does not answer; nothing was stored, and it can be tried again."""
 
     slug = "database-unreachable"
 
 
 class DiskFull(StoreError):
-    """The disk is full; nothing of the act was kept."""
+    """The disk is full; nothing was stored."""
 
     status = 507
     slug = "disk-full"

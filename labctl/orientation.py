@@ -121,7 +121,9 @@ class Orientation:
         if not (np.isfinite(t_s) and np.isfinite(rate_dps)):
             raise BadInput(f"reading at {t_s} s is {rate_dps} deg/s, not a number; leave such readings out")
         if self._last is not None and t_s <= self._last[0]:
-            raise BadInput(f"reading at {t_s:g} s comes after one at {self._last[0]:g} s; times must increase")
+            raise BadInput(
+                f"reading at {t_s:g} s comes after one at {self._last[0]:g} s; pass the readings in order of time"
+            )
 
     def _judge(self, t_s: float, rate_dps: float, still: bool | None) -> None:
         near = still or abs(rate_dps - self._offset_dps) <= self._rule.near_dps
@@ -173,4 +175,4 @@ class Orientation:
 
 def _refuse_no_number(what: str, value: float) -> None:
     if not np.isfinite(value):
-        raise BadInput(f"{what} {value} is not a number")
+        raise BadInput(f"{what} {value} is not a number; correct it")

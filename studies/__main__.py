@@ -15,6 +15,7 @@ STUDIES = (
     "process_pairs",
     "faults",
     "attacks",
+    "log_size",
 )
 
 

@@ -153,7 +153,7 @@ def judge(kill: Kill, expected: Fitted, folder: Path) -> Verdict:
     database = MortalDatabase(location, world.clock.life)
     store = Store(database)
     left = store.campaigns.unfinished()
-    if not left:  # killed before the campaign was written down, or after its end was: nothing is to be taken up
+    if not left:  # killed before the campaign was written down, or after its end was: nothing is to be resumed
         done = store.campaigns.all()
         if campaign is None or not done:
             store.close()

@@ -91,7 +91,7 @@ def labctl(database: str, *arguments: str) -> subprocess.Popen[str]:
 
 
 def kill_once(folder: Path, bench: Path, after_s: float) -> Heir:
-    """Kill a campaign after so many seconds, let the next process take it up, and look at what is there then."""
+    """Kill a campaign after so many seconds, let the next process resume it, and read what is there then."""
     recipe = folder / "killed.toml"
     recipe.write_text(RECIPE)
     location = new_database(folder)

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NoReturn
 
-import serial
-
 from instruments.clock import Clock
 from instruments.errors import LinkError, NoReply, RequestRejected
 from instruments.protocols import arrick_c4_lines as lines
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
 from instruments.transport.factory import Ports
-from instruments.transport.serial import BROKEN
+from instruments.transport.serial import BROKEN, SerialPort
 
 REPLY_S = 1.0
 #: Replies of an earlier move that can arrive before the reply to the present command.
@@ -29,14 +27,14 @@ class C4Link:
         self._device, self._settings = device, settings
         self._ports, self._clock = ports, clock
         self._opened = opened
-        self._port: serial.SerialBase | None = None
+        self._port: SerialPort | None = None
 
     @property
     def is_open(self) -> bool:
         """Whether the port is open."""
         return self._port is not None
 
-    def open(self) -> serial.SerialBase:
+    def open(self) -> SerialPort:
         """Return the port, opened where it was closed; raises LinkError."""
         if self._port is None:
             settings = self._settings

@@ -132,7 +132,10 @@ class KvhGyro:
         try:
             return re.compile(pattern)
         except re.error as error:
-            raise LimitError(self.name, f"option pattern {pattern!r} is no regular expression ({error})") from error
+            raise LimitError(
+                self.name,
+                f"option pattern {pattern!r} is not a regular expression ({error}); correct it in the bench file",
+            ) from error
 
     def _discard(self) -> None:
         self._stream.discard_input()

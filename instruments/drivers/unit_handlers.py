@@ -48,6 +48,10 @@ class RemoteUnitHandler:
                 link.sendall(f"{line}\n".encode())
                 reply = link.makefile().readline().strip()
         except OSError as error:
-            raise LinkError(DEVICE, f"the simulator at {self._address} does not answer ({error})") from error
+            raise LinkError(
+                DEVICE, f"the simulator at {self._address} does not answer ({error}); start it with `labctl simulator`"
+            ) from error
         if reply != OK:
-            raise RequestRejected(DEVICE, f"the simulator answered {reply!r} to {line!r}")
+            raise RequestRejected(
+                DEVICE, f"the simulator answered {reply!r} to {line!r}; start `labctl simulator` again"
+            )

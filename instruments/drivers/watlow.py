@@ -124,7 +124,8 @@ class Watlow(ABC):
             raise LimitError(
                 self.name,
                 f"set point {temperature_c:g} deg C lies outside {limits.min_c:g} to {limits.max_c:g} deg C "
-                "(the narrower of controller and bench file); nothing was written",
+                "(the narrower of controller and bench file); nothing was written: ask for a set point within these "
+                "limits",
             )
         return rounded
 
@@ -144,7 +145,7 @@ class Watlow(ABC):
             raise RequestRejected(
                 self.name,
                 f"set point {rounded_c:g} deg C was written but {found:g} deg C read back; "
-                "the controller must show its run page",
+                "set the controller to its run page",
             )
         return found
 

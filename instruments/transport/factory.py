@@ -15,7 +15,7 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from instruments.bench_config import is_simulated_address
 from instruments.clock import Clock
 from instruments.errors import LinkError
-from instruments.transport.serial import BROKEN
+from instruments.transport.serial import BROKEN, SerialPort
 
 NOT_OPENED: tuple[type[Exception], ...] = (*BROKEN, ValueError)
 
@@ -23,7 +23,7 @@ NOT_OPENED: tuple[type[Exception], ...] = (*BROKEN, ValueError)
 class LinkFactory(Protocol):
     """Makes ports and Modbus clients of one kind, hardware or simulated. Time-outs are seconds of the bench clock."""
 
-    def serial_port(self, url: str, *, baudrate: int, timeout_s: float) -> serial.SerialBase:
+    def serial_port(self, url: str, *, baudrate: int, timeout_s: float) -> SerialPort:
         """Return an open port with 8 data bits, no parity, one stop bit; raises what pyserial raises."""
         ...
 
@@ -46,7 +46,7 @@ class HardwareLinks:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
 
-    def serial_port(self, url: str, *, baudrate: int, timeout_s: float) -> serial.SerialBase:
+    def serial_port(self, url: str, *, baudrate: int, timeout_s: float) -> SerialPort:
         """Return an open port, locked for this process; raises what pyserial raises."""
         wall_s = self._clock.wall_s(timeout_s)
         return serial.serial_for_url(url, baudrate=baudrate, timeout=wall_s, write_timeout=wall_s, exclusive=True)
@@ -72,7 +72,7 @@ class Ports:
         self._hardware = HardwareLinks(clock)
         self._simulated = simulated
 
-    def serial(self, url: str, *, device: str, baudrate: int, timeout_s: float) -> serial.SerialBase:
+    def serial(self, url: str, *, device: str, baudrate: int, timeout_s: float) -> SerialPort:
         """Open a serial port, 8 data bits, no parity, one stop bit, locked for this process.
 
         Raises LinkError with port and remedy, also while another process has the port open.
@@ -110,5 +110,9 @@ class Ports:
         if not is_simulated_address(address):
             return self._hardware
         if self._simulated is None:
-            raise LinkError(device, f"{address} is a simulated instrument, but this bench has no simulation")
+            raise LinkError(
+                device,
+                f"{address} is a simulated instrument, but this bench has no simulation; correct the address in the "
+                "bench file",
+            )
         return self._simulated

@@ -99,12 +99,13 @@ class Registers:
 
     def _check_writable(self, register: Register, value: float) -> None:
         if register.access == "r":
-            raise LimitError(self._link.device, f"{register} can only be read; nothing was sent")
+            raise LimitError(self._link.device, f"{register} can only be read; nothing was sent: correct the driver")
         if not register.holds(value):
             raise LimitError(
                 self._link.device,
-                f"{register} takes {register.low:g} to {register.high:g} {register.unit}, not {value:g}; "
-                "nothing was sent",
+                f"{register} takes {register.low:g} to {register.high:g} {register.unit}, not {value:g}; nothing was "
+                "sent: give a value within these limits"
+                "",
             )
 
     def _write(self, register: Register, words: list[int], function: WriteFunction) -> None:

@@ -1,10 +1,44 @@
-"""Exceptions that pyserial raises when the wire of an open port is gone."""
+"""The part of a serial port that the drivers use, and the exceptions of a port whose wire is gone."""
 
 from __future__ import annotations
 
 import importlib
+from typing import Protocol
 
 import serial
+
+
+class SerialPort(Protocol):
+    """An open port of pyserial, real or simulated; the type stub of pyserial declares these for single systems only."""
+
+    @property
+    def timeout(self) -> float | None:
+        """Longest wait of `read`, s; None: without end."""
+        ...
+
+    @timeout.setter
+    def timeout(self, timeout: float | None, /) -> None: ...
+
+    @property
+    def in_waiting(self) -> int:
+        """Number of bytes that can be read without waiting."""
+        ...
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Read `size` bytes, or as many as arrive before the time-out; raises an error of `BROKEN`."""
+        ...
+
+    def write(self, data: bytes, /) -> int | None:
+        """Send bytes; raises an error of `BROKEN`."""
+        ...
+
+    def reset_input_buffer(self) -> None:
+        """Drop unread bytes; raises an error of `BROKEN`."""
+        ...
+
+    def close(self) -> None:
+        """Close the port; safe to call twice."""
+        ...
 
 
 def _terminal_error() -> type[Exception]:

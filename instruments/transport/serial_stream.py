@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-import serial
-
 from instruments.clock import Clock, sleep_until
 from instruments.errors import LinkError
 from instruments.transport.factory import Ports
-from instruments.transport.serial import BROKEN
+from instruments.transport.serial import BROKEN, SerialPort
 
 #: Clock seconds that count as no time: rounding of sums of durations.
 TINY_S = 1e-9
@@ -22,7 +20,7 @@ class SerialStream:
         self._device, self._url = device, url
         self._ports, self._clock = ports, clock
         self._baudrate, self._timeout_s = baudrate, timeout_s
-        self._port: serial.SerialBase | None = None
+        self._port: SerialPort | None = None
 
     @property
     def is_open(self) -> bool:
@@ -78,9 +76,9 @@ class SerialStream:
             if self._clock.now_s() >= end_s - TINY_S:
                 return data
 
-    def _opened(self) -> serial.SerialBase:
+    def _opened(self) -> SerialPort:
         if self._port is None:
-            raise LinkError(self._device, f"the stream on {self._url} was not started")
+            raise LinkError(self._device, f"the stream on {self._url} was not started; start it first")
         return self._port
 
     def _fail(self, error: Exception) -> NoReturn:

@@ -62,7 +62,7 @@ NEEDS_APPROVER = Depends(_approver)
 DECLARES_KEY = Security(
     HTTPBearer(
         scheme_name="key",
-        description="A key that `labctl key create` made. A service on loopback without --require-keys asks for none.",
+        description="A key that `labctl key create` made. A service on loopback without --require-keys needs none.",
         auto_error=False,
     )
 )

@@ -34,12 +34,12 @@ Calibrations of gyroscopes by serial number, the campaigns that measured them, a
 
 * `GET /api/units/{serial}/calibration` is what a robot loads: the certified calibration, immutable bytes with a strong
   ETag, as JSON or in the format of a consumer.
-* `POST /api/recordings` takes data measured on any bench; `POST /api/units/{serial}/calibrations` fits it.
+* `POST /api/recordings` imports data measured on any bench; `POST /api/units/{serial}/calibrations` fits it.
 * `POST /api/campaigns` runs a recipe on this service's bench, now, at a time or on a cron line;
-  `GET /api/campaigns/{id}/events` follows it, `GET /api/schedule` says what begins when.
+  `GET /api/campaigns/{id}/events` follows it, `GET /api/schedule` lists the scheduled starts.
 
 Rates are deg/s, temperatures deg C, times s, instants UTC. Errors are problem documents (RFC 9457).
-Where keys are asked for, they travel as `Authorization: Bearer`: reading asks for a viewer's, acting for an operator's,
+Where keys are required, they are sent as `Authorization: Bearer`: reading needs a viewer's, every change an operator's,
 certifying and keys for an approver's.
 """
 

@@ -66,18 +66,20 @@ class AccessMiddleware:
         """
         reads = role_needed(scope["method"], scope["path"]) is Role.VIEWER
         if scope.get("state", {}).get(RESERVED) and reads and scope["path"] not in OPEN:
-            raise Overloaded("as many connections are open as this service answers at once; ask again in a moment")
+            raise Overloaded(
+                "the limit of connections that this service answers at once is reached; try again in a few seconds"
+            )
         uploads = bool(scope["path"] == UPLOAD and not reads)
         if uploads and self._uploads >= MOST_UPLOADS:
             raise Overloaded(
-                f"{MOST_UPLOADS} recordings are being sent already; send this one when one of them is done"
+                f"{MOST_UPLOADS} recordings are being received already; send this one when one of them is complete"
             )
         return uploads
 
     def _admit(self, scope: Scope) -> Caller | None:
         """Return the caller; None at a path that is open without a key. Raises NotIdentified, NotAllowed, BadInput."""
         if "\x00" in scope["path"] or b"%00" in scope["query_string"]:
-            raise BadInput("the address holds a NUL character; nothing here has one in its name")
+            raise BadInput("the address holds a NUL character; remove it")
         try:
             caller = self._caller(scope)
             require_role(caller, role_needed(scope["method"], scope["path"]))
@@ -92,7 +94,7 @@ class AccessMiddleware:
         if (authorization := headers.get("authorization")) is not None:
             return identify(self._service.store, authorization)
         if self._access.keys:
-            raise NotIdentified("this service asks for a key: send `Authorization: Bearer KEY`")
+            raise NotIdentified("this service requires a key: send `Authorization: Bearer KEY`")
         self._refuse_foreign(scope, headers)
         claimed = unquote(headers.get(USER_HEADER, ""))[:100]
         return Caller(claimed if claimed.isprintable() and claimed else "local", Role.APPROVER, "loopback")
@@ -108,7 +110,9 @@ class AccessMiddleware:
         host = headers.get("host", "")
         if _name_of(host) not in self._access.hosts:
             raise NotAllowed(
-                f"host {host!r}: without keys this service answers to {', '.join(sorted(self._access.hosts))}"
+                f"host {host!r} is not accepted; use an address of this list, or start the service with "
+                "--require-keys: "
+                f"{', '.join(sorted(self._access.hosts))}"
             )
         if "forwarded" in headers or "x-forwarded-for" in headers:
             raise NotAllowed("the request came through a proxy; start the service with --require-keys behind one")
@@ -116,10 +120,14 @@ class AccessMiddleware:
         if reads and not scope["path"].startswith(API):
             return
         if headers.get("sec-fetch-site", "none") not in {"none", "same-origin"}:
-            raise NotAllowed("a page of another site may neither ask nor act here; open the address itself")
+            raise NotAllowed(
+                "a page of another site may send no request here; open the address of this service in the browser"
+            )
         origin = headers.get("origin")
         if not reads and origin is not None and origin.partition("://")[2] != host:
-            raise NotAllowed(f"a page of {origin[:80]} may not act here")
+            raise NotAllowed(
+                f"a page of {origin[:80]} may change nothing here; open the address of this service in the browser"
+            )
 
 
 def _name_of(host: str) -> str:
@@ -149,7 +157,10 @@ class _BoundedBody:
 
     def __init__(self, receive: Receive, declared: int, limit: int, held: _Held | None) -> None:
         self._receive, self._limit, self._held = receive, limit, held
-        self._text = f"the request's body is larger than {limit} bytes, which is all that is taken here"
+        self._text = (
+            f"the request's body is larger than the limit of {limit} bytes; send less, or raise --max-upload-mib for "
+            "recordings"
+        )
         self._taken = 0
         if declared > limit:
             raise TooLarge(self._text)
@@ -164,7 +175,10 @@ class _BoundedBody:
         if self._taken > self._limit:
             raise HTTPException(TooLarge.status, self._text)
         if self._held is not None and size and self._held.now > self._held.limit:
-            text = f"bodies of {self._held.limit} bytes are being sent already; send this one again in a moment"
+            text = (
+                f"requests with {self._held.limit} bytes in all are being received already; send this one again in a "
+                "few seconds"
+            )
             raise HTTPException(Overloaded.status, text, {"Retry-After": str(Overloaded.retry_after_s)})
         return message
 

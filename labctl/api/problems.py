@@ -65,20 +65,20 @@ def _of_the_request(request: Request, error: RequestValidationError) -> JSONResp
 
 
 def _of_a_number(request: Request, error: OverflowError) -> JSONResponse:
-    text = f"a number is larger than anything here can be ({error})"
+    text = f"a number is out of range ({error}); send a smaller one"
     return problem(400, "bad-input", "A number is too large", text, request.url.path)
 
 
 def _of_a_text(request: Request, error: UnicodeEncodeError) -> JSONResponse:
-    text = f"a text holds half a character at place {error.start}; send whole Unicode"
-    return problem(400, "bad-input", "A text is not whole", text, request.url.path)
+    text = f"a text has an incomplete character at position {error.start}; send valid Unicode"
+    return problem(400, "bad-input", "A text is not valid Unicode", text, request.url.path)
 
 
 def _of_the_system(request: Request, error: OSError) -> JSONResponse:
     if error.errno not in {errno.ENOSPC, errno.EDQUOT}:
         raise error
     place = error.filename or f"the folder for temporary files, {tempfile.gettempdir()}"
-    text = f"{place}: the disk is full; nothing of this act was kept. Make room, then send it again"
+    text = f"{place}: the disk is full; nothing was stored. Free disk space, then send it again"
     return as_problem(DiskFull(text), request.url.path)
 
 
@@ -88,7 +88,10 @@ def _of_http(request: Request, error: HTTPException) -> JSONResponse:
     if error.status_code == TooLarge.status or too_many:
         return as_problem(TooLarge(text), request.url.path)
     if error.status_code == 400 and text == UNREADABLE:
-        nested = "the request's body cannot be read as JSON: nested too deeply, or a number of too many digits"
+        nested = (
+            "the request's body cannot be read as JSON: it is nested too deeply, or a number has too many digits; "
+            "correct it and send it again"
+        )
         return problem(400, "bad-input", "The body cannot be read", nested, request.url.path)
     answer = problem(error.status_code, f"http-{error.status_code}", text, text, request.url.path)
     answer.headers.update(error.headers or {})

@@ -36,7 +36,7 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
-    help="Calibrate gyroscopes: run the bench, fit, hold the model against the measurements, serve the calibration.",
+    help="Calibrate gyroscopes: run the bench, fit a model, compare it with the measurements, serve the calibration.",
 )
 app.add_typer(bench.app, name="bench")
 app.add_typer(campaign.app, name="campaign")

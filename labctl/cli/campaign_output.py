@@ -31,7 +31,7 @@ def print_plan(answer: PlanResponse) -> None:
         if line.visible:
             rows.add_row(line.effect, format_number(line.share, 2), format_number(line.smallest_size, 2), line.unit)
     console.print(rows)
-    hidden = table("\nand what not", "effect", "because of", "what would show it")
+    hidden = table("\nand what not", "effect", "because of", "experiment that would detect it")
     for line in answer.visibility:
         if not line.visible:
             why = f"no channel {', '.join(line.needs)}" if line.why == "channel" else "the schedule"
@@ -88,11 +88,11 @@ def print_campaign(answer: CampaignResponse) -> None:
     if answer.prompt is not None:
         console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow", markup=False)
     if answer.wish is not None:
-        console.print(f"  {answer.wish} was asked for and follows", style="yellow", markup=False)
+        console.print(f"  {answer.wish} was requested and will be carried out", style="yellow", markup=False)
     for device, state in answer.links.items():
         console.print(f"  {device}: link {state}", style="red", markup=False)
     for unit, why in answer.dropped.items():
-        console.print(f"  {unit} takes no further part: {why}", style="red", markup=False)
+        console.print(f"  {unit} is excluded from the rest of the campaign: {why}", style="red", markup=False)
     if answer.last_error:
         console.print(f"  last fault: {answer.last_error}", style="red", markup=False)
     if answer.unrecorded:
@@ -109,7 +109,7 @@ def _print_advice(answer: CampaignResponse) -> None:
         console.print(f"  what labctl did: {answer.advice.done}", markup=False, soft_wrap=True)
         console.print(f"  what to do next: {answer.advice.next}", markup=False, soft_wrap=True)
     if answer.state in STOPPED_EARLY and answer.resume_reason:
-        word = "resume with care" if answer.resumable else "not resumable"
+        word = "resume only after you have checked this" if answer.resumable else "not resumable"
         console.print(f"  {word}: {answer.resume_reason}", style="yellow", markup=False, soft_wrap=True)
 
 
@@ -117,7 +117,7 @@ def print_start(answer: ScheduledResponse) -> None:
     """Print one entry of the schedule."""
     console.print(f"start {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]")
     if answer.due_at is not None:
-        again = f", again by cron line {answer.cron!r}" if answer.cron else ""
+        again = f", repeated by cron line {answer.cron!r}" if answer.cron else ""
         console.print(f"  begins {answer.due_at:%Y-%m-%d %H:%M %z} ({answer.time_zone}){again}", markup=False)
     if answer.confirmed_by:
         console.print(f"  {answer.confirmed_by} confirmed that the bench will be clear", markup=False)

@@ -47,8 +47,9 @@ def print_criticism(answer: CriticismResponse) -> None:
         console.print(line, style="bold" if line is answer.text[0] else None, markup=False, soft_wrap=whole)
     error = answer.error
     console.print(
-        f"{answer.serial} version {answer.version}, recording {answer.recording}: "
-        f"left {format_number(error['rms_dps'])} deg/s, "
+        f"{answer.serial} version {answer.version}, recording {answer.recording}: residual "
+        f"{format_number(error['rms_dps'])} deg/s RMS,"
+        f" "
         f"held-out {format_number(error['heldout_rms_dps'])}, noise floor {format_number(error['noise_floor_dps'])}",
         style="dim",
     )
@@ -87,19 +88,19 @@ def _not_testable(answer: CriticismResponse) -> list[str]:
     for line in answer.not_testable:
         if line["why"] == "channel":
             lacking.setdefault(", ".join(line["needs"]), []).append(line["effect"])
-    said = [f"this schedule cannot say anything about: {', '.join(hidden)}"] if hidden else []
+    said = [f"this schedule cannot test: {', '.join(hidden)}"] if hidden else []
     return said + [f"not recorded: {channel}, which would show {', '.join(each)}" for channel, each in lacking.items()]
 
 
 def _print_static(static: StaticRecordJson) -> None:
-    """Print what the longest stretch at rest shows."""
+    """Print what the longest section at rest shows."""
     for axis, noise in static["axes"].items():
         figures = (("N", noise["N"]), ("B", noise["B"]), ("K", noise["K"]))
         shown = [(letter, figure) for letter, figure in figures if figure["value"] is not None]
         said = ", ".join(
             f"{letter} {format_number(f['value'], 3)} +- {format_number(f['u'], 2)} {f['unit']}" for letter, f in shown
         )
-        instead = "; B stands for the data sheet" if noise["replaces_datasheet"] else ""
+        instead = "; B is that of the data sheet" if noise["replaces_datasheet"] else ""
         text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {said or 'no slope shows'}{instead}"
         console.print(text, style="dim", markup=False)
 
@@ -145,11 +146,14 @@ def print_improvement(answer: ImproveResponse) -> None:
     for effect_id, span in answer.plausible.items():
         if not span["inside"]:
             console.print(
-                f"  {effect_id}: larger than is usual ({span['from']:g} to {span['to']:g}); look again at its rivals",
+                f"  {effect_id}: larger than is usual ({span['from']:g} to {span['to']:g}); compare it again with "
+                "the effects that explain the same",
                 style="yellow",
             )
     for left in answer.left_out:
-        console.print(f"  {left['effect']} stays on the bench ({left['origin']}); a calibration file leaves it out")
+        console.print(
+            f"  {left['effect']} not part of a calibration ({left['origin']}); a calibration file leaves it out"
+        )
     console.print(f"next: labctl criticise {answer.serial}", style="dim")
 
 
@@ -187,5 +191,7 @@ def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:
         error = (
             "cannot be applied" if other.applied_rms_dps is None else f"{format_number(other.applied_rms_dps)} deg/s"
         )
-        lines.append(f"    version {other.version} of recording {other.recording}, applied here as it is: {error}")
+        lines.append(
+            f"    version {other.version} of recording {other.recording}, applied here without refitting: {error}"
+        )
     return lines

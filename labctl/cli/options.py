@@ -9,12 +9,18 @@ import typer
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, and nothing else.")]
 Database = Annotated[
     str | None,
-    typer.Option("--database", metavar="URL_OR_PATH", help="The database; default $LABCTL_DATABASE or the user's own."),
+    typer.Option(
+        "--database",
+        metavar="URL_OR_PATH",
+        help="The database; default: $LABCTL_DATABASE, else the one in the user's data folder.",
+    ),
 ]
 Serial = Annotated[str, typer.Argument(metavar="SERIAL", help="Serial number of the unit.")]
 AcceptWarnings = Annotated[
     bool,
-    typer.Option("--accept-warnings", help="Fit also data that are certainly wrong, or what is worse than no fit."),
+    typer.Option(
+        "--accept-warnings", help="Fit data that are certainly wrong, and keep a fit that is worse than none."
+    ),
 ]
 BenchName = Annotated[
     str | None,

@@ -52,7 +52,7 @@ class TerminalOperator:
     def _put(operator: HumanOperator, prompt: Prompt, note: Callable[[str], None]) -> None:
         if sys.stdin.isatty():  # an Enter from before the question is no answer to it
             termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
-        stderr.print(f"{prompt.text}. Press Enter when it is done, or type why it cannot be.", markup=False)
+        stderr.print(f"{prompt.text}. Press Enter when it is done, or type why it cannot be done.", markup=False)
         line = sys.stdin.readline()
         if not line:  # nobody sits there
             return

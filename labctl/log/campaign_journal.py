@@ -90,7 +90,7 @@ class LoggedJournal:
             self._journal.session_began(run, t_s)
 
     def unit_dropped(self, gyro: str, reason: str) -> None:
-        """Record and log that a unit takes no further part."""
+        """Record and log that a unit is excluded from the rest of the campaign."""
         with self._entry("unit.dropped", "error", **self._unit(gyro), reason=reason):
             self._journal.unit_dropped(gyro, reason)
 

@@ -11,6 +11,7 @@ import structlog
 from structlog.typing import Processor
 
 from labctl.log.redaction import Redaction
+from labctl.log.sentences import sentence
 
 Fields = MutableMapping[str, Any]
 #: In this order at the beginning of a line.
@@ -23,12 +24,18 @@ _CONTROLS = {
 
 
 class Rendering:
-    """The last of structlog's processors, for labctl's own records and those of other libraries. Raises nothing."""
+    """The last of structlog's processors, for labctl's own records and those of other libraries.
 
-    def __init__(self, process: str, redaction: Redaction, *, for_a_person: bool, colors: bool = False) -> None:
+    Where `brief`, a person gets sentences, and structlog.DropEvent is raised for a record that has none; else it raises
+    nothing.
+    """
+
+    def __init__(
+        self, process: str, redaction: Redaction, *, for_a_person: bool, brief: bool = False, colors: bool = False
+    ) -> None:
         self._process = {"process": process, "pid": os.getpid()}
         self._redaction = redaction
-        self._for_a_person = for_a_person
+        self._for_a_person, self._brief = for_a_person, for_a_person and brief
         self._time = structlog.processors.TimeStamper(fmt="iso", utc=not for_a_person)
         self._last: Processor = structlog.processors.JSONRenderer()
         if for_a_person:
@@ -40,7 +47,9 @@ class Rendering:
         """Return the line of a record."""
         try:
             return self._line(logger, method, fields)
-        except Exception as error:  # noqa: BLE001  a record that cannot be written must stop nobody
+        except structlog.DropEvent:
+            raise
+        except Exception as error:  # noqa: BLE001  a record that cannot be written must stop no caller
             text = f"{type(error).__name__} in a record of {fields.get('event')!r:.100}"
             return str(self._last(logger, "error", {"event": "log.unreadable", "level": "error", "error": text}))
 
@@ -56,7 +65,13 @@ class Rendering:
             found["level"] = "warning"
         clean = self._redaction.fields(found)
         ordered = {name: clean.pop(name) for name in FIRST if name in clean} | clean
-        return str(self._last(logger, method, self._shown(ordered) if self._for_a_person else ordered))
+        if not self._for_a_person:
+            return str(self._last(logger, method, ordered))
+        shown = self._shown(ordered)
+        text = sentence(shown) if self._brief else None
+        if text == "":
+            raise structlog.DropEvent
+        return str(self._last(logger, method, shown)) if text is None else f"{shown['timestamp']} {text}"
 
     def _shown(self, fields: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields for a terminal: the time of day alone, and nothing that it obeys."""

@@ -16,7 +16,7 @@ from structlog.stdlib import ExtraAdder, ProcessorFormatter, add_logger_name
 from labctl.log.redaction import Redaction, secrets_of
 from labctl.log.rendering import Rendering
 from labctl.log.repetition import MOST_FOREIGN, ForeignRecordLimit, RepetitionLimit
-from labctl.log.settings import is_read_by_a_person
+from labctl.log.settings import is_read_by_a_person, level_asked
 from labctl.log.silence import be_silent
 from labctl.log.uncaught import uncaught_errors_logged
 from labctl.log.writer import LogWriter
@@ -65,7 +65,9 @@ class _ForeignRecords(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         try:
             self._writer.put(self.format(record))
-        except Exception:  # noqa: BLE001  a record that cannot be written must stop nobody
+        except structlog.DropEvent:
+            pass
+        except Exception:  # noqa: BLE001  a record that cannot be written must stop no caller
             self._writer.lost += 1
 
 
@@ -119,7 +121,8 @@ def _log_to(output: int | None, process: str, level: int, locations: Iterable[st
     by_person = output is not None and is_read_by_a_person(output)
     colors = by_person and not os.environ.get("NO_COLOR")
     redaction = Redaction(secrets_of(locations=locations))
-    rendering = Rendering(process, redaction, for_a_person=by_person, colors=colors)
+    brief = level_asked() is None
+    rendering = Rendering(process, redaction, for_a_person=by_person, brief=brief, colors=colors)
     limit = RepetitionLimit(MOST_FOREIGN)
 
     def notes(lost: int) -> Iterator[str]:

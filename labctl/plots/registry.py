@@ -37,26 +37,31 @@ class _Kind(Generic[AnswerT]):
 KINDS = (
     _Kind(
         "map", "Where the model fails, in rate and temperature",
-        "Each cell is the mean residual of its data sets over the noise floor, and every measured cell is drawn; red "
-        "is too much, blue too little, the same scale in all maps. Data sets share a cell where rate and temperature "
-        "repeat within 0.1 % and 0.25 K. Dimmed cells are less than two floors from zero: by themselves they mean "
-        "nothing. A "
+        "Each cell is the mean residual of its data sets over the noise floor, and every measured cell is drawn; "
+        "red: measured error above the model, blue: below it; the same colour scale in all maps."
+        " Data sets share a cell where rate and temperature "
+        "repeat within 0.1 % and 0.25 K. Dimmed cells are less than two noise floors from zero: a single one is not "
+        "significant."
+        " A "
         "column that is coloured from top to bottom depends on the rate, a row on the temperature, one corner on both.",
         residual_maps.maps,
     ),
     _Kind(
         "channels", "Residual against every logged channel",
         "Dots are data sets, the line is their running mean (or the mean at each level), the band its 95 % interval, "
-        "with the drift between data sets taken into account. Where the band leaves zero, something hangs on this "
-        "channel - or on another that changes together with it, as time and temperature do on one rising leg.",
+        "with the drift between data sets taken into account. Where the band excludes zero, the error depends on "
+        "this channel, or on another that changes together with it, as time and temperature do when the temperature "
+        "only rises."
+        "",
         residual_lines.channels,
     ),
     _Kind(
         "time", "Residual against time",
         "Dotted lines are power-ons; the temperature is below; without times, the data sets in order. A slope is "
         "drift, a step at a power-on or a re-mounting is a shift, a decay after a power-on is warm-up. Lag-1 and the "
-        "runs test are of the residuals after the drift that the noise model knows is taken out: a small p says that "
-        "neighbours still hang together.",
+        "runs test are of the residuals after the drift that the noise model knows is taken out: a small p means "
+        "that successive residuals are still correlated."
+        "",
         residual_lines.time,
     ),
     _Kind(
@@ -64,69 +69,75 @@ KINDS = (
         "Mean power over white noise by cycles per turn; a bar above the dashed limit is a line (about 5 % chance of "
         "one anywhere in a panel with nothing there). Once per turn: Earth's rate, a magnetic field or a tilt; four "
         "per turn: the gear. The stepper's own lines (50 and 200 per turn) and, where the latitude is known, the "
-        "Earth's are taken out: bars well below 1 are where sampling had folded them to. A line here that is none in "
-        "time follows the table.",
+        "Earth's are taken out: bars well below 1 are the frequencies to which sampling aliased them. A line that "
+        "appears here and not over time follows the table."
+        "",
         spectra.angle,
     ),
     _Kind(
         "frequency", "Waves in time",
         "Left: the data sets' residuals as waves, dashed what noise alone gives on average. Right: readings within "
-        "data sets over white noise, dashed the limit. A line here that is none in the angle follows a clock, not the "
-        "table: mains, a fan, the chamber's cycling.",
+        "data sets over white noise, dashed the limit. A line that appears here and not over the angle follows a "
+        "clock, not the table: mains, a fan, the chamber's cycling."
+        "",
         spectra.frequency,
     ),
     _Kind(
         "time_in_set", "The first seconds of a data set",
         "The mean course of all data sets, and the same by the step in rate that went before; bands are 95 % about "
-        "zero. A course that decays in the right panel is the gyro or the table still settling: wait longer.",
+        "zero. A mean that decays in the right panel shows that the gyro or the table is still settling: wait longer.",
         residual_lines.time_in_set,
     ),
     _Kind(
         "legs", "From below minus from above",
         "Pairs of data sets at one rate and temperature, once reached from a lower temperature and once from a higher. "
-        "Off zero: hysteresis, or something that lags behind the thermometer; hysteresis closes towards both ends of "
-        "the range. A slope against rate says that the scale factor does it too.",
+        "Off zero: hysteresis, or a part that follows the temperature later than the thermometer; hysteresis closes "
+        "towards both ends of "
+        "the range. A slope over rate means that the scale factor has hysteresis too.",
         residual_lines.legs,
     ),
     _Kind(
         "previous_rate", "Residual against the rate before",
-        "A slope or a step at zero says that the gyro remembers the rate it came from. With rates in rising order this "
-        "picture is the one against the rate itself, moved by one.",
+        "A slope or a step at zero means that the output depends on the previous rate. With rates in rising order "
+        "this picture is that over the rate itself, shifted by one data set."
+        "",
         residual_lines.previous_rate,
     ),
     _Kind(
-        "repeats", "Points measured again",
+        "repeats", "Repeated points",
         "Differences of data sets at one rate and temperature; dashed are two standard deviations of what the noise "
-        "model gives neighbours like these. Far outside: something that is not in rate and temperature at all, or "
-        "noise that is larger than thought.",
+        "model gives neighbours like these. Points far outside: an effect that depends on neither rate nor "
+        "temperature, or noise that is larger than estimated."
+        "",
         noise.repeats,
     ),
     _Kind(
         "allan", "Allan deviation of the static record",
-        "The longest stretch at rest and at one temperature. Slope -1/2 is angle random walk N, the flat part bias "
+        "The longest section at rest and at one temperature. Slope -1/2 is angle random walk N, the flat part bias "
         "instability B, slope +1/2 rate random walk K; bars are 95 % intervals, dashed the fitted sum of the terms.",
         noise.allan,
     ),
 )  # fmt: skip
 LADDER = _Kind(
-    "ladder", "The fall of the error",
-    "Each version's RMS error on its own data and on temperatures that its fit has not seen; dashed the noise floor. "
-    "An error that falls on its own data alone was bought with coefficients.",
+    "ladder", "Errors of the versions",
+    "Each version's RMS error on the data of its fit and on temperatures left out of its fit; dashed the noise floor. "
+    "An error that falls on the fitted data only is overfitting.",
     noise.ladder,
 )  # fmt: skip
 
 
 COMPARED = (
     _Kind(
-        "error_over_rate", "Measured and modelled error, as the version is",
+        "error_over_rate", "Measured and modelled error of the version, without refitting",
         "Nothing is refitted here. Dots are measured, lines are the version's model at each temperature level: blue is "
         "cold, red is hot. Rows are outputs, columns the axis that is turned; each panel has its own scale of errors.",
         model_lines.error_over_rate,
     ),
     _Kind(
         "full_turn", "Error after a full turn",
-        "How far a heading is off after one turn, from 5 deg/s on: left with the static bias at rest taken off only, "
-        "right with the calibration and the static bias that it leaves, both on the same axes; blue is cold, red is "
+        "How far a heading is off after one turn, from 5 deg/s on: left with only the static bias at rest "
+        "subtracted, right with the calibration applied and its remaining static bias subtracted, both on the same axes"
+        "; blue is cold, red is "
         "hot.",
         model_lines.full_turn,
     ),

@@ -43,7 +43,7 @@ def report_html(
         *(f"<p>{line}</p>" for line in others),
         _errors(criticism["error"]),
         _suspects(criticism["suspects"]),
-        *(f"<p>To tell apart: {escape(str(e['do']))}.</p>" for e in criticism["experiments"]),
+        *(f"<p>To distinguish them:  {escape(str(e['do']))}.</p>" for e in criticism["experiments"]),
         *(_figure(picture) for picture in pictures),
         _worst(criticism.get("worst", ())),
         _not_testable(criticism["not_testable"]),
@@ -62,7 +62,7 @@ def _figure(picture: Picture) -> str:
     """Return a picture with its caption; its numbers stand beside it as JSON."""
     data = picture.figure.to_json().replace("</", "<\\/")
     effects = ", ".join(picture.effects)
-    drawn = f"<br>Effects that would show here: {escape(effects)}." if effects else ""
+    drawn = f"<br>Effects that would be visible here: {escape(effects)}." if effects else ""
     return (
         f'<h2 id="{picture.id}">{escape(picture.title)}</h2>\n<figure>'
         f"<figcaption>{escape(picture.caption)}{drawn}</figcaption>"
@@ -85,7 +85,7 @@ def _number(value: float | None) -> str:
 def _errors(error: CriticisedErrors) -> str:
     figures = (
         ("left after the fit", error.get("rms_dps")),
-        ("at temperatures that the fit has not seen", error.get("heldout_rms_dps")),
+        ("at temperatures left out of the fit", error.get("heldout_rms_dps")),
         ("noise floor", error.get("noise_floor_dps")),
     )
     return _table(("RMS error", "deg/s"), [(word, _number(figure)) for word, figure in figures])
@@ -101,7 +101,7 @@ def _suspects(suspects: Sequence[Suspect]) -> str:
          _number(s["heldout_rms_after_dps"]), ", ".join(e for e in s["alias_group"] if e != s["effect"]))
         for s in suspects
     ]  # fmt: skip
-    head = ("suspect", "origin", "evidence, nats", "RMS with it", "held out", "cannot be told from")
+    head = ("suspect", "origin", "evidence, nats", "RMS with it", "held out", "cannot be distinguished from")
     return f"<h2>Suspects</h2>{_table(head, rows)}" if rows else ""
 
 
@@ -116,4 +116,4 @@ def _not_testable(lines: Sequence[NotTestable]) -> str:
     if not lines:
         return ""
     names = ", ".join(str(line["effect"]) for line in lines)
-    return f'<h2>What this recording cannot say anything about</h2><p class="soft">{escape(names)}</p>'
+    return f'<h2>Effects that this recording cannot test</h2><p class="soft">{escape(names)}</p>'

@@ -64,8 +64,9 @@ def _runner(settings: BenchSettings, store: Store) -> BenchRunner | None:
     bench = load_bench(settings.bench)
     if settings.simulate and not bench.is_simulated:
         raise BadInput(
-            f"--simulate with --bench {settings.bench}: that bench has real instruments, and they would move; leave "
-            "--simulate out, or name a bench of sim:// addresses"
+            f"--simulate with --bench {settings.bench}: that bench has real instruments, which would move; leave "
+            "--simulate out"
+            ", or name a bench of sim:// addresses"
         )
 
     def make_clock() -> Clock:
@@ -115,7 +116,7 @@ class BenchProcess:
 
     def _close(self) -> None:
         log.info("process.ending", running=self._local.running)
-        left = BenchLeft("how the bench was left is not known; look at it", in_doubt=True)
+        left = BenchLeft("how the bench was left is not known; inspect it", unconfirmed=True)
         try:
             left = self._local.close()
         finally:
@@ -124,7 +125,7 @@ class BenchProcess:
                 self._store.close()
             self._supervision.say_left(left)
             self._servers[0].close()
-            log.log(ERROR if left.in_doubt else INFO, "process.ended", left=left.text, in_doubt=left.in_doubt)
+            log.log(ERROR if left.unconfirmed else INFO, "process.ended", left=left.text, unconfirmed=left.unconfirmed)
 
 
 def main() -> int:

@@ -118,7 +118,13 @@ def _packed(answer: Answer) -> bytes:
         return pickle.dumps(answer)
     except Exception as error:  # noqa: BLE001  whatever cannot travel is told in words
         text = str(answer.raised or error)
-        return pickle.dumps(Answer(raised=LabctlError(f"an answer that cannot be sent: {text}")))
+        return pickle.dumps(
+            Answer(
+                raised=LabctlError(
+                    f"an answer cannot be sent between processes; report this with the version of labctl: {text}"
+                )
+            )
+        )
 
 
 class Caller:
@@ -139,11 +145,15 @@ class Caller:
         try:
             connection.send(Call(name, args, kwargs))
             if not connection.poll(wait_s):
-                raise BenchSilent(f"the bench process has not answered within {wait_s:g} s")
+                raise BenchSilent(
+                    f"the bench process has not answered within {wait_s:g} s; inspect the bench if this continues"
+                )
             answer: Answer = connection.recv()
         except (EOFError, OSError) as error:
             connection.close()
-            raise BenchSilent(f"the bench process has gone ({error or type(error).__name__})") from error
+            raise BenchSilent(
+                f"the bench process has ended ({error or type(error).__name__}); wait for its restart, then try again"
+            ) from error
         except BaseException:
             connection.close()  # an answer that comes later must not be taken for that of the next call
             raise
@@ -170,7 +180,9 @@ class Caller:
         try:
             return Client(str(self._path), "AF_UNIX")
         except OSError as error:
-            raise BenchSilent(f"the bench process cannot be reached ({error.strerror or error})") from error
+            raise BenchSilent(
+                f"the bench process cannot be reached ({error.strerror or error}); wait for its restart, then try again"
+            ) from error
 
     def close(self) -> None:
         """Close the connections that wait for a call."""

@@ -93,7 +93,7 @@ class Child:
 
 
 def begin_child_log(name: str, location: str) -> None:
-    """Begin the log of a child process; its supervisor has looked at the level that the environment asks for."""
+    """Begin the log of a child process; its supervisor has checked the level that the environment sets."""
     level = level_asked()
     begin_log(name, INFO if level is None else level, locations=(location,))
 

@@ -31,7 +31,9 @@ def listening(host: str, port: int) -> Iterator[Listening]:
         except socket.gaierror as error:
             raise BadInput(f"--host {host}: {error.strerror}; name an address of this machine") from error
         except OSError as error:
-            raise BadInput(f"--port {port} on {host}: {error.strerror}; name another, or 0") from error
+            raise BadInput(
+                f"--port {port} on {host}: {error.strerror}; give another port, or 0 for a free one"
+            ) from error
         name = f"[{host}]" if ":" in host else host
         listener.listen(BACKLOG)  # whoever reads the address may connect at once
         yield Listening(listener, name, f"http://{name}:{listener.getsockname()[1]}")

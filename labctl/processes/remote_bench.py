@@ -89,7 +89,7 @@ class RemoteControl:
             if not stopped:
                 raise
             raise BenchSilent(
-                f"campaign {asked.campaign} was told to stop; how far it is, is not known: {silent}"
+                f"campaign {asked.campaign} was asked to stop; its progress is not known: {silent}; inspect the bench"
             ) from silent
 
     def confirm(self, _: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
@@ -123,7 +123,7 @@ class RemoteBench:
 
     @property
     def stops(self) -> bool:
-        """Whether nothing is begun any more because the service ends."""
+        """Whether no campaign is started any more because the service ends."""
         return self._beat.stops or self._over.is_set()
 
     @property
@@ -133,7 +133,7 @@ class RemoteBench:
 
     @property
     def schedule_trouble(self) -> str:
-        """Why the schedule could not be looked at; empty when all is well."""
+        """Why the schedule could not be read; empty when all is well."""
         return self._beat.schedule_trouble
 
     @property
@@ -143,7 +143,7 @@ class RemoteBench:
 
     @property
     def _silence(self) -> str:
-        return f"the bench process has not been heard of for {self.heard_s:.0f} s: the bench may move; look at it"
+        return f"the bench process has not answered for {self.heard_s:.0f} s: the bench may move; inspect it"
 
     def _ask(self, name: str, *args: Any) -> Any:
         if self.heard_s > SILENT_S:

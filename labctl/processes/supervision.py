@@ -40,7 +40,7 @@ class Supervision:
         """Obey a supervisor from now on. Raises Conflict while there is another, or for another bench."""
         with self._guard:
             if self._line is not None:
-                raise Conflict(f"the service at {self._settings.url} is in charge of this bench process")
+                raise Conflict(f"the service at {self._settings.url} is in charge of this bench process; stop it first")
             if wanted.drives != self._settings.drives:
                 own = self._settings
                 raise Conflict(

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from logging import ERROR, INFO
 from pathlib import Path
 
-from labctl.errors import BenchInDoubt, BenchSilent, LabctlError
+from labctl.errors import BenchSilent, BenchUnconfirmed, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
 from labctl.processes.bench_line import BenchLine, bench_process_of
@@ -61,21 +61,24 @@ class _Restarts:
         now_s = self._age.s
         self._at_s = [at_s for at_s in self._at_s if now_s - at_s < RESTARTS_WITHIN_S] + [now_s]
         if len(self._at_s) > MOST_RESTARTS:
-            raise LabctlError(f"{what} ended {len(self._at_s)} times within {RESTARTS_WITHIN_S / 60:g} min; given up")
+            raise LabctlError(
+                f"{what} ended {len(self._at_s)} times within {RESTARTS_WITHIN_S / 60:g} min; labctl stops. Read the "
+                "log for the cause, then start it again"
+            )
 
 
 def serve_forever(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
     """Serve until interrupted; returns how the bench was left, nothing where there is none.
 
     Raises BadInput for an address that others can reach while there is no key to ask them for, Conflict, BadBench, and
-    BenchInDoubt for a bench that at the end is not known to be safe.
+    BenchUnconfirmed for a bench that at the end is not known to be safe.
     """
     request.check()
     with listening(request.host, request.port) as at, ending_signals() as waker:
         left = Supervisor(request, at, waker).run(ready)
-    log.log(ERROR if left.in_doubt else INFO, "process.ended", left=left.text, in_doubt=left.in_doubt)
-    if left.in_doubt:
-        raise BenchInDoubt(f"stopped; {left.text}")
+    log.log(ERROR if left.unconfirmed else INFO, "process.ended", left=left.text, unconfirmed=left.unconfirmed)
+    if left.unconfirmed:
+        raise BenchUnconfirmed(f"stopped; {left.text}")
     return left.text
 
 
@@ -169,8 +172,8 @@ class Supervisor:
         shutil.rmtree(self._folder, ignore_errors=True)
         if bench.left is not None:
             return bench.left
-        text = "the bench process ended without a word: how the bench was left is not known; look at it"
-        return BenchLeft(text, in_doubt=self._request.bench_name is not None)
+        text = "the bench process ended without a report: how the bench was left is not known; inspect it"
+        return BenchLeft(text, unconfirmed=self._request.bench_name is not None)
 
     # -- the web process
 

@@ -59,7 +59,9 @@ def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:
     if _is_loopback(request.host) and not request.require_keys:
         return AccessPolicy(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload)
     asked = (
-        "--require-keys" if _is_loopback(request.host) else f"--host {request.host}: other machines could reach this"
+        "--require-keys"
+        if _is_loopback(request.host)
+        else f"--host {request.host}: this address can be reached from other computers"
     )
     require_an_api_key(store, asked)
     return AccessPolicy(keys=True, upload_bytes=upload)

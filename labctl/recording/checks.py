@@ -27,7 +27,8 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     for name in needed(info):
         if name not in columns:
             raise BadRecording(
-                f"{path}: column {name!r} is missing (needed for kind = {info.kind!r}, motion = {info.motion!r}: "
+                f"{path}: column {name!r} is missing; add it (needed for kind = {info.kind!r}, motion = "
+                f"{info.motion!r}: "
                 f"{BY_NAME[name].meaning})"
             )
         _finite(path, name, columns[name], columns.get("valid"))
@@ -69,8 +70,9 @@ def _squarable(path: Path, name: str, values: Column, valid: Column | None) -> N
     if wrong.any():
         row = int(np.argmax(wrong))
         raise BadRecording(
-            f"{path}: column {name[:80]!r}, row {row + 1}: {values[row]:g} is beyond {LARGEST:g}, up to which means "
-            "and spreads are numbers; check the column's unit"
+            f"{path}: column {name[:80]!r}, row {row + 1}: {values[row]:g} is beyond {LARGEST:g}, the largest value "
+            "that is computed with;"
+            " check the column's unit"
         )
 
 
@@ -82,7 +84,7 @@ def checked_environment(path: Path, columns: dict[str, Column]) -> dict[str, Col
     """Return the environment's columns; raises BadRecording when time or temperature is missing or not in order."""
     for name in ENVIRONMENT_NEEDED:
         if name not in columns:
-            raise BadRecording(f"{path}: column {name!r} is missing")
+            raise BadRecording(f"{path}: column {name!r} is missing; add it")
         _finite(path, name, columns[name], None)
     for name, values in columns.items():
         _squarable(path, name, values, None)
@@ -113,7 +115,7 @@ def _time(path: Path, t_s: NDArray[np.float64], *, strict: bool) -> None:
         row = int(np.argmax(back)) + 1
         raise BadRecording(
             f"{path}: column 't_s', row {row + 1}: {t_s[row]:.9g} s does not follow {t_s[row - 1]:.9g} s "
-            "of the row before; rows stand in the order of measurement"
+            "of the row before; sort the rows in the order of measurement"
         )
 
 
@@ -125,8 +127,8 @@ def _datasets(path: Path, dataset: NDArray[np.int64], *, points: bool) -> None:
     if len(first) != len(numbers):
         again = int(np.setdiff1d(np.arange(len(numbers)), first)[0])
         raise BadRecording(
-            f"{path}: column 'dataset', row {rows[again] + 1}: number {numbers[again]} returns; "
-            "each data set stands once, in one stretch of rows"
+            f"{path}: column 'dataset', row {rows[again] + 1}: number {numbers[again]} is repeated; give each data "
+            "set one number and consecutive rows"
         )
 
 
@@ -163,6 +165,6 @@ def _positions(path: Path, position: Column) -> None:
         if word not in POSITIONS:
             row = int(np.argmax(position == word))
             raise BadRecording(
-                f"{path}: column 'position', row {row + 1}: {str(word)!r} is no body axis "
-                "(expected x, -x, y, -y, z or -z)"
+                f"{path}: column 'position', row {row + 1}: {str(word)!r} is not a body axis (expected"
+                " x, -x, y, -y, z or -z)"
             )

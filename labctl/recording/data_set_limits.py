@@ -29,8 +29,9 @@ def refuse_too_many_data_sets(where: Path | str, info: RecordingInfo, columns: C
     found = len(numbers) if info.kind == "points" else len(dataset_starts(numbers)) if len(numbers) else 0
     if found > MOST_DATA_SETS:
         raise BadRecording(
-            f"{where}: {found} data sets; at most {MOST_DATA_SETS} are taken in at once; divide the recording, or give "
-            "readings at one rate and temperature one number (a data set is a stretch, not a reading)"
+            f"{where}: {found} data sets; at most {MOST_DATA_SETS} are imported at once; divide the recording, or give "
+            "readings at one rate and temperature one data set number (a data set is a series of readings, not a "
+            "single reading)"
         )
 
 

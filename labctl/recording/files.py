@@ -53,11 +53,11 @@ def read_recording(folder: Path) -> Recording:
 
 def _read_head(path: Path) -> RecordingInfo:
     if not path.is_file():
-        raise BadRecording(f"{path}: not found; a recording is a folder with {HEAD} and a data file")
+        raise BadRecording(f"{path}: not found; name a folder with {HEAD} and a data file")
     try:
         return RecordingInfo.model_validate(read_toml(path))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadRecording(f"{path}: not TOML: {error}") from error
+        raise BadRecording(f"{path}: not TOML: {error}; correct it") from error
     except ValidationError as error:
         # a misspelt key is both unknown and missing: the unknown one is what a person looks for
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
@@ -69,9 +69,11 @@ def _read_head(path: Path) -> RecordingInfo:
 def _data_file(folder: Path, kind: str) -> Path:
     found = [folder / f"{kind}.{suffix}" for suffix in FORMATS if (folder / f"{kind}.{suffix}").exists()]
     if not found:
-        raise BadRecording(f"{folder}: kind = {kind!r} needs a file {kind}.parquet or {kind}.csv; there is none")
+        raise BadRecording(
+            f"{folder}: kind = {kind!r} needs a file {kind}.parquet or {kind}.csv; there is none; add it"
+        )
     if len(found) > 1:
-        raise BadRecording(f"{folder}: both {found[0].name} and {found[1].name} are there; keep the one that is meant")
+        raise BadRecording(f"{folder}: both {found[0].name} and {found[1].name} exist; remove one of them")
     return found[0]
 
 

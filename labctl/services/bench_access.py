@@ -27,7 +27,7 @@ class BenchAccess(Protocol):
 
     @property
     def stops(self) -> bool:
-        """Whether nothing is begun any more because the service ends."""
+        """Whether no campaign is started any more because the service ends."""
         ...
 
     @property
@@ -37,7 +37,7 @@ class BenchAccess(Protocol):
 
     @property
     def schedule_trouble(self) -> str:
-        """Why the schedule could not be looked at; empty when all is well."""
+        """Why the schedule could not be read; empty when all is well."""
         ...
 
     @property

@@ -42,7 +42,7 @@ class LocalBench:
 
     @property
     def schedule_trouble(self) -> str:
-        """Why the schedule could not be looked at; empty when all is well."""
+        """Why the schedule could not be read; empty when all is well."""
         return "" if self.scheduler is None else self.scheduler.trouble
 
     def runs(self, campaign: int) -> bool:
@@ -108,7 +108,7 @@ class LocalBench:
         try:
             row = self._store.benches.get(bench)
         except StoreError as error:
-            return BenchLeft(f"whether bench {bench} is safe cannot be read ({error}); look at it", in_doubt=True)
+            return BenchLeft(f"whether bench {bench} is safe cannot be read ({error}); inspect it", unconfirmed=True)
         if row is not None and row.unconfirmed:
-            return BenchLeft(describe_bench(row), row.is_in_doubt)
+            return BenchLeft(describe_bench(row), row.is_unconfirmed)
         return BenchLeft(describe_safe_state(bench, "") if runner.used else f"bench {bench} was not used")

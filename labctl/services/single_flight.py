@@ -20,7 +20,7 @@ class _Flight:
         self._lock = threading.Lock()
         self._guard = threading.Lock()
         self._wanted_by: list[Progress] = []
-        self._stage = "waiting for the same question"
+        self._stage = "waiting for the same computation"
 
     @contextmanager
     def turn(self) -> Iterator[None]:

@@ -37,7 +37,7 @@ from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.recording_writer import Imports, ImportTicket
 from labctl.store.repositories.recordings import Recordings
-from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, TakeUp
+from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.repositories.units import Units
 
@@ -77,6 +77,7 @@ __all__ = [
     "Recordings",
     "ResumePoint",
     "ResumePoints",
+    "Resumption",
     "ServiceAddress",
     "StartEventRow",
     "StartRow",
@@ -85,7 +86,6 @@ __all__ = [
     "Store",
     "StoreAddress",
     "StoreJournal",
-    "TakeUp",
     "Unit",
     "Units",
     "Writer",

@@ -60,10 +60,10 @@ def pack(columns: Mapping[str, NDArray[np.generic]], effort: int = LIVE) -> Bloc
 def unpack(block: Block) -> dict[str, NDArray[np.generic]]:
     """Return the columns of a block; raises StoreError when its bytes are not those that were written."""
     if zlib.crc32(block.data) != block.crc32:
-        raise StoreError("a block of readings is damaged: its checksum does not fit; restore it from a backup")
+        raise StoreError("a block of readings is damaged: its checksum is wrong; restore the newest backup")
     if block.codec != CODEC:
         raise StoreError(
-            f"a block of readings is packed by codec {block.codec}, this labctl knows {CODEC}; use a newer one"
+            f"a block of readings is stored by codec {block.codec}, and this labctl reads {CODEC}; use a newer labctl"
         )
     (size,) = _HEAD.unpack_from(block.data)
     heads, lengths, effort = json.loads(block.data[_HEAD.size : _HEAD.size + size])

@@ -83,7 +83,7 @@ class Journal(Protocol):
         ...
 
     def unit_dropped(self, gyro: str, reason: str) -> None:
-        """Record that a unit takes no further part, and why."""
+        """Record that a unit is excluded from the rest of the campaign, and why."""
         ...
 
     def dataset_opened(self, header: DataSetHeader) -> int:

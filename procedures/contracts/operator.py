@@ -118,5 +118,5 @@ class HumanOperator:
         with self._lock:
             if self._pending is None or self._pending.id != answer.prompt_id or self._answer is not None:
                 now = f"{self._pending.id!r} is" if self._pending and self._answer is None else "no question is"
-                raise StalePrompt(f"question {answer.prompt_id!r} is no longer asked; {now} open now")
+                raise StalePrompt(f"question {answer.prompt_id!r} is no longer asked; {now} open now, answer that")
             self._answer = answer

@@ -70,7 +70,7 @@ class ExecutionContext:
             unit.stop()
         self.recorder.journal.unit_dropped(gyro, reason)
         self.recorder.tracker.update(dropped=dict(self.bench.dropped))
-        text = f"{gyro} takes no further part: {reason}"
+        text = f"{gyro} is excluded from the rest of the campaign: {reason}"
         self.recorder.event(Event("unit_dropped", text, level="error", device=gyro))
 
     def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:

@@ -15,7 +15,7 @@ from procedures.contracts.operator import Operator
 from procedures.contracts.steps import Mount
 from procedures.execution.active_bench import ActiveBench
 from procedures.execution.context import ExecutionContext
-from procedures.execution.resume import Restart, take_up
+from procedures.execution.resume import Restart, resume_campaign
 from procedures.execution.shutdown import Outcome, Shutdown
 from procedures.execution.step_executor import StepExecutor
 from procedures.monitoring.campaign_time import CampaignTime
@@ -109,7 +109,7 @@ class Engine:
         return outcome
 
     def _begin(self, start_at: int, restart: Restart | None) -> None:
-        """Record that the campaign runs, then look at the bench; after an interruption, prepare the bench first."""
+        """Record that the campaign runs, then check the bench; after an interruption, prepare the bench first."""
         if start_at > 0 or restart is not None:
             self._resume(start_at, restart or Restart())
             return
@@ -127,8 +127,8 @@ class Engine:
             if isinstance(self.plan.steps[index], Mount):
                 self._executor.skip_mounting(index)
         self._context.added_runs = restart.added_runs
-        self._recorder.change_state(CampaignState.RUNNING, f"taken up at step {start_at + 1}")
-        take_up(self._context, self.plan, start_at, restart, self._executor.carry_out)
+        self._recorder.change_state(CampaignState.RUNNING, f"resumed at step {start_at + 1}")
+        resume_campaign(self._context, self.plan, start_at, restart, self._executor.carry_out)
 
     def _describe_done(self) -> str:
         skipped, dropped = len(self._executor.skipped), self._context.bench.dropped

@@ -18,7 +18,7 @@ def is_reconnectable(context: ExecutionContext, step: Step, error: LinkError) ->
     """Return whether a step may be begun again once its instrument answers.
 
     A table that is silent or talks nonsense in the middle of a move may have lost steps or time, and a person has to
-    look at it; a table whose port went away and came back is homed.
+    inspect it; a table whose port went away and came back is homed.
     """
     if not isinstance(step, REPEATABLE):
         return False

@@ -40,7 +40,7 @@ def soak_matters_after_s(rules: ResumeRules, band_c: float, ramp_c_per_min: floa
     return 60.0 * 2.0 * band_c / ramp_c_per_min
 
 
-def take_up(
+def resume_campaign(
     context: ExecutionContext, plan: Plan, start_at: int, restart: Restart, carry_out: Callable[[Step], object]
 ) -> None:
     """Make the bench what step `start_at` relies on.
@@ -72,7 +72,7 @@ def _make_safe_first(context: ExecutionContext) -> None:
     pause_s = FIRST_PAUSE_S
     while complaints := make_safe(context.full_bench, context.clock):
         if context.clock.now_s() >= until_s:
-            raise StepFailed("taken up, but the bench could not be made safe first: " + "; ".join(complaints))
+            raise StepFailed("resumed, but the bench could not be made safe first: " + "; ".join(complaints))
         pass_time(context, pause_s, pausing=False)
         pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
     context.recorder.event(Event("safe_state", "the bench is in its safe state before anything else"))

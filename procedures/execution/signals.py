@@ -1,4 +1,4 @@
-"""Signals that must not cut short what leaves a bench safe. Each scope restores the handlers that it found.
+"""Signals that must not interrupted what leaves a bench safe. Each scope restores the handlers that it found.
 
 Only a process's main thread gets signals; in another thread none of these scopes does anything.
 """

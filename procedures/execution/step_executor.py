@@ -73,7 +73,10 @@ class StepExecutor:
         owed = context.owed_soak
         if owed is not None and isinstance(step, Acquire):
             self._recorder.event(
-                warning("soak_again", f"soaked again: {owed.temperature_c:g} deg C was left or in doubt")
+                warning(
+                    "soak_again",
+                    f"soaked again: {owed.temperature_c:g} deg C was left, or the unit's temperature is uncertain",
+                )
             )
             self.carry_out(owed)
             self._recorder.event(Event("soaked_again", f"the soak at {owed.temperature_c:g} deg C is done again"))

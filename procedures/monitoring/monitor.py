@@ -65,7 +65,7 @@ class BenchMonitor:
                 self.links.heard(name)
 
     def forget(self, gyro: str) -> None:
-        """Take in that a unit takes no further part."""
+        """Take in that a unit is excluded from the rest of the campaign."""
         self._recorder.tracker.live.forget(gyro)
         self._gyro_c.pop(gyro, None)
         self.links.forget(gyro)

@@ -67,7 +67,7 @@ class Plan(BaseModel):
     def lead_in(self, index: int) -> tuple[Step, ...]:
         """Return what has to be done again before step `index` can be run from cold: home, temperature, soak.
 
-        For taking up a campaign in the middle. The mounting is as it was left, so no Mount is among them. What the
+        For resuming a campaign in the middle. The mounting is unchanged, so no Mount is among them. What the
         step does itself is not done before it: no temperature before one that sets another.
         """
         if index >= len(self.steps) or isinstance(self.steps[index], SafeState):

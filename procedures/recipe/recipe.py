@@ -76,12 +76,12 @@ def read_recipe(source: str | Path) -> Recipe:
     try:
         text = read_toml_text(path)
     except tomllib.TOMLDecodeError as error:
-        raise RecipeError(f"recipe {path}: not TOML: {error}") from error
+        raise RecipeError(f"recipe {path}: not TOML: {error}; correct it") from error
     except FileNotFoundError:
         known = ", ".join(shipped_recipes())
         raise RecipeError(f"no recipe {str(source)!r}: give a file, or one of {known}") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise RecipeError(f"recipe {path}: cannot be read: {error}") from error
+        raise RecipeError(f"recipe {path}: cannot be read: {error}; check path and permissions") from error
     return parse_recipe(text, where=str(path))
 
 
@@ -90,7 +90,7 @@ def parse_recipe(text: str, *, where: str = "recipe") -> Recipe:
     try:
         return Recipe.model_validate(parse_toml(text))
     except tomllib.TOMLDecodeError as error:
-        raise RecipeError(f"{where}: not TOML: {error}") from error
+        raise RecipeError(f"{where}: not TOML: {error}; correct it") from error
     except ValidationError as error:
         raise RecipeError(f"{where}: {_complaints(error)}") from error
 

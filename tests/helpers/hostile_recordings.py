@@ -153,7 +153,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
     "CSV not UTF-8": (data("samples.csv", _ROWS + b"\n1,0,10,25,\xff\n"), r"samples.csv: not UTF-8 text after row 0"),
     "long word": (
         data("samples.csv", _ROWS + b"\n1,0,10,25," + b"a" * 10_000 + b"\n"),
-        r"row 1: 'a{80}' is not a number",
+        r"row 1: 'a{80}' is not a number; correct it",
     ),
     "footer of 1 GB": (
         data("samples.parquet", b"PAR1" + b"\0" * 99 + bytes([0, 0, 0, 64]) + b"PAR1"),

@@ -24,7 +24,7 @@ test("a state has its words and its colour", () => {
   assert.deepEqual([stateText({ state: "done" }), stateKind({ state: "done" })], ["done", "good"]);
   /** @type {{ state: "running", abandoned: boolean }} */
   const abandoned = { state: "running", abandoned: true };
-  assert.deepEqual([stateText(abandoned), stateKind(abandoned)], ["running, left alone", "warn"]);
+  assert.deepEqual([stateText(abandoned), stateKind(abandoned)], ["running, no process runs it", "warn"]);
 });
 
 test("a state that the page does not know is named", () => {

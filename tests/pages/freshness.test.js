@@ -23,15 +23,15 @@ const words = (change) => {
 };
 
 test("a page that hears service and bench is fresh", () => {
-  assert.deepEqual(words({}), { found: "no", stale: false, text: "Service last heard 0 s ago, bench 1 s ago." });
-  assert.equal(words({ bench_s: null }).text, "Service last heard 0 s ago.");
+  assert.deepEqual(words({}), { found: "no", stale: false, text: "Last answer of the service 0 s ago, bench 1 s ago." });
+  assert.equal(words({ bench_s: null }).text, "Last answer of the service 0 s ago.");
 });
 
 test("it is stale once the service was not heard for long enough", () => {
   assert.equal(words({ service_s: STALE_MS / 1000 }).found, "no");
   const { found, stale, text } = words({ service_s: STALE_MS / 1000 + 0.1 });
   assert.deepEqual([found, stale], ["yes", true]);
-  assert.equal(text, "Service last heard 4 s ago. What is shown may no longer be so; it is of 12:00:00.");
+  assert.equal(text, "Last answer of the service 4 s ago. What is shown may be out of date; it dates from 12:00:00.");
 });
 
 test("a page that has just been opened asks first", () => {
@@ -40,16 +40,16 @@ test("a page that has just been opened asks first", () => {
   assert.deepEqual(words({ ...opened, open_s: 5 }), {
     found: "yes",
     stale: true,
-    text: "The service was not heard. What is shown may no longer be so.",
+    text: "The service has not answered. What is shown may be out of date.",
   });
 });
 
 test("a silent bench, an answer that does not fit and a hidden tab each say what is known", () => {
-  assert.match(words({ bench_s: BENCH_STALE_S + 0.1 }).text, /^Bench last heard 3 s ago; the service answers\./);
+  assert.match(words({ bench_s: BENCH_STALE_S + 0.1 }).text, /^Last answer of the bench 3 s ago; the service answers\./);
   assert.equal(words({ trouble: "no such path" }).found, "trouble");
   assert.match(words({ trouble: "no such path" }).text, /: no such path$/);
-  assert.match(words({ paused: true }).text, /last heard at 12:00:00\.$/);
-  assert.match(words({ paused: true, clock: null }).text, /last heard never\.$/);
+  assert.match(words({ paused: true }).text, /last answer of the service at 12:00:00\.$/);
+  assert.match(words({ paused: true, clock: null }).text, /last answer of the service never\.$/);
 });
 
 test("two minutes and more are in minutes", () => {

@@ -1,4 +1,5 @@
-"""The processes of a service are killed and stopped: each is started again, and the campaign goes on or is taken up."""
+"""The processes of a service are killed and stopped: each is started again, and the campaign continues or is
+resumed."""
 
 from __future__ import annotations
 

@@ -21,16 +21,13 @@ ARGUMENTS = (
 )  # fmt: skip
 
 
-@pytest.fixture(scope="session")
-def _kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("kept")
-
-
 @pytest.fixture(autouse=True)
-def cache(_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def cache(shared: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """All pages share their kept answers: the same criticism is worked out once, as it is for a person."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(_kept))
-    return _kept
+    kept = shared / "pages"
+    kept.mkdir(mode=0o700, exist_ok=True)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(kept))
+    return kept
 
 
 @pytest.fixture

@@ -63,12 +63,12 @@ def test_mounted_paused_and_stopped_by_hand(service: Service, visit: Callable[..
     stop.get_by_label("Why").fill("smoke")
     stop.get_by_role("button", name="Stop now").click()
     expect(page.locator(".toasts")).to_contain_text("safe state")
-    expect(page.get_by_role("region", name="Nothing runs")).to_be_visible()
+    expect(page.get_by_role("region", name="No campaign is running")).to_be_visible()
     ended = service.get("/api/campaigns/1")
     assert ended["state"] == "aborted"
     assert "smoke (Ann)" in ended["reason"]
 
-    page.get_by_role("button", name="Resume where it was").click()
+    page.get_by_role("button", name="Resume where it stopped").click()
     page.get_by_role("dialog").get_by_role("button", name="Resume", exact=True).click()
     expect(page.get_by_role("region", name="What the bench is doing")).to_be_visible()
 
@@ -83,7 +83,7 @@ def test_what_cannot_be_done_ends_the_campaign(service: Service, visit: Callable
     asked.get_by_label("Your name").fill("Ann")
     asked.get_by_label("Why").fill("no wrench")
     asked.get_by_role("button", name="It cannot be done").click()
-    expect(page.get_by_role("region", name="Nothing runs")).to_be_visible()
+    expect(page.get_by_role("region", name="No campaign is running")).to_be_visible()
     assert "no wrench" in service.get("/api/campaigns/1")["reason"]
     last = page.get_by_role("region", name="Last: campaign 1")
     expect(last).to_contain_text("A person said that it cannot be done.")
@@ -117,7 +117,7 @@ def test_a_page_that_got_no_answer_is_shown_once_the_service_is_heard(
     from playwright.sync_api import expect
 
     page = visit("/bench")
-    expect(page.get_by_role("region", name="Nothing runs")).to_be_visible()
+    expect(page.get_by_role("region", name="No campaign is running")).to_be_visible()
     page.route("**/api/**", lambda route: route.abort())
     page.get_by_role("link", name="Campaigns", exact=True).click()
     expect(page.get_by_role("heading", name="No answer")).to_be_visible()
@@ -154,13 +154,13 @@ def test_a_bench_that_was_not_confirmed_safe_is_told_and_cleared_by_a_person(
     told = page.get_by_text(f"Bench {bench} was not confirmed safe")
     expect(told).to_be_visible()
     expect(page.locator("main")).to_contain_text("the chamber did not answer")
-    expect(page.get_by_role("region", name="Nothing runs")).to_contain_text("No campaign starts before")
-    expect(page.get_by_role("button", name="Resume where it was")).to_be_disabled()
-    expect(page.get_by_text("Cannot be resumed now")).to_contain_text("look at it first")
-    page.get_by_role("button", name="I have looked, it is safe").click()
+    expect(page.get_by_role("region", name="No campaign is running")).to_contain_text("No campaign starts before")
+    expect(page.get_by_role("button", name="Resume where it stopped")).to_be_disabled()
+    expect(page.get_by_text("Cannot be resumed now")).to_contain_text("inspect it first")
+    page.get_by_role("button", name="I have inspected it, it is safe").click()
     asked = page.get_by_role("dialog")
     asked.get_by_label("Your name").fill("Ann")
     asked.get_by_role("button", name="It is safe", exact=True).click()
     expect(told).to_have_count(0)
     assert store.benches.unconfirmed(bench) == ""
-    expect(page.get_by_role("button", name="Resume where it was")).to_be_enabled()
+    expect(page.get_by_role("button", name="Resume where it stopped")).to_be_enabled()

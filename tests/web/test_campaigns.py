@@ -19,8 +19,8 @@ def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visi
     from playwright.sync_api import expect
 
     page = visit("/campaigns/new?recipe=short&hide=scale_factor_asymmetry")
-    expect(page.get_by_role("region", name="What it would do")).to_contain_text("15")
-    expect(page.get_by_role("region", name="What it could find")).to_contain_text("It could find")
+    expect(page.get_by_role("region", name="Steps")).to_contain_text("15")
+    expect(page.get_by_role("region", name="What it can detect")).to_contain_text("It could find")
     expect(page.get_by_role("spinbutton", name="Size")).not_to_have_value("")
     page.get_by_role("button", name="Start on").click()
     page.wait_for_url("**/bench")
@@ -41,8 +41,8 @@ def test_what_the_bench_cannot_do_is_refused_or_left_out(visit: Callable[..., Pa
 
     page = visit("/campaigns/new?recipe=table1-x-table2", size=NARROW)
     expect(page.get_by_role("alert")).to_contain_text("400")
-    page.get_by_label("Leave out what the bench or the unit cannot do").check()
-    expect(page.get_by_role("region", name="What it would do")).to_contain_text("points are left out")
+    page.get_by_label("Leave out points beyond the limits of the bench or the unit").check()
+    expect(page.get_by_role("region", name="Steps")).to_contain_text("points are left out")
     assert "clip=1" in page.url
     faults.clear()  # the browser notes the refusal as an error
 
@@ -51,11 +51,11 @@ def test_own_recipe_is_planned_as_it_is_typed_and_is_in_the_address(visit: Calla
     from playwright.sync_api import expect
 
     page = visit("/campaigns/new?recipe=short")
-    page.get_by_text("Its text").click()
+    page.get_by_text("Recipe text").click()
     page.get_by_role("button", name="Change a copy of it").click()
     text = page.get_by_label("Recipe as TOML")
     text.fill(text.input_value().replace("[24, 26, 28]", "[24, 26]"))
-    expect(page.get_by_role("region", name="What it would do").locator("dd").first).to_contain_text("10")
+    expect(page.get_by_role("region", name="Steps").locator("dd").first).to_contain_text("10")
     assert "toml=" in page.url
     text.fill('format = "labctl-recipe/1"\nname = "x"\ntemperatures_c = "warm"\n')
     expect(page.get_by_role("alert")).to_contain_text("temperatures_c")
@@ -66,10 +66,10 @@ def test_a_start_is_put_on_the_schedule_and_taken_out(service: Service, visit: C
     from playwright.sync_api import expect
 
     page = visit("/campaigns/new?recipe=short")
-    page.get_by_role("button", name="Again and again").click()
+    page.get_by_role("button", name="Repeatedly").click()
     page.get_by_label("Cron line").fill("0 20 * * FRI")
     page.get_by_label("Time zone").fill("Europe/Berlin")
-    page.get_by_role("button", name="Put on the schedule").click()
+    page.get_by_role("button", name="Add to the schedule").click()
     page.wait_for_url("**/campaigns")
     entry = page.get_by_role("region", name="Schedule").first
     expect(entry).to_contain_text("20:00")

@@ -45,7 +45,7 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     dialog.get_by_label("Why").fill("needed on the robot today, to be replaced tomorrow")
     dialog.get_by_role("button", name="Certify").click()
     expect(dialog).to_be_visible()  # not without the override
-    dialog.get_by_role("checkbox", name="Certify it all the same").check()
+    dialog.get_by_role("checkbox", name="Certify it despite the objections").check()
     dialog.get_by_role("button", name="Certify").click()
     expect(in_force).to_contain_text("version 2")
     expect(in_force).to_contain_text("Certified against objections")
@@ -61,7 +61,7 @@ def test_a_change_that_predicts_no_better_is_shown_as_such(service: Service, vis
     service.post(UNIT, {"effects": ["bias", "scale_factor", "scale_factor_odd"]})
     page = visit("/explore?unit=OSU-FOG-2024")
     adding = page.get_by_role("region", name="Add it")
-    adding.get_by_label("Take one out").select_option("scale_factor_odd")
+    adding.get_by_label("Remove an effect").select_option("scale_factor_odd")
     adding.get_by_role("button", name="Preview").click()
     expect(adding).to_contain_text("Check: change: the held-out RMS error rises")
     adding.get_by_role("button", name="Make version 2").click()

@@ -30,7 +30,7 @@ def test_a_pick_shows_everywhere_and_in_the_address(visit: Callable[..., Page], 
     from playwright.sync_api import expect
 
     page = visit(explored)
-    fails = page.get_by_role("region", name="See where it fails")
+    fails = page.get_by_role("region", name="Where the model fails")
     fails.scroll_into_view_if_needed()
     picture = fails.locator(".plot").first
     expect(picture.locator(".heatmaplayer image").first).to_be_attached()
@@ -40,8 +40,8 @@ def test_a_pick_shows_everywhere_and_in_the_address(visit: Callable[..., Page], 
     expect(fails).to_contain_text("1 data sets picked")
     assert "pick=" in page.url
     page.reload()
-    expect(page.get_by_role("region", name="See where it fails")).to_contain_text("1 data sets picked")
-    fails.get_by_role("button", name="Let go").click()
+    expect(page.get_by_role("region", name="Where the model fails")).to_contain_text("1 data sets picked")
+    fails.get_by_role("button", name="Clear selection").click()
     expect(fails).to_contain_text("Nothing is picked")
     assert "pick=" not in page.url
 

@@ -154,13 +154,13 @@ def check_surfaces(drawn: dict[str, Any], compared: dict[str, Any], rows: list[d
     own = {row["dataset"]: row for row in rows if row["axis"] == row["position"] == "x"}
     for name, key, scene in (
         ("measured", "measured_error_dps", "scene"),
-        ("what remains", "residual_dps", "scene2"),
+        ("residual", "residual_dps", "scene2"),
     ):
         (dots,) = (trace for trace in traces if trace["name"] == name and trace["type"] == "scatter3d")
         assert dots["scene"] == scene
         assert sorted(dots["customdata"]) == sorted(own)
         assert dots["z"] == pytest.approx([own[number][key] for number in dots["customdata"]])
-    (remains,) = (trace for trace in traces if trace["type"] == "surface" and trace["name"] == "what remains")
+    (remains,) = (trace for trace in traces if trace["type"] == "surface" and trace["name"] == "residual")
     assert np.isfinite(np.array(remains["z"], dtype=float)).sum() == 210
 
 

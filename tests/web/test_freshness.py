@@ -53,7 +53,7 @@ def expect_stale(page: Page) -> None:
 
     expect(page.locator("[data-freshness]")).to_contain_text("Stale.", timeout=STALE_MS)
     expect(page.get_by_text(FREE)).not_to_be_visible(timeout=1)
-    expect(page.get_by_text("Nothing runs")).not_to_be_visible(timeout=1)
+    expect(page.get_by_text("No campaign is running")).not_to_be_visible(timeout=1)
     expect(page.get_by_text("Not known now").first).to_be_visible(timeout=1)
     text: str = page.evaluate("() => getComputedStyle(document.documentElement).getPropertyValue('--text').trim()")
     assert colour(page) == text
@@ -63,12 +63,12 @@ def test_a_service_that_stands_still_or_is_killed_is_stale_within_5_s(served: Se
     from playwright.sync_api import expect
 
     line, calm = idle.locator("[data-freshness]"), colour(idle)
-    expect(line).to_contain_text("Service last heard 0 s ago")
+    expect(line).to_contain_text("Last answer of the service 0 s ago")
     for pid in (served.web_pid, served.bench_pid):
         os.kill(pid, signal.SIGSTOP)
         expect_stale(idle)
         os.kill(pid, signal.SIGCONT)
-        expect(line).to_contain_text("Service last heard 0 s ago")
+        expect(line).to_contain_text("Last answer of the service 0 s ago")
         expect(idle.get_by_text(FREE)).to_be_visible()
         assert colour(idle) == calm
     for pid in (served.process.pid, served.bench_pid, served.web_pid):
@@ -88,7 +88,7 @@ def test_a_network_that_is_gone_is_stale_within_5_s(idle: Page) -> None:
 def test_a_bench_process_that_is_not_heard_is_stale_though_the_service_answers(idle: Page) -> None:
     idle.route(f"**{HEARTBEAT}", lambda asked: asked.fulfill(json={"status": "ok", "heard_s": 12.0}))
     expect_stale(idle)
-    assert "Bench last heard 12 s ago" in idle.locator("[data-freshness]").inner_text()
+    assert "Last answer of the bench 12 s ago" in idle.locator("[data-freshness]").inner_text()
 
 
 def test_a_service_that_answers_but_refuses_what_the_page_shows_is_stale(idle: Page) -> None:
@@ -112,10 +112,10 @@ def test_a_page_asks_once_a_second_and_not_while_its_tab_is_hidden(visit: Callab
     page.reload()
     settled(page)
     line = page.locator("[data-freshness]")
-    expect(line).to_contain_text("Service last heard")
+    expect(line).to_contain_text("Last answer of the service")
     before = len(asked)
     page.clock.run_for(10_000)
-    expect(line).to_contain_text("last heard")
+    expect(line).to_contain_text("ast answer of the service")
     assert len(asked) - before <= 11
 
     page.evaluate(HIDE, True)
@@ -124,7 +124,7 @@ def test_a_page_asks_once_a_second_and_not_while_its_tab_is_hidden(visit: Callab
     page.clock.run_for(60_000)
     assert len(asked) == before
     page.evaluate(HIDE, False)
-    expect(line).to_contain_text("Service last heard 0 s ago")
+    expect(line).to_contain_text("Last answer of the service 0 s ago")
     assert len(asked) == before + 1
     faults.clear()
 

@@ -77,7 +77,7 @@ def test_an_empty_house_leads_to_a_first_calibration_in_one_press(visit: Callabl
     expect(page.get_by_role("heading", name="Begin", exact=True)).to_be_visible()
     page.get_by_role("button", name="Open the real gyro").click()
     page.wait_for_url("**/explore?unit=OSU-FOG-2024**")
-    expect(page.get_by_role("region", name="Verdict")).to_contain_text("Cannot tell which")
+    expect(page.get_by_role("region", name="Verdict")).to_contain_text("Cause ambiguous")
     assert service.get("/api/units/OSU-FOG-2024/ladder")["steps"][0]["model"] == "bias_scale"
 
 

@@ -28,7 +28,7 @@ def test_a_start_asks_who_has_looked_before_anything_moves(service: Service, vis
     from playwright.sync_api import expect
 
     page = visit("/campaigns/new?recipe=short")
-    expect(page.get_by_role("region", name="What it would do")).to_contain_text("needs a person at")
+    expect(page.get_by_role("region", name="Steps")).to_contain_text("needs a person at")
     page.get_by_role("button", name="Start on").click()
     asked = page.get_by_role("dialog")
     expect(asked).to_contain_text("is a real bench")
@@ -61,12 +61,12 @@ def test_a_start_that_needs_a_person_at_night_is_warned_of_and_a_better_one_prop
     begin.get_by_role("button", name="instead").click()
     expect(page.get_by_label("Begin at")).to_have_value("2199-07-02T07:00")
     expect(begin).not_to_contain_text("At night:")
-    page.get_by_role("button", name="Put on the schedule").click()
+    page.get_by_role("button", name="Add to the schedule").click()
     asked = page.get_by_role("dialog")
     asked.get_by_label("Your name").fill("Ann")
     for question in ("chamber clear", "table free", "limiter on"):
         asked.get_by_label(question).check()
-    asked.get_by_role("button", name="I make sure of it").click()
+    asked.get_by_role("button", name="I confirm it for that time").click()
     page.wait_for_url("**/campaigns")
     entry = page.get_by_role("region", name="Schedule").first
     expect(entry).to_contain_text("Ann makes sure that the bench is clear")

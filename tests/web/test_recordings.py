@@ -42,7 +42,7 @@ def test_a_recording_is_dropped_and_opened(service: Service, visit: Callable[...
     page = visit("/recordings")
     dropped(page, FOG, ["recording.toml", "points.csv"])
     expect(page.get_by_text("Recording 1 of OSU-FOG-2024: 695 data sets")).to_be_visible()
-    page.get_by_role("link", name="Look at it").click()
+    page.get_by_role("link", name="Show it").click()
     expect(page.get_by_role("region", name="695 data sets").first).to_be_visible()
     page.get_by_role("button", name="7", exact=True).click()
     assert "dataset=7" in page.url
@@ -95,7 +95,7 @@ def test_traces_are_looked_at_more_closely_down_to_the_readings(service: Service
     page = visit(f"/recordings/{made['recording']}")
     trace = page.get_by_role("region", name="Trace")
     expect(trace).to_contain_text("readings")
-    trace.get_by_role("button", name="Look closer").click()
+    trace.get_by_role("button", name="Zoom in").click()
     page.wait_for_url("**from=**")
     trace.get_by_label("Channel").select_option("temperature_c")
     page.wait_for_url("**channel=temperature_c**")

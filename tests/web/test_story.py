@@ -30,7 +30,7 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     verdict = page.get_by_role("region", name="Verdict")
     expect(verdict).to_contain_text("Missing: scale_factor_asymmetry")
 
-    learn = page.get_by_role("region", name="Learn what is missing")
+    learn = page.get_by_role("region", name="Which effects are missing")
     learn.get_by_role("button", name="Draw").first.click()
     expect(learn).to_contain_text("what scale factor asymmetry would explain")
     learn.get_by_role("button", name="Add", exact=True).first.click()
@@ -39,7 +39,7 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     adding.get_by_role("button", name="Make version 2").click()
     page.wait_for_url("**version=2**")
     expect(page.get_by_role("region", name="Verdict")).to_contain_text("Nothing is missing")
-    expect(page.get_by_role("region", name="Watch the error fall")).to_contain_text("Version 1: what was left")
+    expect(page.get_by_role("region", name="Error of the versions")).to_contain_text("Version 1: residual before")
 
     ladder = service.get("/api/units/FOG-0001/ladder")["steps"]
     assert ladder[1]["heldout_rms_dps"] < 0.75 * ladder[0]["heldout_rms_dps"]

@@ -91,7 +91,7 @@ def test_two_people_at_once_make_two_versions(fog: Service, visit: Callable[...,
         page.get_by_role("button", name="Make version 2").wait_for()
     for page in pages:
         page.get_by_role("button", name="Make version 2").click()
-        expect(page.get_by_role("region", name="Watch the error fall")).to_contain_text("Version 1: what was left")
+        expect(page.get_by_role("region", name="Error of the versions")).to_contain_text("Version 1: residual before")
     steps = fog.get("/api/units/OSU-FOG-2024/ladder")["steps"]
     assert [(step["version"], step["parent"]) for step in steps] == [(1, None), (2, 1), (3, 1)]
 

@@ -7,8 +7,9 @@ a silent instrument costs no wall time, and the same bytes come at the same inst
 from __future__ import annotations
 
 import socket
-from typing import Any
+from typing import Any, cast
 
+import serial
 from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException
@@ -106,7 +107,7 @@ class SimulatedRtuClient(ModbusSerialClient):
                 port.reset_input_buffer()
             except OSError:
                 return False
-            self.socket = port
+            self.socket = cast("serial.Serial", port)  # pymodbus reads, writes, empties and closes it, no more
         return True
 
     def recv(self, size: int | None) -> bytes:  # noqa: ARG002  a simulated reply comes whole, or is waited for again

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import serial
+from typing_extensions import Buffer
 
 from instruments.clock import Clock
 from instruments.simulators.links.device import SimulatedDevice
@@ -77,12 +78,13 @@ class SimulatedSerialPort(serial.SerialBase):
         del self._unread[:size]
         return found
 
-    def write(self, data: bytes) -> int:
+    def write(self, data: Buffer, /) -> int:
         """Send bytes to the instrument."""
         if not self.is_open:
             raise serial.PortNotOpenError
-        self._device.receive(bytes(data), self._clock.now_s())
-        return len(data)
+        sent = bytes(data)
+        self._device.receive(sent, self._clock.now_s())
+        return len(sent)
 
     def flush(self) -> None:
         """Do nothing: written bytes arrive at once."""

@@ -17,6 +17,7 @@ class BiasInstability:
         self._taus_s = np.asarray(taus_s)
         self._sd_dps = sd_dps / np.sqrt(len(self._taus_s))
         self._axes = axes
+        self._step = self._over(GRID_S)
         self._here = rng.normal(0.0, self._sd_dps, (len(self._taus_s), axes))
         self._next = self._here.copy()
         self._here_s = 0.0
@@ -36,10 +37,15 @@ class BiasInstability:
 
     def _advance(self, t_s: float) -> None:
         skipped_s = max(np.floor((t_s - self._here_s) / GRID_S) - 1.0, 0.0) * GRID_S
-        self._here = self._after(self._next, skipped_s) if skipped_s else self._next
+        self._here = self._after(self._next, self._over(skipped_s)) if skipped_s else self._next
         self._here_s += skipped_s + GRID_S
-        self._next = self._after(self._here, GRID_S)
+        self._next = self._after(self._here, self._step)
 
-    def _after(self, bias: Array, elapsed_s: float) -> Array:
+    def _over(self, elapsed_s: float) -> tuple[Array, Array]:
+        """Return what share of each process stays over a time, and the scatter that it gains, deg/s; (taus, 1) each."""
         keep = np.exp(-elapsed_s / self._taus_s)[:, None]
-        return keep * bias + self._sd_dps * np.sqrt(1 - keep**2) * self._rng.standard_normal(bias.shape)
+        return keep, self._sd_dps * np.sqrt(1 - keep**2)
+
+    def _after(self, bias: Array, over: tuple[Array, Array]) -> Array:
+        keep, scatter = over
+        return keep * bias + scatter * self._rng.standard_normal(bias.shape)

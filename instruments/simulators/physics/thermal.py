@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,7 @@ class Body:
         self.deep_c += (self.sensor_c + self.heated_c - self.deep_c) * _share(self.deep_tau_s)
 
 
+@cache
 def _share(tau_s: float) -> float:
     return 1.0 - math.exp(-GRID_S / tau_s)
 
@@ -101,6 +103,7 @@ class Heat:
         return np.interp(t_s, (first + np.arange(len(piece))) * GRID_S, piece)
 
     def _advance(self, t_s: float) -> None:
+        followers = [(body, self._sensor[name], self._deep[name]) for name, body in self._bodies.items()]
         for _ in range(len(self._air) - 1, int(t_s / GRID_S)):
             distance = self._target_c - self._ramped_c
             self._ramped_c += math.copysign(min(abs(distance), self._ramp_per_s * GRID_S), distance)
@@ -108,10 +111,10 @@ class Heat:
             self._air_noise_c += -self._air_noise_c * 0.05 + self._noise_c * 0.31 * self._draw()
             air = self._air_c + self._air_noise_c
             self._air.append(air)
-            for name, body in self._bodies.items():
+            for body, sensor, deep in followers:
                 body.step(air)
-                self._sensor[name].append(body.sensor_c + body.heated_c)
-                self._deep[name].append(body.deep_c)
+                sensor.append(body.sensor_c + body.heated_c)
+                deep.append(body.deep_c)
 
     def _draw(self) -> float:
         if not self._draws:

@@ -38,7 +38,7 @@ def _number(settings: Mapping[str, object], name: str, usual: float) -> float:
     """Return a setting of the simulation; raises ValueError where it is no number."""
     value = settings.get(name, usual)
     if not isinstance(value, int | float):
-        raise ValueError(f"[simulation] {name} = {value!r} is not a number")
+        raise ValueError(f"[simulation] {name} = {value!r} is not a number; correct it")
     return float(value)
 
 

@@ -21,26 +21,28 @@ router = APIRouter(prefix="/api", tags=["keys and audit"])
 
 @router.get("/keys", summary="All keys", dependencies=[NEEDS_APPROVER])
 def keys(service: ServiceDep) -> list[KeyResponse]:
-    """Every key that was made, with its role; the keys themselves are kept nowhere. Asks for an approver."""
+    """Every key that was made, with its role; the keys themselves are not stored. Needs an approver's key."""
     return list_keys(service.store)
 
 
 @command_route(router, CREATE_KEY, "Make a key", dependencies=[NEEDS_APPROVER])
 def create_key(request: KeyRequest, service: ServiceDep) -> NewKeyResponse:
-    """Make a key. The answer is the only place where it is ever shown. Asks for an approver."""
+    """Make a key. The answer is the only place where it is ever shown. Needs an approver's key."""
     return service.execute(CREATE_KEY, request)
 
 
 @command_route(router, REVOKE_KEY, "Revoke a key", dependencies=[NEEDS_APPROVER])
 def revoke_key(name: str, request: ReasonRequest, service: ServiceDep) -> KeyResponse:
-    """Take a key's power away, at once. Asks for an approver."""
+    """Revoke a key, at once. Needs an approver's key."""
     return service.execute(REVOKE_KEY, ToKey(name, request))
 
 
 @router.get("/audit", summary="The audit trail")
 def audit(
     service: ServiceDep,
-    since: Annotated[datetime | None, Query(description="From this instant on; without a zone: UTC.")] = None,
+    since: Annotated[
+        datetime | None, Query(description="Only rows from this instant on; without a time zone: UTC.")
+    ] = None,
     after: Annotated[int, Query(ge=0, le=2**63 - 1, description="Rows with a number above this one.")] = 0,
     limit: Annotated[int, Query(ge=1, le=10_000, description="At most this many rows.")] = 1000,
 ) -> list[AuditResponse]:
@@ -50,5 +52,5 @@ def audit(
 
 @command_route(router, NOTE_BACKUP, "Note a backup")
 def note_backup(note: BackupNote, service: ServiceDep) -> None:
-    """Write down in the audit trail that a backup was made; `labctl backup` sends it."""
+    """Record in the audit trail that a backup was made; `labctl backup` sends it."""
     service.execute(NOTE_BACKUP, note)

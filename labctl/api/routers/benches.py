@@ -19,13 +19,13 @@ def benches(service: ServiceDep) -> list[BenchResponse]:
     return service.benches()
 
 
-@router.get("/benches/status", summary="What could not be confirmed safe")
+@router.get("/benches/status", summary="Benches, and unconfirmed safe states")
 def bench_states(service: ServiceDep) -> list[BenchStatus]:
     """Every bench of this database, with what its last safe state could not confirm."""
     return bench_statuses(service.store)
 
 
-@command_route(router, CLEAR_BENCH, "Say that a bench was looked at")
+@command_route(router, CLEAR_BENCH, "Record that a bench was inspected")
 def clear(bench: str, request: ClearRequest, service: ServiceDep) -> BenchStatus:
-    """Take in that a person has looked at a bench whose safe state was not confirmed; campaigns may start again."""
+    """Record that a person has inspected a bench whose safe state was not confirmed; campaigns may start again."""
     return service.execute(CLEAR_BENCH, ToBench(bench, request))

@@ -53,9 +53,11 @@ from labctl.services.schemas.criticism import (
 from labctl.services.schemas.uncertainty import UncertaintyResponse
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
-OtherUnit = Annotated[bool, Query(description="The recording may be of another unit.")]
+OtherUnit = Annotated[bool, Query(description="Accept a recording of another unit.")]
 RecordingNumber = Annotated[int | None, Query(description="Recording; default: the unit's newest.")]
-Formulas = Annotated[list[str] | None, Query(description="Effects of your own that compete: 'name: expr'.")]
+Formulas = Annotated[
+    list[str] | None, Query(description="Your own effects to include in the comparison: 'name: expr'.")
+]
 
 
 @router.head("/calibration", include_in_schema=False)
@@ -69,7 +71,7 @@ async def calibration(
 ) -> Response:
     """The calibration as a file: the bytes never change, the ETag is their hash. 304 when the caller has them already.
 
-    A point read of tens of microseconds: it runs in the event loop, without a hand-over to a thread.
+    A point read of tens of microseconds: it runs in the event loop, without a switch to a thread.
     """
     file = services.calibration_file(service.store, serial, version, format)
     headers = {"ETag": f'"{file.etag}"', "Cache-Control": "no-cache"}
@@ -93,25 +95,26 @@ async def fit(serial: str, request: FitRequest, service: ServiceDep) -> FitRespo
 
 @command_route(router, IMPROVE, "Change a model")
 async def improve(serial: str, version: int, request: ImproveRequest, service: ServiceDep) -> ImproveResponse:
-    """Add effects to a version, or take some out, and fit everything again; it becomes the unit's next version."""
+    """Add effects to a version, or remove some, and fit everything again; it becomes the unit's next version."""
     return await execute(service, IMPROVE, ToNewestOrVersion(serial, version, request))
 
 
 @router.get("/calibrations/{version}", summary="One version")
 def one_version(serial: str, version: int, service: ServiceDep) -> VersionResponse | ImprovedVersionResponse:
-    """The version as its fit answered, when and from what it was made, and whether it is in force."""
+    """The result of the fit of a version, when and from which data it was made, and whether it is in force."""
     return services.one_version(service.store, serial, version)
 
 
-@router.get("/certifications", summary="What was certified and revoked")
+@router.get("/certifications", summary="Certifications and revocations")
 def certifications(serial: str, service: ServiceDep) -> list[CertificationResponse]:
-    """Every act of certifying and revoking a version of the unit, newest first: who, why, when, and due when."""
+    """Every certification and revocation of a version of the unit, newest first: who, why, when, and until when."""
     return list_certifications(service.store, serial)
 
 
-@router.get("/calibrations/{version}/assessment", summary="What speaks against certifying a version")
+@router.get("/calibrations/{version}/assessment", summary="Objections to certifying a version")
 async def assessment(request: Request, serial: str, version: int, service: ServiceDep) -> AssessmentResponse:
-    """The verdict on the version by its own recording, its errors, and what certifying it would have to override."""
+    """The verdict on the version from its own recording, its errors, and the objections that certifying it would
+    override."""
     return await while_connected(request, service, assess, serial, version)
 
 
@@ -124,11 +127,11 @@ async def verification(
     recording: RecordingNumber = None,
     other_unit: OtherUnit = False,
 ) -> VerificationResponse:
-    """What the version leaves of the recording as it is, nothing refitted, and whether that is as expected of it."""
+    """The residual of the version on the recording, without refitting, and whether it is as small as expected."""
     return await while_connected(request, service, verify_unit, serial, version, recording, other_unit=other_unit)
 
 
-@router.get("/calibrations/{version}/criticism", summary="Hold a model against a recording")
+@router.get("/calibrations/{version}/criticism", summary="Compare a model with a recording")
 async def criticism(
     request: Request,
     serial: str,
@@ -138,7 +141,7 @@ async def criticism(
     other_unit: OtherUnit = False,
     formula: Formulas = None,
 ) -> CriticismResponse:
-    """What the model leaves, where, which effect may be missing, and what this recording cannot say.
+    """The residual of the model, where it is large, which effects may be missing, and which ones cannot be tested.
 
     The computation is cancelled when the client leaves.
     """
@@ -171,11 +174,12 @@ async def criticism_events(
     return await follow(request, service, criticise_unit, serial, version, recording, competing, other_unit=other_unit)
 
 
-@router.get("/calibrations/{version}/residuals", summary="What a model leaves, data set by data set")
+@router.get("/calibrations/{version}/residuals", summary="Residuals of a model, by data set")
 async def residuals(
     request: Request, serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None
 ) -> ResidualsResponse:
-    """The rows behind the map of the criticism, one per data set and axis: measured, modelled, and what is left."""
+    """The data of the residual map of the criticism, one row per data set and axis: measured error, modelled error
+    and residual."""
     return await while_connected(request, service, residuals_unit, serial, version, recording)
 
 
@@ -183,11 +187,11 @@ async def residuals(
 async def pictures(
     request: Request, serial: str, version: int, service: ServiceDep, recording: RecordingNumber = None
 ) -> list[PictureResponse]:
-    """Every picture that there is something to draw in, as a Plotly figure, with how to read it."""
+    """Every picture of the criticism that has data, as a Plotly figure, with a caption that explains it."""
     return await while_connected(request, service, pictures_unit, serial, version, recording)
 
 
-@router.get("/calibrations/{version}/comparison", summary="A version as it is, beside a recording")
+@router.get("/calibrations/{version}/comparison", summary="A version without refitting, compared with a recording")
 async def comparison(
     request: Request,
     serial: str,
@@ -209,20 +213,21 @@ async def surface(
     rate_points: Annotated[int, Query(ge=2, le=401)] = 41,
     temperature_points: Annotated[int, Query(ge=2, le=201)] = 25,
 ) -> SurfaceResponse:
-    """What the calibration takes off each axis, turned about itself, on a grid over what was calibrated."""
+    """The error that the calibration subtracts from each axis, turned about itself, on a grid over the calibrated
+    range."""
     return await while_connected(request, service, surface_of, serial, version, rate_points, temperature_points)
 
 
-@router.post("/calibrations/{version}/preview", summary="What a changed model would be")
+@router.post("/calibrations/{version}/preview", summary="Preview of a changed model")
 async def preview(
     http: Request, serial: str, version: int, request: ImproveRequest, service: ServiceDep
 ) -> PreviewResponse:
-    """The same change as `improve` makes, fitted, with its errors before and after; nothing is kept."""
+    """The same change as `improve` makes, fitted, with its errors before and after; nothing is stored."""
     change = request.model_copy(update={"version": version})
     return await while_connected(http, service, preview_unit, serial, change)
 
 
-@router.get("/calibrations/{version}/uncertainty", summary="How far a corrected rate may be off")
+@router.get("/calibrations/{version}/uncertainty", summary="Uncertainty of a corrected rate")
 async def uncertainty(
     request: Request,
     serial: str,
@@ -230,35 +235,38 @@ async def uncertainty(
     service: ServiceDep,
     rate_dps: Annotated[float, Query(description="True rate about each axis in turn, deg/s.")],
     temperature_c: Annotated[float, Query(description="The gyro's thermometer, deg C.")],
-    grid: Annotated[bool, Query(description="Also on a small grid over what was calibrated.")] = False,
+    grid: Annotated[bool, Query(description="Also on a small grid over the calibrated range.")] = False,
 ) -> UncertaintyResponse:
-    """GUM components of a corrected rate at one rate and temperature, and whether that was calibrated at all."""
+    """GUM components of a corrected rate at one rate and temperature, and whether that point lies in the
+    calibrated range."""
     return await while_connected(request, service, uncertainty_at, serial, version, rate_dps, temperature_c, grid=grid)
 
 
 @router.head("/ladder", include_in_schema=False)
-@router.get("/ladder", summary="The error, version by version")
+@router.get("/ladder", summary="Errors of the versions")
 async def ladder(
     request: Request,
     serial: str,
     service: ServiceDep,
     recording: Annotated[int | None, Query(description="Recording; default: that of the newest version.")] = None,
 ) -> LadderResponse:
-    """The errors of the versions fitted to one recording, each after its parent, and the noise floor."""
+    """The errors of the versions fitted to one recording, each after the version it was changed from, and the
+    noise floor."""
     return await while_connected(request, service, ladder_of, serial, recording)
 
 
-@command_route(router, CERTIFY, "Make a version current", dependencies=[NEEDS_APPROVER])
+@command_route(router, CERTIFY, "Certify a version", dependencies=[NEEDS_APPROVER])
 async def certify(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
-    """Make a version the one in force: who, why, and when it is due again. An older version again is a rollback.
+    """Put a version in force: who, why, and when the next calibration is due. An older version again is a rollback.
 
-    Its verdict is kept with the act. 409 where something speaks against it, unless `override` is set and the reason is
-    a sentence. Asks for an approver.
+    The verdict is stored with the certification. 409 where there are objections, unless `override` is set and the
+    reason is
+    a sentence. Needs an approver's key.
     """
     return await execute(service, CERTIFY, ToVersion(serial, version, request))
 
 
-@command_route(router, REVOKE, "Take a version out of force", dependencies=[NEEDS_APPROVER])
+@command_route(router, REVOKE, "Revoke a version", dependencies=[NEEDS_APPROVER])
 def revoke(serial: str, version: int, request: RevokeRequest, service: ServiceDep) -> CertificationResponse:
-    """Take the version out of force; the unit then has no certified calibration. Asks for an approver."""
+    """Revoke the version; the unit then has no certified calibration. Needs an approver's key."""
     return service.execute(REVOKE, ToVersion(serial, version, request))

@@ -36,7 +36,7 @@ router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
 def start(request: CampaignRequest, service: ServiceDep, response: Response) -> CampaignResponse | ScheduledResponse:
     """Run a recipe on this service's bench, now (201) or, with `at` or `cron`, later (202: an entry of the schedule).
 
-    Refused when the bench or a unit cannot do it, naming the limit.
+    Refused where it exceeds a limit of the bench or of a unit; the answer names the limit.
     """
     answer = service.execute(START_CAMPAIGN, CampaignStart(request))
     response.status_code = START_CAMPAIGN.status_of(answer)
@@ -57,7 +57,7 @@ def campaign(campaign: int, service: ServiceDep) -> CampaignResponse:
 
 @router.get("/{campaign}/plan", summary="Its steps")
 def plan(campaign: int, service: ServiceDep) -> CampaignPlanResponse:
-    """The whole plan as it was written down, with what became of each step."""
+    """The whole plan of the campaign, with the outcome of each step."""
     return campaign_plan(service.store, campaign)
 
 
@@ -65,7 +65,7 @@ def plan(campaign: int, service: ServiceDep) -> CampaignPlanResponse:
 async def abort(
     campaign: int, request: ReasonRequest, service: ServiceDep, control: ControlPoolDep
 ) -> CampaignResponse:
-    """End a running campaign now, in the safe state. What was measured is kept.
+    """End a running campaign now, in the safe state. The data measured so far are stored.
 
     Answered within a second; `wish` is `abort` while the safe state is still being reached.
     """
@@ -80,9 +80,9 @@ async def pause(
     return await control.run(lambda: service.execute(PAUSE_CAMPAIGN, ToCampaign(campaign, request)))
 
 
-@command_route(router, RESUME_CAMPAIGN, "Let a campaign go on")
+@command_route(router, RESUME_CAMPAIGN, "Resume a campaign")
 def resume(campaign: int, request: ResumeRequest, service: ServiceDep) -> CampaignResponse:
-    """Let a paused campaign go on, or take up one that was interrupted, failed or aborted, safe state first."""
+    """Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first."""
     return service.execute(RESUME_CAMPAIGN, CampaignResume(campaign, request))
 
 
@@ -105,7 +105,7 @@ async def events(
 ) -> EventStream:
     """Server-sent events from the first or, with `Last-Event-ID`, from the one after it, until the campaign ends.
 
-    Between them `progress`, without an id: where the campaign stands, whenever that has changed.
+    Between them `progress`, without an id: the present status, whenever it has changed.
     """
 
     async def stream() -> AsyncIterator[bytes]:

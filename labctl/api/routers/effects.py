@@ -12,5 +12,6 @@ router = APIRouter(prefix="/api", tags=["catalogue"])
 
 @router.get("/effects", summary="The catalogue of physical effects")
 def effects() -> CatalogueResponse:
-    """Every effect a model can be made of: its standard term, sentence, origin, channels, coefficients and ranges."""
+    """Every effect that a model can contain: its standard term, description, origin, channels, coefficients and
+    ranges."""
     return catalogue()

@@ -14,23 +14,25 @@ from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, P
 router = APIRouter(tags=["service"])
 
 
-@router.get("/health", summary="Is the service well?", dependencies=[DECLARES_KEY])
+@router.get("/health", summary="State of the service", dependencies=[DECLARES_KEY])
 def health(service: ServiceDep, request: Request) -> HealthResponse | PulseResponse:
-    """Whether the service answers and in which version; to those who may read, also the database and the bench."""
+    """Whether the service answers and in which version; with a key that may read, also the state of the database
+    and of the bench."""
     return service.health() if request.state.caller is not None else service.pulse()
 
 
-@router.get("/health/heartbeat", summary="Does the service answer?")
+@router.get("/health/heartbeat", summary="Sign of life of the service")
 async def heartbeat(service: ServiceDep) -> HeartbeatResponse:
     """Whether the service answers: what every open page asks once a second.
 
-    No key is asked for and no database is read. `heard_s`, where it is there: how long the bench was not heard.
+    No key is asked for and no database is read. `heard_s`, where present: seconds since the last answer of the
+    bench process.
     """
     return service.heartbeat()
 
 
-@router.get("/metrics", summary="Figures for a monitor", response_class=PlainTextResponse, dependencies=[DECLARES_KEY])
+@router.get("/metrics", summary="Metrics for monitoring", response_class=PlainTextResponse, dependencies=[DECLARES_KEY])
 def metrics(service: ServiceDep, request: Request) -> PlainTextResponse:
-    """Counts in the text format that Prometheus reads."""
+    """Metrics in the text format of Prometheus."""
     text = text_of(service, request.app.state.request_figures)
     return PlainTextResponse(text, media_type=CONTENT_TYPE_PLAIN_0_0_4)

@@ -16,16 +16,16 @@ router = APIRouter(prefix="/api", tags=["campaigns"])
 
 @router.get("/recipes", summary="The recipes that come with labctl")
 def recipes(service: ServiceDep) -> list[RecipeResponse]:
-    """Each with its text, and what it would take on this service's bench, or why it cannot be done there.
+    """Each with its text, the time and data sets it needs on this service's bench, or why it cannot run there.
 
-    A service without a bench says it for the simulated one that fits the recipe best.
+    A service without a bench answers for the simulated bench that suits the recipe best.
     """
     return services.list_recipes(service.bench)
 
 
 @router.post("/plans", summary="Plan a recipe")
 async def plan(http: Request, request: PlanRequest, service: ServiceDep) -> PlannedResponse:
-    """What a campaign would do, step by step, and what it could find. Nothing moves, nothing is kept.
+    """The steps of a campaign, and which effects it could detect. Nothing moves, nothing is stored.
 
     `attendance` says when a person is needed if it begins now, at `at` or when `cron` is due next.
     """

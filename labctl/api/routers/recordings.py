@@ -34,8 +34,9 @@ router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
 @command_route(router, IMPORT_RECORDING, "Import a recording")
 async def import_recording(request: Request, files: list[UploadFile], service: ServiceDep) -> ImportResponse:
-    """Take in a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
-    environment file, as parts of one multipart form. All of it or nothing; an error names file, column and row."""
+    """Import a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
+    environment file, as parts of one multipart form. Either the whole recording is stored or nothing; an error
+    names file, column and row."""
     return await with_files(
         request,
         import_files,
@@ -46,13 +47,13 @@ async def import_recording(request: Request, files: list[UploadFile], service: S
 
 @command_route(router, SIMULATE_RECORDING, "Simulate a recording")
 async def simulated(request: SimulatedRequest, service: ServiceDep) -> SimulatedRecordingResponse:
-    """Walk through a recipe in simulation, with effects hidden in the unit, and take in what it would have given."""
+    """Simulate a recipe with effects hidden in the unit, and store the resulting recording."""
     return await execute(service, SIMULATE_RECORDING, request)
 
 
-@command_route(router, IMPORT_EXAMPLE, "Take in an example")
+@command_route(router, IMPORT_EXAMPLE, "Import an example")
 async def example(request: ExampleRequest, service: ServiceDep) -> ImportResponse:
-    """Take in one of the recordings of real gyros that come with labctl."""
+    """Import one of the recordings of real gyros that come with labctl."""
     return await execute(service, IMPORT_EXAMPLE, request)
 
 
@@ -72,7 +73,7 @@ def recording(
     return catalogue.describe_recording(service.store, recording, points=points)
 
 
-@router.get("/{recording}/datasets", summary="Its data sets")
+@router.get("/{recording}/datasets", summary="Data sets of a recording")
 def datasets(recording: int, service: ServiceDep) -> DataSetsResponse:
     """One row per data set, as columns, with mean and standard deviation of every channel; also incomplete ones."""
     return catalogue.data_sets(service.store, recording)
@@ -88,27 +89,28 @@ async def trace(
     until_s: Annotated[float | None, Query(description="Its end.")] = None,
     points: Annotated[int, Query(ge=1, le=20_000, description="At most this many bins.")] = 2000,
 ) -> TraceResponse:
-    """Least, largest and mean reading of a channel in bins of equal time, only those that hold readings."""
+    """Smallest, largest and mean reading of a channel in time bins of equal length; empty bins are left out."""
     return await while_connected(request, service, trace_of, recording, channel, from_s, until_s, points)
 
 
-@router.get("/{recording}/allan", summary="Its noise at rest")
+@router.get("/{recording}/allan", summary="Noise of a recording at rest")
 async def allan(
     request: Request,
     recording: int,
     service: ServiceDep,
-    dataset: Annotated[int | None, Query(description="A data set; default: the longest stretch at rest.")] = None,
+    dataset: Annotated[int | None, Query(description="A data set; default: the longest section at rest.")] = None,
 ) -> AllanResponse:
-    """The overlapping Allan deviation of each axis with 95 % intervals, and N, B and K as far as they show."""
+    """The overlapping Allan deviation of each axis with 95 % intervals, and the coefficients N, B and K where they
+    can be determined."""
     return await while_connected(request, service, allan_unit, recording, dataset)
 
 
-@router.get("/{recording}/file", summary="The recording to take away", response_class=StreamingResponse)
+@router.get("/{recording}/file", summary="Download the recording", response_class=StreamingResponse)
 async def file(
     request: Request,
     recording: int,
     service: ServiceDep,
-    format: Annotated[Literal["parquet", "csv"], Query(description="Of its tables.")] = "parquet",  # noqa: A002
+    format: Annotated[Literal["parquet", "csv"], Query(description="Format of the tables in the zip.")] = "parquet",  # noqa: A002
 ) -> StreamingResponse:
     """The recording in the interchange format, every reading, as one zip; it imports again."""
     made = await with_files(request, zip_recording, service.store, recording, format)

@@ -15,21 +15,21 @@ from labctl.services.schemas.schedule import ScheduledResponse
 router = APIRouter(prefix="/api/schedule", tags=["campaigns"])
 
 
-@router.get("", summary="What begins when")
+@router.get("", summary="Scheduled starts")
 def schedule(
-    service: ServiceDep, ended: Annotated[bool, Query(description="Also entries that are over.")] = False
+    service: ServiceDep, ended: Annotated[bool, Query(description="Also entries that have ended.")] = False
 ) -> list[ScheduledResponse]:
-    """Every entry that waits, next first, with what became of its starts."""
+    """Every waiting entry of the schedule, the next first, with the outcome of its past starts."""
     return queue.list_starts(service.store, ended=ended)
 
 
 @router.get("/{start}", summary="One entry")
 def start(start: int, service: ServiceDep) -> ScheduledResponse:
-    """When it begins next, and what became of each start that fell due."""
+    """When the entry begins next, and the outcome of each past start."""
     return queue.start_status(service.store, start)
 
 
 @command_route(router, CANCEL_START, "Cancel an entry")
 def cancel(start: int, service: ServiceDep) -> ScheduledResponse:
-    """Take an entry out of the schedule. A campaign that it has begun runs on."""
+    """Remove an entry from the schedule. A campaign that it has started continues."""
     return service.execute(CANCEL_START, ToStart(start))

@@ -16,11 +16,11 @@ FILES = {"swagger-ui-bundle.js": "text/javascript", "swagger-ui.css": "text/css"
 PAGE = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>labctl: the text of the API</title>
+<title>labctl: the HTTP interface</title>
 <link rel="icon" href="api-docs/favicon.png"><link rel="stylesheet" href="api-docs/swagger-ui.css"></head>
 <body><div id="swagger-ui"></div>
 <script src="api-docs/swagger-ui-bundle.js"></script><script src="api-docs/start.js"></script>
-<noscript>This page needs scripts; <a href="openapi.json">openapi.json</a> says the same to programs.</noscript>
+<noscript>This page needs scripts; <a href="openapi.json">openapi.json</a> describes the same for programs.</noscript>
 </body>
 </html>
 """
@@ -44,6 +44,6 @@ def file(name: str) -> Response:
     if name == "start.js":
         return Response(START, media_type="text/javascript")
     if name not in FILES:
-        raise NotFound(f"no file {name!r} here")
+        raise NotFound(f"there is no file {name!r}; open api-docs")
     found = resources.files("fastapi_offline") / "static" / name
     return Response(found.read_bytes(), media_type=FILES[name], headers={"Cache-Control": "max-age=86400"})

@@ -19,5 +19,5 @@ def units(service: ServiceDep) -> list[UnitResponse]:
 
 @router.get("/units/{serial}", summary="One unit")
 def one_unit(serial: str, service: ServiceDep) -> UnitResponse:
-    """Who the unit is, its recordings and calibrations, and which version is in force."""
+    """The unit, its recordings and calibrations, and which version is in force."""
     return unit(service.store, serial)

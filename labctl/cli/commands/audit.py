@@ -46,12 +46,12 @@ def list_(
 def verify(
     anchor: Annotated[
         str | None,
-        typer.Option("--anchor", metavar="LENGTH:HASH", help="What an earlier verify printed, kept elsewhere."),
+        typer.Option("--anchor", metavar="LENGTH:HASH", help="Anchor that an earlier verify printed, LENGTH:HASH."),
     ] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Find the first row that was changed, moved, or follows a missing one."""
+    """Verify the audit trail: find the first row that was changed or moved, or that follows a missing one."""
     from labctl.services.admin.audit import verify_audit
     from labctl.services.commands.open import open_readonly
 
@@ -60,9 +60,7 @@ def verify(
     if as_json:
         print_json(answer)
     elif answer.ok:
-        console.print(
-            f"{answer.rows} rows, all as they were written; anchor {answer.anchor or 'none yet'}", markup=False
-        )
+        console.print(f"{answer.rows} rows, none changed; anchor {answer.anchor or 'none yet'}", markup=False)
     else:
         stderr.print(f"labctl: audit trail: {answer.text}", markup=False)
     if not answer.ok:

@@ -19,7 +19,7 @@ def check(
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
-    """Talk to every instrument of a bench and say what answered. Nothing moves."""
+    """Connect to every instrument of a bench and list the answers. Nothing moves."""
     from labctl.services.benches.check import check_bench
 
     with one_clear_line():
@@ -37,7 +37,7 @@ def check(
 
 @app.command("status")
 def status(as_json: Json = False, database: Database = None) -> None:
-    """Say which benches were not confirmed safe when their last campaign ended, or had none: their process is gone."""
+    """List the benches that were not confirmed safe when their last campaign ended or its process was lost."""
     from labctl.services.campaigns.bench_status import bench_statuses
     from labctl.services.commands.open import open_readonly
 
@@ -47,12 +47,16 @@ def status(as_json: Json = False, database: Database = None) -> None:
         print_json(benches)
     else:
         for bench in benches:
-            said = [bench.unconfirmed, *(f"it has not been made safe: {left}" for left in bench.left)]
+            said = [bench.unconfirmed, *(f"not made safe; campaigns left there: {left}" for left in bench.left)]
             if bench.attempts:
                 said.insert(1, f"the safe state was tried again {bench.attempts} times, last at {bench.attempted_at}")
             if bench.confirmed_at:
-                said.insert(2, f"labctl confirmed it at {bench.confirmed_at}; a person has still to look, then `clear`")
-            for line in filter(None, said if any(said) else ["nothing is unconfirmed"]):
+                said.insert(
+                    2,
+                    f"labctl confirmed it at {bench.confirmed_at}; a person has still to inspect the bench, then "
+                    "`labctl bench clear`",
+                )
+            for line in filter(None, said if any(said) else ["the safe state is confirmed"]):
                 console.print(f"{bench.name:18} {line}", markup=False, soft_wrap=True)
     if any(bench.unconfirmed or bench.left for bench in benches):
         raise typer.Exit(1)
@@ -60,13 +64,13 @@ def status(as_json: Json = False, database: Database = None) -> None:
 
 @app.command("clear")
 def clear(
-    bench: Annotated[str, typer.Argument(metavar="NAME", help="Name of the bench, as `labctl bench status` says it.")],
-    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Who has looked at it.")],
-    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="What was found.")] = "looked at the bench",
+    bench: Annotated[str, typer.Argument(metavar="NAME", help="Name of the bench, as `labctl bench status` shows it.")],
+    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Who has inspected it.")],
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="What was found.")] = "inspected the bench",
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Say that you have looked at a bench that was not confirmed safe; campaigns may start on it again."""
+    """Record that you have inspected a bench that was not confirmed safe; campaigns may start on it again."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import CLEAR_BENCH
     from labctl.services.commands.requests import ToBench
@@ -74,7 +78,7 @@ def clear(
 
     with one_clear_line():
         answer = execute(database, CLEAR_BENCH, ToBench(bench, ClearRequest(by=by, reason=reason)))
-    print_json(answer) if as_json else console.print(f"{answer.name}: nothing is unconfirmed", markup=False)
+    print_json(answer) if as_json else console.print(f"{answer.name}: the safe state is confirmed", markup=False)
 
 
 @app.command("list")

@@ -13,11 +13,11 @@ from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, Seri
 from labctl.cli.output import console, print_json
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
-By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it.")]
+By = Annotated[str, typer.Option("--by", metavar="NAME", help="Name of the person.")]
 Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")]
 Override = Annotated[
     bool,
-    typer.Option("--override", help="Certify in spite of what speaks against it; the reason must be a sentence."),
+    typer.Option("--override", help="Certify despite objections; the reason must be a sentence."),
 ]
 
 
@@ -57,14 +57,16 @@ def certify(
     version: Version,
     by: By,
     reason: Reason,
-    due_days: Annotated[int | None, typer.Option("--due-days", metavar="N", help="Days until it is due again.")] = None,
+    due_days: Annotated[
+        int | None, typer.Option("--due-days", metavar="N", help="Days until the next calibration is due.")
+    ] = None,
     override: Override = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Make a version the unit's current one. An older version again is a rollback.
+    """Certify a version: put it in force. Certifying an older version again is a rollback.
 
-    Refused where the verdict on it, its errors or its data speak against it, unless --override.
+    Refused where its verdict, its errors or its data give objections, unless --override.
     """
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import CERTIFY
@@ -85,7 +87,7 @@ def certify(
 def revoke(
     serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
 ) -> None:
-    """Take a version out of force."""
+    """Revoke the certification of a version."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import REVOKE
     from labctl.services.commands.requests import ToVersion
@@ -102,7 +104,8 @@ def revoke(
 
 
 def certifications(serial: Serial, as_json: Json = False, database: Database = None) -> None:
-    """List what was certified and revoked, newest first, with the verdict of then and what was overridden."""
+    """List what was certified and revoked, newest first, with the verdict at that time and the overridden
+    objections."""
     from labctl.services.calibrations.certification import list_certifications
     from labctl.services.commands.open import open_readonly
 
@@ -118,7 +121,9 @@ def certifications(serial: Serial, as_json: Json = False, database: Database = N
 
 def calibration(
     serial: Serial,
-    version: Annotated[int | None, typer.Option("--version", metavar="N", help="Default: the certified one.")] = None,
+    version: Annotated[
+        int | None, typer.Option("--version", metavar="N", help="Calibration version; default: the certified one.")
+    ] = None,
     format_: Annotated[str, typer.Option("--format", metavar="NAME", help="json, c ...")] = "json",
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write a file instead of printing.")] = None,
     as_json: Json = False,  # noqa: ARG001  the calibration file is JSON already

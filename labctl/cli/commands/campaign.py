@@ -17,31 +17,50 @@ if TYPE_CHECKING:
 app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units.")
 
 Recipe = Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")]
-Clip = Annotated[bool, typer.Option("--clip", help="Leave out points beyond the bench or a unit, and say which.")]
+Clip = Annotated[
+    bool, typer.Option("--clip", help="Leave out points beyond the limits of the bench or a unit, and list them.")
+]
 Speed = Annotated[
     float | None,
-    typer.Option("--speed", metavar="X", help="A simulated bench, X times as fast; default: as fast as it can."),
+    typer.Option(
+        "--speed", metavar="X", help="Speed of a simulated bench: X times real time; default: as fast as possible."
+    ),
 ]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the simulated bench.")]
 At = Annotated[
-    str | None, typer.Option("--at", metavar="TIME", help="Begin then: 2026-03-28T22:00, or now: when it is free.")
+    str | None,
+    typer.Option(
+        "--at", metavar="TIME", help="Time of the start: 2026-03-28T22:00, or `now`: as soon as the bench is free."
+    ),
 ]
-Cron = Annotated[str | None, typer.Option("--cron", metavar="LINE", help="Begin again and again: '30 22 * * FRI'.")]
+Cron = Annotated[
+    str | None, typer.Option("--cron", metavar="LINE", help="Cron line of repeated starts: '30 22 * * FRI'.")
+]
 TimeZone = Annotated[
     str | None,
     typer.Option("--time-zone", metavar="NAME", help="Time zone of --at and --cron; default: that of this computer."),
 ]
-Priority = Annotated[int | None, typer.Option("--priority", metavar="N", help="The highest goes first; default: 0.")]
+Priority = Annotated[
+    int | None,
+    typer.Option(
+        "--priority", metavar="N", help="Of starts that are due the highest priority begins first; default: 0."
+    ),
+]
 LateLimit = Annotated[
     float | None,
-    typer.Option("--late-limit-s", metavar="S", help="Later it is not begun; 0 skips a missed start."),
+    typer.Option(
+        "--late-limit-s",
+        metavar="S",
+        help="A start that is later than this by S seconds is skipped; 0 skips every missed start.",
+    ),
 ]
 ClearConfirmedBy = Annotated[
     str | None,
     typer.Option(
         "--clear-confirmed-by",
         metavar="NAME",
-        help="Of a real bench: NAME confirms chamber clear, table free, limiter on. Default: asked here.",
+        help="For a real bench: NAME confirms that the chamber is clear, the table free and "
+        "the limiter on. Default: asked at the terminal.",
     ),
 ]
 
@@ -52,12 +71,16 @@ def plan(
     bench: BenchName = None,
     clip: Clip = False,
     visibility: Annotated[
-        bool, typer.Option("--visibility", help="Also say what the plan could and could not find, from which size on.")
+        bool,
+        typer.Option(
+            "--visibility",
+            help="Also list the effects that the plan can and cannot detect, with the smallest detectable size.",
+        ),
     ] = False,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
-    """Say what a campaign would do and how long it takes. Nothing moves."""
+    """Show the steps of a campaign and how long it takes. Nothing moves."""
     from instruments.clock import SystemClock
     from labctl.services.planning.loading import describe_plan
     from labctl.services.schedule.planned_start import planned_start
@@ -88,9 +111,10 @@ def start(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Run a recipe. A service that holds the database runs it on its bench; else it runs here, until it is over.
+    """Run a recipe. A service that uses the database runs it on its bench; without one it runs in this terminal
+    until it ends.
 
-    With --at or --cron it is entered into the schedule, which only a service (`labctl serve`) carries out. On a bench
+    With --at or --cron it is added to the schedule, which only a service (`labctl serve`) carries out. On a bench
     that is not simulated a person has to confirm first that the bench is clear, or will be at that time.
     """
     from labctl.cli.campaign_terminal import campaign_terminal
@@ -134,7 +158,7 @@ def list_(as_json: Json = False, database: Database = None) -> None:
 
 @app.command("status")
 def status(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
-    """Say where a campaign is: live from a running service, else what the database tells."""
+    """Show the status of a campaign: live from a running service, else from the database."""
     from labctl.services.commands.open import current_status
 
     with one_clear_line():

@@ -15,11 +15,13 @@ from labctl.cli.output import console, print_json
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse
 
-#: How long an abort is followed until the bench is safe, and how often it is looked at, s.
+#: How long an abort is followed until the bench is safe, and how often it is read, s.
 SAFE_WITHIN_S, LOOK_S = 120.0, 0.2
 
 Id = Annotated[int, typer.Argument(metavar="ID", help="Campaign.")]
-By = Annotated[str | None, typer.Option("--by", metavar="NAME", help="Who says so; default: the user logged in.")]
+By = Annotated[
+    str | None, typer.Option("--by", metavar="NAME", help="Name of the person; default: the user who is logged in.")
+]
 
 
 def person(by: str | None) -> str:
@@ -31,7 +33,7 @@ def person(by: str | None) -> str:
 
 
 def watch(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
-    """Follow a campaign until it ends: from a running service live, else what the database tells."""
+    """Follow a campaign until it ends: live from a running service, else from the database."""
     from instruments.clock import SystemClock
     from labctl.cli.progress_bar import CampaignProgress
     from labctl.services.commands.open import current_status
@@ -60,7 +62,7 @@ def pause(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Hold a running campaign after the present data set; the bench is still watched."""
+    """Pause a running campaign after the present data set; the bench is still monitored."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import PAUSE_CAMPAIGN
     from labctl.services.commands.requests import ToCampaign
@@ -79,14 +81,20 @@ def resume(
     bench: BenchName = None,
     power: Annotated[
         str | None,
-        typer.Option("--power", metavar="lost|kept", help="Were the units off meanwhile? Default: if the host."),
+        typer.Option(
+            "--power",
+            metavar="lost|kept",
+            help="Whether the units were off meanwhile; default: yes if this computer was.",
+        ),
     ] = None,
-    speed: Annotated[float | None, typer.Option("--speed", metavar="X", help="Of a simulated bench.")] = None,
+    speed: Annotated[
+        float | None, typer.Option("--speed", metavar="X", help="Speed of a simulated bench: X times real time.")
+    ] = None,
     by: By = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Let a paused campaign go on, or take up one that was interrupted, failed or aborted; safe state first."""
+    """Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first."""
     from labctl.cli.campaign_terminal import campaign_terminal
     from labctl.services.commands.open import campaign_to_resume, open_commands
     from labctl.services.commands.registry import RESUME_CAMPAIGN
@@ -107,7 +115,7 @@ def abort(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """End a running campaign now, in the safe state. What was measured is kept."""
+    """End a running campaign now, in the safe state. The data measured so far are stored."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import ABORT_CAMPAIGN
     from labctl.services.commands.requests import ToCampaign
@@ -133,7 +141,9 @@ def _at_its_end(database: str | None, answer: CampaignResponse) -> CampaignRespo
 
 
 def confirm(
-    prompt: Annotated[str, typer.Argument(metavar="QUESTION", help="Id of the question, as status or watch shows it.")],
+    prompt: Annotated[
+        str, typer.Argument(metavar="QUESTION", help="Id of the question, as `campaign status` or `watch` shows it.")
+    ],
     campaign: Annotated[
         int | None, typer.Option("--campaign", metavar="ID", help="Campaign; default: the newest.")
     ] = None,
@@ -144,7 +154,7 @@ def confirm(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Answer a campaign's question: it is done, or cannot be. An answer to an older question is refused."""
+    """Answer a campaign's question: done, or cannot be done. An answer to an older question is refused."""
     from labctl.services.commands.open import current_status, execute
     from labctl.services.commands.registry import CONFIRM_PROMPT
     from labctl.services.commands.requests import ToCampaign

@@ -24,11 +24,13 @@ if TYPE_CHECKING:
 VersionOption = Annotated[int | None, typer.Option("--version", metavar="N", help="Version; default: the newest.")]
 FormulaOption = Annotated[
     list[str] | None,
-    typer.Option("--formula", metavar="'NAME: EXPR'", help="An effect of your own, or a TOML file of them."),
+    typer.Option(
+        "--formula", metavar="'NAME: EXPR'", help="Your own effect as 'name: formula', or a TOML file of effects."
+    ),
 ]
 
 
-OtherUnit = Annotated[bool, typer.Option("--other-unit", help="The recording may be of another unit.")]
+OtherUnit = Annotated[bool, typer.Option("--other-unit", help="Accept a recording of another unit.")]
 
 
 def verify(
@@ -39,7 +41,7 @@ def verify(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Apply a version as it is to a recording, nothing refitted: its errors, and whether they are as expected."""
+    """Apply a version to a recording without refitting: its errors, and whether they are as small as expected."""
     from labctl.services.commands.open import open_readonly
     from labctl.services.criticism.verification import verify_unit
 
@@ -68,7 +70,7 @@ def criticise(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Hold a version against a recording: what is left, where, and which effect may be missing."""
+    """Compare a version with a recording: the residual, where it is large, and which effects may be missing."""
     from labctl.services.commands.open import open_readonly
     from labctl.services.criticism.criticise import criticise_unit, write_next
 
@@ -102,7 +104,7 @@ def written(sources: list[str] | None) -> list[Formula]:
 def improve(
     serial: Serial,
     add: Annotated[list[str] | None, typer.Option("--add", metavar="EFFECT", help="Effect to add.")] = None,
-    remove: Annotated[list[str] | None, typer.Option("--remove", metavar="EFFECT", help="Effect to take out.")] = None,
+    remove: Annotated[list[str] | None, typer.Option("--remove", metavar="EFFECT", help="Effect to remove.")] = None,
     formula: FormulaOption = None,
     version: VersionOption = None,
     recording: RecordingId = None,
@@ -141,7 +143,8 @@ def ladder(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Show the error of the versions on one recording, each after its parent, down to the noise floor."""
+    """Show the errors of the versions on one recording, each after the version it was changed from, and the noise
+    floor."""
     from labctl.services.commands.open import open_readonly
     from labctl.services.criticism.ladder import ladder as ladder_of
 

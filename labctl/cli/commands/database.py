@@ -17,7 +17,7 @@ def backup(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Copy the database to one file, also while a service or a campaign uses it, and check the copy."""
+    """Copy the database to one file and check the copy; also while a service or a campaign uses the database."""
     from labctl.services.admin.maintenance import back_up
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import NOTE_BACKUP
@@ -32,14 +32,15 @@ def backup(
         stderr.print(f"labctl: {answer.remark}", markup=False)
     for finding in answer.findings:
         stderr.print(
-            f"labctl: the copy is what the database was, and there: {finding.part}: {finding.text}", markup=False
+            f"labctl: the copy equals the database, in which damage was found: {finding.part}: {finding.text}",
+            markup=False,
         )
     if answer.findings:
         raise typer.Exit(1)
 
 
 def check(as_json: Json = False, database: Database = None) -> None:
-    """Check that all is as it was written: file, schema, every reading, calibrations, audit trail."""
+    """Check the database for damage: file, schema, every reading, calibrations, audit trail."""
     from labctl.services.admin.maintenance import check_database
 
     def said(part: str, done: int, total: int) -> None:
@@ -54,7 +55,7 @@ def check(as_json: Json = False, database: Database = None) -> None:
             console.print(f"{finding.part}: {finding.text}", markup=False, soft_wrap=True)
         looked = f"{answer.blocks} blocks, {answer.calibrations} calibrations, {answer.audit_rows} audit rows"
         number = len(answer.findings)
-        verdict = "all as it was written" if answer.ok else f"{number} finding{'s' if number > 1 else ''}"
+        verdict = "no damage found" if answer.ok else f"{number} finding{'s' if number > 1 else ''}"
         console.print(f"{answer.database}: {looked}: {verdict}", markup=False, soft_wrap=True)
     if not answer.ok:
         raise typer.Exit(1)

@@ -10,9 +10,9 @@ from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr, table
 
-app = typer.Typer(no_args_is_help=True, help="API keys: who may read, act and approve over HTTP.")
+app = typer.Typer(no_args_is_help=True, help="API keys: who may read, make changes and approve over HTTP.")
 
-KeyName = Annotated[str, typer.Argument(metavar="NAME", help="Whose key it is; the audit trail shows this name.")]
+KeyName = Annotated[str, typer.Argument(metavar="NAME", help="Name of the key's owner; the audit trail shows it.")]
 Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why.")]
 
 
@@ -23,7 +23,7 @@ def create(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Make a key and print it, this once: only its digest is kept."""
+    """Make a key and print it once: only its digest is stored."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import CREATE_KEY
     from labctl.services.schemas.admin import KeyRequest, Role
@@ -34,13 +34,17 @@ def create(
         print_json(answer)
         return
     console.print(answer.key, markup=False, soft_wrap=True)
-    may = {Role.VIEWER: "read", Role.OPERATOR: "read and act", Role.APPROVER: "read, act and approve"}[answer.role]
-    stderr.print(f"{answer.name} may {may}. The key is not shown again: keep it now.", markup=False)
+    may = {
+        Role.VIEWER: "read",
+        Role.OPERATOR: "read, and make changes",
+        Role.APPROVER: "read, make changes and approve",
+    }[answer.role]
+    stderr.print(f"{answer.name} may {may}. The key is not shown again: store it now.", markup=False)
 
 
 @app.command("list")
 def list_(as_json: Json = False, database: Database = None) -> None:
-    """List every key that was made, by name; the keys themselves are kept nowhere."""
+    """List every key that was made, by name; the keys themselves are not stored."""
     from labctl.services.admin.api_keys import list_keys
     from labctl.services.commands.open import open_readonly
 
@@ -60,7 +64,7 @@ def list_(as_json: Json = False, database: Database = None) -> None:
 def revoke(
     name: KeyName, reason: Reason = "revoked from the command line", as_json: Json = False, database: Database = None
 ) -> None:
-    """Take a key's power away, at once."""
+    """Revoke a key, at once."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import REVOKE_KEY
     from labctl.services.commands.requests import ToKey

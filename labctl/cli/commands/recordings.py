@@ -23,16 +23,16 @@ def import_(
     ],
     importer: Annotated[
         str | None,
-        typer.Option("--format", metavar="NAME", help="Importer; default: the one that is surest of the file."),
+        typer.Option("--format", metavar="NAME", help="Importer; default: the one that recognises the file best."),
     ] = None,
     option: Annotated[
         list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; as often as there are some."),
+        typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; may be repeated."),
     ] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Take in a recording made on any bench: in the interchange format, or in one that an installed importer knows."""
+    """Import a recording made on any bench: in the interchange format, or in one that an installed importer knows."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import IMPORT_RECORDING
     from labctl.services.commands.requests import RecordingFolder
@@ -53,7 +53,7 @@ def import_(
 @export_app.command("recording")
 def export_recording(
     recording: Annotated[int, typer.Argument(metavar="ID", help="Recording.")],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write; it may not exist yet.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder to write; it must not exist.")],
     csv: Annotated[bool, typer.Option("--csv", help="CSV instead of Parquet.")] = False,
     points: Annotated[bool, typer.Option("--points", help="One row per data set instead of every reading.")] = False,
     as_json: Json = False,
@@ -74,7 +74,7 @@ def export_recording(
 
 def simulate(
     recipe: Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped one.")],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write; it may not exist yet.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder to write; it must not exist.")],
     bench: Annotated[
         str | None, typer.Option("--bench", metavar="FILE", help="Bench; default: the recipe's own.")
     ] = None,

@@ -21,11 +21,11 @@ StartId = Annotated[int, typer.Argument(metavar="ID", help="Entry of the schedul
 
 @app.command("list")
 def list_(
-    ended: Annotated[bool, typer.Option("--all", help="Also entries that are over.")] = False,
+    ended: Annotated[bool, typer.Option("--all", help="Also entries that have ended.")] = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """List what begins when, next first."""
+    """List the scheduled starts, the next first."""
     from labctl.services.commands.open import open_readonly, service_url
     from labctl.services.schedule.queue import list_starts
 
@@ -45,12 +45,12 @@ def list_(
         )  # fmt: skip
     console.print(rows)
     if answers and not served:
-        stderr.print("no service holds this database, so nothing begins; `labctl serve` does", style="yellow")
+        stderr.print("no service uses this database, so no start is carried out; run `labctl serve`", style="yellow")
 
 
 @app.command("show")
 def show(start: StartId, as_json: Json = False, database: Database = None) -> None:
-    """Say when an entry begins next and what became of each start that fell due."""
+    """Show when an entry begins next, and the outcome of each past start."""
     from labctl.services.commands.open import open_readonly
     from labctl.services.schedule.queue import start_status
 
@@ -61,7 +61,7 @@ def show(start: StartId, as_json: Json = False, database: Database = None) -> No
 
 @app.command("cancel")
 def cancel(start: StartId, as_json: Json = False, database: Database = None) -> None:
-    """Take an entry out of the schedule. A campaign that it has begun runs on."""
+    """Remove an entry from the schedule. A campaign that it has started continues."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import CANCEL_START
     from labctl.services.commands.requests import ToStart

@@ -16,19 +16,22 @@ from labctl.cli.output import console, print_json, stderr
 
 def serve(
     bench: BenchName = None,
-    simulate: Annotated[bool, typer.Option("--simulate", help="A simulated bench; default triaxial-sim.")] = False,
+    simulate: Annotated[bool, typer.Option("--simulate", help="Run a simulated bench; default: triaxial-sim.")] = False,
     speed: Annotated[
         float,
         typer.Option(
             "--speed",
             metavar="X",
-            help="Simulated bench, X times as fast; 0: as it can. Too fast for this machine, it loses readings.",
+            help="Speed of a simulated bench: X times real time; 0: as fast as this computer keeps up.",
         ),
     ] = 1.0,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", metavar="N", help="Port; 0 takes a free one.")] = 8420,
     require_keys: Annotated[
-        bool, typer.Option("--require-keys", help="Ask for a key on loopback too; elsewhere one is always asked for.")
+        bool,
+        typer.Option(
+            "--require-keys", help="Require a key on loopback too; on other addresses a key is always required."
+        ),
     ] = False,
     max_upload_mib: Annotated[
         int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
@@ -36,7 +39,8 @@ def serve(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Serve calibrations over HTTP and run campaigns on the bench. Stops with Ctrl-C, bench left safe."""
+    """Serve calibrations over HTTP and run campaigns on the bench. Ctrl-C stops it and leaves the bench in its
+    safe state."""
     from labctl.processes.settings import ServeRequest
     from labctl.processes.supervisor import Ready, serve_forever
     from labctl.services.schemas.service import ServiceReady
@@ -53,7 +57,7 @@ def serve(
             said = ServiceReady(**asdict(service), unconfirmed=unconfirmed, cut_short=cut_short)
             print_json(said, one_line=True)
             return
-        console.print(f"labctl listens on {service.url}  (API text: {service.url}/api-docs)", markup=False)
+        console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)", markup=False)
         for text in filter(None, (unconfirmed, cut_short)):
             console.print(text, style="yellow", markup=False, soft_wrap=True)
 
@@ -63,7 +67,8 @@ def serve(
 
 
 def _found(source: str, database: str | None) -> tuple[str, str]:
-    """Say what is wrong with a bench when its service starts, and which campaign was left there; empty for nothing."""
+    """Return what is wrong with a bench when its service starts, and which campaign was left there; empty for
+    nothing."""
     from labctl.services.benches.confirmation import describe_bench
     from labctl.services.campaigns.recovery import describe_recovery
     from labctl.services.commands.open import open_readonly
@@ -79,19 +84,26 @@ def _found(source: str, database: str | None) -> tuple[str, str]:
 def simulator(
     bench: Annotated[str, typer.Argument(metavar="BENCH", help="Bench file, or the name of a shipped one.")],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Write a bench file that points at the simulator here.")
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="Path of a bench file to write, with the addresses of the simulator."
+        ),
     ] = None,
     speed: Annotated[
         float, typer.Option("--speed", metavar="X", help="Speed of the simulated instruments: X times real time.")
     ] = 1.0,
     log: Annotated[
         Path | None,
-        typer.Option("--log", metavar="FILE", help="Write what every instrument hears here, as JSON lines."),
+        typer.Option(
+            "--log",
+            metavar="FILE",
+            help="Path of a file to write: all bytes that the instruments receive, as JSON lines.",
+        ),
     ] = None,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
-    """Put a bench's simulated instruments on real pseudo-terminals and TCP ports, until Ctrl-C."""
+    """Serve a bench's simulated instruments on pseudo-terminals and TCP ports, until Ctrl-C."""
     from labctl.services.benches.check import serve_simulator
     from labctl.services.schemas.service import SimulatorReady
 
@@ -109,12 +121,14 @@ def simulator(
 
 
 def demo(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the demo's files go.")] = Path("demo-output"),
-    quick: Annotated[bool, typer.Option("--quick", help="The same story on a smaller tri-axial campaign.")] = False,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the demo's files.")] = Path(
+        "demo-output"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Use a smaller tri-axial campaign, to be faster.")] = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Run the whole job on simulated benches in virtual time, and on a real gyro's recording; print each result."""
+    """Demonstrate every step on simulated benches in virtual time and on a real gyro's recording; print each result."""
     from labctl.cli.demo import run_demo
 
     with one_clear_line():

@@ -17,13 +17,13 @@ HIDDEN = {"scale_factor_asymmetry": 2e-4}
 
 def play(demo: DemoRunner, real_serial: str) -> None:
     """Tell both walks; what is said comes from the criticism alone."""
-    demo.title("(e) What is missing? A gyro with something hidden in it")
+    demo.title("(e) Which effect is missing? A gyro with a hidden effect")
     campaign = demo.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
     demo.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])
     answer = _criticise_and_improve(demo, SERIAL)
-    demo.say(f"(hidden in it was: {', '.join(HIDDEN)})")
+    demo.say(f"(hidden effect: {', '.join(HIDDEN)})")
     demo.figures["hidden"] = {"hidden": list(HIDDEN), "named": [*answer.named], "verdict": answer.verdict}
-    demo.title("The same walk through the real gyro's recording, from a plain model")
+    demo.title("The same steps on the real gyro's recording, from a simple model")
     demo.fit(real_serial, "bias_scale", demo.store.recordings.of_unit(real_serial)[0].id)
     answer = _criticise_and_improve(demo, real_serial)
     demo.figures["real_walk"] = {"named": [*answer.named], "verdict": answer.verdict}

@@ -46,4 +46,7 @@ def _address(service: subprocess.Popen[str]) -> str:
     for line in service.stdout:
         if '"url"' in line:
             return line.split('"')[3]
-    raise RuntimeError("the service of the demo ended before it was ready")
+    raise RuntimeError(
+        "the service of the demo ended before it was ready; run `labctl serve --simulate` to see its error; run "
+        "`labctl serve --simulate` to see its error"
+    )

@@ -34,7 +34,7 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
         for serial in serials:
             _certify_best(demo, serial)
         serve_calibrations.play(demo, serials)
-        demo.title("Where to look")
+        demo.title("Next steps")
         demo.say(f"labctl serve --simulate --database {location}     then http://127.0.0.1:8420/api-docs")
         demo.say(f"labctl campaign list --database {location};  labctl calibration FOG-0001 --database {location}")
     return demo.figures

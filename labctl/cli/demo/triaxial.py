@@ -21,7 +21,7 @@ def play(demo: DemoRunner, *, quick: bool) -> None:
     versions = {
         model: demo.fit(SERIAL, model, first.recordings[SERIAL]).version for model in ("yang2018", "single_temperature")
     }
-    demo.say("the same unit on another day, which no fit has seen:")
+    demo.say("the same unit on another day, with data that no fit used:")
     second = demo.campaign(recipe, "triaxial-sim", noise_seed=1)
     context = demo.context(second.recordings[SERIAL])
     errors = {"raw": {axis: context.outputs[axis] - context.true_rate_dps(axis) for axis in context.outputs}}

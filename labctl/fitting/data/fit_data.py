@@ -125,11 +125,14 @@ def fit_data_of(recording: Recording, covered: Covered | None = None) -> FitData
     """
     if recording.info.kind == "coefficients":
         raise BadInput(
-            f"{recording.info.serial}: the recording is a table of coefficients; only model weiss1995 takes one"
+            f"{recording.info.serial}: the recording is a table of coefficients; fit it with --model weiss1995"
         )
     points = to_points(recording)
     if len(points) == 0:
-        raise NotEnoughData(f"{recording.info.serial}: the recording has no complete data set with valid readings")
+        raise NotEnoughData(
+            f"{recording.info.serial}: the recording has no complete data set with valid readings; check column "
+            "'valid', or record data sets"
+        )
     points = with_temperature(points)
     info = points.info
     outputs: dict[str, Array] = {axis: points.gyro_dps(axis) for axis in info.axes}

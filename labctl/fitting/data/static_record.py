@@ -1,4 +1,4 @@
-"""The static record in a recording: the longest stretch at rest, at one temperature, without a gap."""
+"""The static record in a recording: the longest section at rest, at one temperature, without a gap."""
 
 from __future__ import annotations
 

@@ -23,8 +23,8 @@ def with_temperature(recording: Recording) -> Recording:
     warm = temperature_of(columns)
     if warm is None:
         raise NotEnoughData(
-            f"{recording.info.serial}: column 'temperature_c' is missing, and so is 'chamber_c', which could stand in "
-            "for it; a fit needs one of the two"
+            f"{recording.info.serial}: column 'temperature_c' is missing, and so is 'chamber_c', which can replace "
+            "it; add one of the two"
         )
     if environment is not None:
         theirs = {name: values for name, values in environment.items() if name != "temperature_c"}

@@ -120,8 +120,8 @@ def parse_term(text: str) -> Term:
         raise BadInput(f"effect {found.id!r} has no polynomial order; write it without ':{order_text}'")
     if not order_text.strip().isdigit() or not found.min_order <= int(order_text) <= found.max_order:
         raise BadInput(
-            f"effect {found.id!r}: order {order_text!r} is not a whole number "
-            f"from {found.min_order} to {found.max_order}"
+            f"effect {found.id!r}: order {order_text!r} is not a whole number; give one from {found.min_order} to "
+            f"{found.max_order}"
         )
     return Term(found.id, int(order_text))
 

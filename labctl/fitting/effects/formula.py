@@ -117,24 +117,26 @@ class Formula(Effect):
             if name == "table_rate_dps" and len(channels.rates) == 1:  # in use the unit turns without a table
                 return channels.rate_dps(axis)
             raise BadInput(
-                f"formula {self.name!r}: there is no column {name!r} here; the rate along the gyro's own axis is "
-                f"{OWN_RATE}"
+                f"formula {self.name!r}: there is no column {name!r} here; use a column of the recording; the rate "
+                f"along the gyro's own axis is {OWN_RATE}"
             )
         values = channels[name]
         if values.dtype.kind not in "fiub":
-            raise BadInput(f"formula {self.name!r}: column {name!r} holds text ({values[0]!s}), not numbers")
+            raise BadInput(
+                f"formula {self.name!r}: column {name!r} holds text ({values[0]!s}); use a column of numbers"
+            )
         return np.asarray(values, dtype=np.float64)
 
 
 def _parsed(name: str, text: str) -> ast.Expression:
     if len(text) > LONGEST:
-        raise BadInput(f"formula {name!r}: {len(text)} characters; at most {LONGEST}")
+        raise BadInput(f"formula {name!r}: {len(text)} characters; shorten it to at most {LONGEST}")
     try:
         with _PARSER:
             tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         said = error.args[0] if error.args else type(error).__name__
-        raise BadInput(f"formula {name!r}: {text!r} cannot be read ({said})") from None
+        raise BadInput(f"formula {name!r}: {text!r} cannot be read ({said}); correct it") from None
     level: list[ast.AST] = [tree.body]
     depth = 0
     while level:
@@ -151,13 +153,16 @@ def _check(name: str, node: ast.AST) -> None:
     if isinstance(node, ast.Call):
         known = isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS
         if not known or len(node.args) != 1 or node.keywords:
-            raise BadInput(f"formula {name!r}: only {', '.join(FUNCTIONS)} of one value may be called")
+            raise BadInput(
+                f"formula {name!r}: only {', '.join(FUNCTIONS)} of one value may be called; rewrite the formula with "
+                "these"
+            )
     elif isinstance(node, ast.Constant):
         if not isinstance(node.value, int | float) or isinstance(node.value, bool):
-            raise BadInput(f"formula {name!r}: {node.value!r} is not a number")
+            raise BadInput(f"formula {name!r}: {node.value!r} is not a number; correct it")
     elif isinstance(node, ast.BinOp | ast.UnaryOp):
         if type(node.op) not in OPERATORS:
-            raise BadInput(f"formula {name!r}: only + - * / ** may be used")
+            raise BadInput(f"formula {name!r}: an operator is not allowed; use + - * / **")
     elif not isinstance(node, ast.Expression | ast.Name | ast.Load | ast.operator | ast.unaryop):
         raise BadInput(
             f"formula {name!r}: {type(node).__name__} may not be used; write channels, numbers and + - * / **"
@@ -207,10 +212,10 @@ def _from_file(path: Path) -> list[Formula]:
     except (OSError, UnicodeDecodeError, TOMLDecodeError) as error:
         raise BadInput(f"formulas {path}: {error}") from error
     except (KeyError, TypeError) as error:
-        raise BadInput(f"formulas {path}: each [[effects]] needs id and formula ({error} is missing)") from error
+        raise BadInput(f"formulas {path}: an [[effects]] entry lacks {error}; give id and formula") from error
 
 
 def _made(name: str, text: str, sentence: str) -> Formula:
     if not NAME.fullmatch(name):
-        raise BadInput(f"formula name {name!r}: small letters, digits and _ only, beginning with a letter")
+        raise BadInput(f"formula name {name!r}: use small letters, digits and _ only, beginning with a letter")
     return Formula(name, text, sentence)

@@ -44,4 +44,4 @@ def refuse_useless(effect: Effect) -> None:
         raise ValueError(f"effect {effect.id!r} gives values of shape {np.shape(column.values)} for {n} data sets")
     span = Span(100.0, 10.0, (10.0, 20.0, 40.0, 60.0, 80.0, 100.0), frozenset(effect.needs))
     if not all(isinstance(term, Term) for term in effect.options(span)):
-        raise TypeError(f"effect {effect.id!r} competes with options that are no Term")
+        raise TypeError(f"effect {effect.id!r} has options that are not of class Term; return Terms")

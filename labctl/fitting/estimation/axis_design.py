@@ -64,8 +64,9 @@ def axis_design(
         unknowns += added.shape[1]
         if unknowns > len(data):  # before each further column is compared with all of them
             raise NotEnoughData(
-                f"{data.info.serial}, axis {axis}: model {model.name[:80]} has more coefficients than the recording's "
-                f"{len(data)} data sets can tell; leave effects out, or measure more"
+                f"{data.info.serial}, axis {axis}: model {model.name[:80]} has more coefficients than the "
+                f"recording's {len(data)} data sets determine; leave effects out"
+                f", or measure more"
             )
         spread.append(np.ones((nodes, 1)) if owner in steady else np.eye(nodes))
         names.append((owner, column.name, column.unit))

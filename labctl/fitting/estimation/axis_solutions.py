@@ -87,7 +87,7 @@ def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign,
     if design.columns.shape[1] == 0:
         raise NotEnoughData(
             f"{data.info.serial}, axis {axis}: the recording exercises no effect of model {model.name} "
-            f"({', '.join(model.effect_ids)}); turn the unit about its other axes too"
+            f"({', '.join(model.effect_ids)}); record rates about the unit's other axes too"
         )
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
     columns, y, scatter = with_known_size(

@@ -58,7 +58,7 @@ def _rows_of(recording: Recording, axis: str) -> tuple[Array, Array, Array]:
     if len(nodes) < 2 or np.any(np.diff(nodes) <= 0):
         raise NotEnoughData(
             f"{recording.info.serial}, axis {axis}: a table needs at least two different temperatures, each once; "
-            f"it has {len(nodes)} rows at {len(np.unique(nodes))} temperatures"
+            f"it has {len(nodes)} rows at {len(np.unique(nodes))} temperatures, correct column temperature_c"
         )
     return nodes, scale, offset
 

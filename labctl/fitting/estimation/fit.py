@@ -45,7 +45,7 @@ def fit(
 
 @single_threaded
 def fit_preset(data: FitData, preset: Preset) -> FitResult:
-    """Fit a preset to data sets; its errors include those on temperatures that the fit has not seen.
+    """Fit a preset to data sets; its errors include those on temperatures left out of the fit.
 
     Raises NotEnoughData where the data sets do not determine the model, NotConverged where it cannot be inverted.
     """

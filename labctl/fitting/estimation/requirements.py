@@ -18,7 +18,10 @@ def require_enough_data(data: FitData, model: ErrorModel) -> None:
     serial = data.info.serial
     for term in model.terms:
         if absent := data.channels.missing(kind_of(term).needs):
-            raise NotEnoughData(f"{serial}: effect {term.effect} needs column {absent[0]!r}; the recording has none")
+            raise NotEnoughData(
+                f"{serial}: effect {term.effect} needs column {absent[0]!r}; the recording has none: add the column, "
+                "or leave the effect out"
+            )
     _require_rates(data, model)
     _require_temperatures(data, model)
 
@@ -47,6 +50,7 @@ def _require_temperatures(data: FitData, model: ErrorModel) -> None:
             )
         if span < SPAN_PER_ORDER_C * (least - 1):
             raise NotEnoughData(
-                f"{serial}: the temperatures span {span:.2f} deg C, too little for order {least - 1} of {term.effect}; "
-                f"it takes at least {SPAN_PER_ORDER_C * (least - 1):.0f} deg C, or a lower order (`{term.effect}:N`)"
+                f"{serial}: the temperatures span {span:.2f} deg C, too little for order {least - 1} of "
+                f"{term.effect}; measure over at least"
+                f" {SPAN_PER_ORDER_C * (least - 1):.0f} deg C, or a lower order (`{term.effect}:N`)"
             )

@@ -40,8 +40,10 @@ def _centre(data: FitData) -> Reference:
 def _nodes(data: FitData, points: int, name: str) -> tuple[float, ...]:
     if data.levels is None:
         raise NotEnoughData(
-            f"{data.info.serial}: model {name} needs discrete temperature levels; these temperatures run on from "
-            f"{data.temperature_c.min():.1f} to {data.temperature_c.max():.1f} deg C without gaps"
+            f"{data.info.serial}: model {name} needs discrete temperature levels; these temperatures are continuous "
+            "from "
+            f"{data.temperature_c.min():.1f} to {data.temperature_c.max():.1f} deg C without gaps: fit `--effects` "
+            "instead, or measure at fixed temperatures"
         )
     means = level_means(data.temperature_c, data.levels)
     if len(means) < points:
@@ -69,7 +71,10 @@ def _yang2018(data: FitData) -> tuple[ErrorModel, Rows]:
 def _single_temperature(data: FitData) -> tuple[ErrorModel, Rows]:
     levels = data.levels
     if levels is None:
-        raise NotEnoughData(f"{data.info.serial}: model single_temperature needs discrete temperature levels")
+        raise NotEnoughData(
+            f"{data.info.serial}: model single_temperature needs discrete temperature levels; fit `--effects "
+            "bias,scale_factor,misalignment` instead"
+        )
     nearest = int(np.argmin(np.abs(level_means(data.temperature_c, levels) - 25.0)))
     return ErrorModel("single_temperature", ALIGNED, "rate", reference=Reference(25.0)), levels == nearest
 
@@ -118,11 +123,11 @@ def preset_for(model: str | None, effects: list[str]) -> Preset:
     """
     terms = tuple(parse_term(text) for text in effects)
     if model is None and not terms:
-        raise BadInput(f"say which model to fit: --model {'|'.join(PRESETS)} or --effects A,B,C")
+        raise BadInput(f"give the model to fit: --model {'|'.join(PRESETS)} or --effects A,B,C")
     if model is None:
         return Preset("custom", lambda data: (_custom(terms, data), _all(data)))
     if model not in PRESETS:
-        raise BadInput(f"error model {model!r} is not known; there are {', '.join(PRESETS)}")
+        raise BadInput(f"error model {model!r} is not known; choose one of {', '.join(PRESETS)}")
     preset, _ = PRESETS[model]
     if not terms:
         return preset

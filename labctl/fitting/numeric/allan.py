@@ -166,7 +166,7 @@ def _figure(j: int, fitted: _Fitted) -> Figure:
     share = fitted.share(j)
     shown = share >= SHOWN_SHARE
     if not (fitted.shows[j] and shown.any()):
-        return Figure(None, None, kind.unit, bound, f"no {kind.region} {span}: other noise covers it")
+        return Figure(None, None, kind.unit, bound, f"no {kind.region} {span}: masked by other noise")
     if kind.letter == "K" and int(np.sum(share >= 0.5)) < PREVAILING_OCTAVES:
         why = (
             f"slope +1/2 at fewer than {PREVAILING_OCTAVES} octaves of {span}: too short a record to tell a random walk"

@@ -108,7 +108,8 @@ def solve(design: NDArray[np.float64], y: Array, scatter: Scatter, drift: Drift 
     m, k = design.shape
     if m < k or rank_of(design) < k:
         raise NotEnoughData(
-            f"{m} data sets at these rates and temperatures determine {min(m, rank_of(design))} of {k} coefficients"
+            f"{m} data sets at these rates and temperatures determine {min(m, rank_of(design))} of {k} coefficients; "
+            "measure at others, or leave effects out"
         )
     if drift is not None:
         return _collect(_at(design, y, scatter, [drift]), design, y, scatter)

@@ -21,8 +21,8 @@ LARGEST = 1e5
 #: Why a part is unknown.
 PUBLISHED = "published coefficients state none"
 NO_DATA_SETS = "published coefficients have no data sets that could show it"
-NOT_KEPT = "the version was made before this was kept with it: fit it again"
-NO_POWER_ON = "one power-on was recorded, and neither a data sheet nor a static record tells how far the next is off"
+NOT_KEPT = "the version was made by an older labctl, which did not store it: fit it again"
+NO_POWER_ON = "one power-on was recorded, and neither a data sheet nor a static record states the repeatability"
 #: Step of the numerical derivative of the error along the rate, deg/s.
 STEP_DPS = 0.01
 
@@ -58,15 +58,16 @@ def rate_uncertainty(
     """
     for what, value, unit in (("rate_dps", rate_dps, "deg/s"), ("temperature_c", temperature_c, "deg C")):
         if not abs(value) <= LARGEST:  # also false for NaN
-            raise BadInput(f"{what} = {value} {unit}: must be a number between {-LARGEST:g} and {LARGEST:g} {unit}")
+            raise BadInput(f"{what} = {value} {unit}: give a number between {-LARGEST:g} and {LARGEST:g} {unit}")
     if fitted.model.needs:
         raise BadInput(
             f"{name}: its model also needs {', '.join(fitted.model.needs)};"
-            " an uncertainty at a rate and a temperature alone is not defined"
+            " an uncertainty at a rate and a temperature alone is not defined; use a version without these"
         )
     if any(np.isnan(fit.covariance).any() for fit in fitted.axes.values()):
         raise NotEnoughData(
-            f"{name} has as many coefficients as data sets: nothing is left to be uncertain by; measure more data sets"
+            f"{name} has as many coefficients as data sets: no residual is left to estimate the uncertainty from; "
+            "measure more data sets"
         )
     return {axis: _of_axis(fitted, axis, rate_dps, temperature_c, evidence.get(axis)) for axis in fitted.axes}
 

@@ -1,4 +1,5 @@
-"""How much one data file may hold: an import takes a bounded part of the memory, whatever a file unpacks to."""
+"""How much one data file may hold: an import takes a bounded part of the memory, whatever a file has an unpacked
+size of."""
 
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ class Space:
         if self._left < 0:
             raise BadRecording(
                 f"{self._path}: column {column[:80]!r}: the file's values take more than "
-                f"{MOST_VALUES * VALUE_BYTES / 1e6:g} MB, all that one file may; {_ADVICE}, or shorten its words"
+                f"{MOST_VALUES * VALUE_BYTES / 1e6:g} MB, all that one file may; {_ADVICE}, or shorten its texts"
             )
 
 
@@ -46,11 +47,12 @@ def refuse_too_many(path: Path, rows: int, columns: int) -> None:
 
 
 def refuse_too_large(path: Path, size: int) -> None:
-    """Raise BadRecording where a file unpacks to more than so many values need: long words, padding."""
+    """Raise BadRecording where a file has an unpacked size of more than so many values need: long words, padding."""
     if size > MOST_UNPACKED_BYTES:
         raise BadRecording(
-            f"{path}: unpacks to {size / 1e6:g} MB; at most {MOST_UNPACKED_BYTES / 1e6:g} MB are read from "
-            f"one file; {_ADVICE}, or shorten its words"
+            f"{path}: has an unpacked size of {size / 1e6:g} MB; at most {MOST_UNPACKED_BYTES / 1e6:g} MB are read "
+            "from "
+            f"one file; {_ADVICE}, or shorten its texts"
         )
 
 
@@ -58,10 +60,10 @@ def checked_names(path: Path, names: Sequence[str]) -> None:
     """Raise BadRecording for columns that are too many, or of one name."""
     if len(names) > MOST_COLUMNS:
         raise BadRecording(
-            f"{path}: {len(names)} columns; at most {MOST_COLUMNS} are read; leave out what is not needed"
+            f"{path}: {len(names)} columns; at most {MOST_COLUMNS} are read; remove the columns that are not needed"
         )
     seen: set[str] = set()
     for name in names:
         if name in seen:
-            raise BadRecording(f"{path}: column {name[:80]!r} stands more than once in the header")
+            raise BadRecording(f"{path}: column {name[:80]!r} is repeated in the header; remove or rename one")
         seen.add(name)

@@ -1,4 +1,5 @@
-"""A Parquet file as columns: its footer first, then rows in pieces, so that what it unpacks to is known beforehand."""
+"""A Parquet file as columns: its footer first, then rows in pieces, so that what it has an unpacked size of is
+known beforehand."""
 
 from __future__ import annotations
 
@@ -31,10 +32,10 @@ def read_parquet(path: Path) -> dict[str, NDArray[np.generic]]:
     try:
         return _read(path)
     except MemoryError as error:
-        raise BadRecording(f"{path}: needs more memory than this machine has free; divide the recording") from error
+        raise BadRecording(f"{path}: needs more memory than this computer has free; divide the recording") from error
     except (pa.ArrowException, OSError, EOFError, ValueError, OverflowError) as error:
         first = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise BadRecording(f"{path}: not a whole Parquet file (truncated?): {first[:300]}") from error
+        raise BadRecording(f"{path}: not a complete Parquet file; write or copy it again: {first[:300]}") from error
 
 
 def _read(path: Path) -> dict[str, NDArray[np.generic]]:

@@ -41,7 +41,7 @@ def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
     except pa.ArrowInvalid as error:
         first = str(error).splitlines()[0]
         if "UTF8" in first:
-            raise BadRecording(f"{path}: not UTF-8 text after row {rows}: {first[:300]}") from error
+            raise BadRecording(f"{path}: not UTF-8 text after row {rows}, write it as UTF-8: {first[:300]}") from error
         raise BadRecording(
             f"{path}: {first[:300]}; expected {len(names)} columns in each row, "
             "'.' as decimal point, ',' only between columns"
@@ -59,7 +59,9 @@ def _header(path: Path) -> list[str]:
     try:
         header = line.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise BadRecording(f"{path}: not UTF-8 text: {error.reason} at byte {error.start}") from error
+        raise BadRecording(
+            f"{path}: not UTF-8 text, write it as UTF-8: {error.reason} at byte {error.start}"
+        ) from error
     if ";" in header and "," not in header:
         raise BadRecording(f"{path}: columns are separated by ';'; expected ',' between columns and '.' in numbers")
     return [name.strip().strip('"') for name in header.split(",")]

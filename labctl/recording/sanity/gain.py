@@ -36,8 +36,8 @@ class Factor:
 
 FACTORS = (
     Factor(math.pi / 180, "pi/180: the output is in rad/s"),
-    Factor(180 / math.pi, "180/pi: the output is in deg/s and said to be rad/s, or the table's rate is in rad/s"),
-    Factor(1 / 3600, "1/3600: the output is in deg/s and said to be deg/h"),
+    Factor(180 / math.pi, "180/pi: the output is in deg/s and declared as rad/s, or the table's rate is in rad/s"),
+    Factor(1 / 3600, "1/3600: the output is in deg/s and declared as deg/h"),
     Factor(3600.0, "3600: the output is in deg/h"),
     Factor(1 / 60, "1/60: the output is in deg/s, the table's rate per minute"),
     Factor(6.0, "6: the table's rate is in turns per minute"),

@@ -78,7 +78,7 @@ def _rest(sets: Summary, one: Response, more: int) -> Finding:
     return Finding(
         "one_data_set", "likely", f"axis {one.output}, position {one.position}",
         f"{more} more of {len(sets)} data sets disagree with the others", float(more), "data sets", "none",
-        "correct the largest first and look again",
+        "correct the largest first and check again",
     )  # fmt: skip
 
 

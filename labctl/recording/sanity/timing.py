@@ -106,5 +106,5 @@ def _gaps(summary: Summary) -> Iterator[Finding]:
     yield Finding(
         "gaps", "likely", f"{numbers_in_words(summary['dataset'][lacking])} ({int(lacking.sum())} of {len(lacking)})",
         f"readings are missing within the data set, the longest gap is {longest:.3g} s",
-        longest, "s", "readings without gaps", "check the logger; what a mean does not see it does not average",
+        longest, "s", "readings without gaps", "check the logger; lost readings are missing from the mean",
     )  # fmt: skip

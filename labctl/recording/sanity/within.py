@@ -42,7 +42,7 @@ def check_at_rest(summary: Summary) -> Iterator[Finding]:
             yield Finding(
                 "moves_at_rest", "certain" if most > max(MOVED_SHARE * fast, 1.0) else "likely",
                 f"axis {axis}, {numbers_in_words(summary['dataset'][moving])}",
-                f"the table is said to rest and the output moves by {most:.3g} deg/s (root mean square)",
+                f"the table rate is given as 0 and the output changes by {most:.3g} deg/s (root mean square)",
                 most, "deg/s", f"at most {max(MOVES_DPS, MOVES_SHARE * fast):.2g} deg/s",
                 "correct the rate, or leave out the readings in which the unit was moved",
             )  # fmt: skip
@@ -69,7 +69,7 @@ def check_changes(summary: Summary) -> Iterator[Finding]:
             "rate_changes", "certain" if sure else "likely",
             f"axis {axis}, {numbers_in_words(summary['dataset'][found])}",
             f"the output changes by {change[worst]:.4g} deg/s at reading {int(row[worst]) + 1} of data set "
-            f"{summary['dataset'][worst]}, whose rate is said to be {rate[worst]:.6g} deg/s",
+            f"{summary['dataset'][worst]}, whose rate is given as {rate[worst]:.6g} deg/s",
             float(change[worst]), "deg/s", "one rate per data set",
             "give the readings at each rate a data set of their own",
         )  # fmt: skip

@@ -59,10 +59,10 @@ def identify(store: Store, authorization: str) -> Caller:
 def require_role(caller: Caller, needed: Role) -> None:
     """Raise NotAllowed when a caller's role does not reach as far as an act needs."""
     if not caller.role.may(needed):
-        raise NotAllowed(f"{caller.name} is {caller.role.value}; this asks for the role {needed.value}")
+        raise NotAllowed(f"{caller.name} is {caller.role.value}; use a key of the role {needed.value}")
 
 
 def require_an_api_key(store: Store, why: str) -> None:
     """Raise BadInput when a service has to ask for keys and none is in force; `why` says what makes it ask."""
     if all(row.revoked_at is not None for row in store.keys.all()):
-        raise BadInput(f"{why}, and there is no key to ask for; make one first: labctl key create NAME --role operator")
+        raise BadInput(f"{why}, and no key exists yet; make one first: labctl key create NAME --role operator")

@@ -10,4 +10,4 @@ class BenchLeft:
     """How a bench was left: in words, nothing where there is none, and whether it is not known to be safe."""
 
     text: str = ""
-    in_doubt: bool = False
+    unconfirmed: bool = False

@@ -32,7 +32,8 @@ def _always() -> bool:
 
 
 class SafeStateRetry:
-    """Tries the safe state of one bench again while it is in doubt, nothing runs on it, and it may be driven here.
+    """Tries the safe state of one bench again while that state is unconfirmed, no campaign runs on the bench, and
+    it may be driven here.
 
     `guard` is held during an attempt: what else drives the bench waits for its end, at most some ten seconds.
     `is_idle` says, under that guard, whether the bench may be opened. A simulated bench ended with its process; there
@@ -50,7 +51,7 @@ class SafeStateRetry:
         self._store, self._bench, self._make_clock = store, bench, make_clock
         self._guard = guard or threading.Lock()
         self._is_idle = is_idle
-        self._in_doubt = False  #: at the last look
+        self._unconfirmed = False  #: at the last look
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -78,12 +79,12 @@ class SafeStateRetry:
         self.attempt()
 
     def attempt(self) -> None:
-        """Try the safe state once, without pauses, if it is in doubt. Raises nothing.
+        """Try the safe state once, without pauses, if it is unconfirmed. Raises nothing.
 
         What cannot be written does not keep the bench from being tried: it is written after the next attempt.
         """
         with self._guard:
-            if not self._bench.is_simulated and self._is_idle() and self._is_in_doubt():
+            if not self._bench.is_simulated and self._is_idle() and self._is_unconfirmed():
                 clock = self._make_clock()
                 unconfirmed = self._try(clock)
                 level = WARNING if unconfirmed else INFO
@@ -91,11 +92,11 @@ class SafeStateRetry:
                 with acting(ITSELF), suppress(LabctlError):
                     self._store.benches.attempted(self._bench.name, unconfirmed, clock.utc())
 
-    def _is_in_doubt(self) -> bool:
+    def _is_unconfirmed(self) -> bool:
         with suppress(LabctlError):  # a database that cannot be read: as it was at the last look
             row = self._store.benches.get(self._bench.name)
-            self._in_doubt = row is not None and row.is_in_doubt
-        return self._in_doubt
+            self._unconfirmed = row is not None and row.is_unconfirmed
+        return self._unconfirmed
 
     def _try(self, clock: Clock) -> str:
         """Return what is not confirmed; empty when all is well."""
@@ -113,7 +114,7 @@ def describe_safe_state(bench: str, unconfirmed: str) -> str:
     if not unconfirmed:
         return f"bench {bench} is safe"
     return (
-        f"bench {bench} is NOT confirmed safe: {unconfirmed}; look at it, then `labctl bench clear {bench} --by NAME`"
+        f"bench {bench} is NOT confirmed safe: {unconfirmed}; inspect it, then `labctl bench clear {bench} --by NAME`"
     )
 
 
@@ -123,6 +124,6 @@ def describe_bench(row: BenchRow) -> str:
         return describe_safe_state(row.name, row.unconfirmed)
     return (
         f"bench {row.name} was confirmed safe by labctl at {row.confirmed_at:%Y-%m-%d %H:%M:%S} UTC, attempt "
-        f"{row.attempts}, after: {row.unconfirmed}; look at it before anything moves, then `labctl bench clear "
+        f"{row.attempts}, after: {row.unconfirmed}; inspect it before anything moves, then `labctl bench clear "
         f"{row.name} --by NAME`"
     )

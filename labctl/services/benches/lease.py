@@ -117,7 +117,7 @@ class BenchHold:
             else:
                 self._renewed_s = None
                 found = self._store.leases.holder(self._bench)
-                self._note_loss(described(found) if found else "its lease was taken away")
+                self._note_loss(described(found) if found else "another process has taken its lease")
         except Exception as error:  # noqa: BLE001  the next try may do better; until then `held` counts the time
             self._note_loss(str(error) or type(error).__name__)
 
@@ -208,7 +208,7 @@ def described(lease: LeaseRow) -> str:
     who = f"process {lease.pid} on {lease.host} since {lease.since:%Y-%m-%d %H:%M:%S} UTC"
     if lease.url is not None:
         who = f"the service at {lease.url}, {who}"
-    return f"bench {lease.bench_name} is held by {who}, last heard of at {lease.beat_at:%H:%M:%S}"
+    return f"bench {lease.bench_name} is in use by {who}, last sign of life at {lease.beat_at:%H:%M:%S}"
 
 
 def this_machine() -> str:

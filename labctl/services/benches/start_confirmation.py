@@ -11,8 +11,8 @@ from labctl.services.schemas.campaigns import BENCH_CHECKS, BenchCheck
 
 #: What is asked, and what the answer yes says.
 QUESTIONS: Mapping[BenchCheck, str] = {
-    "chamber_clear": "Is the chamber clear: no hand, no tool, no loose part in it, door closed?",
-    "table_free": "Is the table free to turn: nothing touches it, cables have their slack?",
+    "chamber_clear": "Is the chamber clear: no person, no tool, no loose part in it, door closed?",
+    "table_free": "Is the table free to turn: nothing touches it, and its cables have enough slack?",
     "limiter_on": "Is the independent temperature limiter on?",
 }
 STATEMENTS: Mapping[BenchCheck, str] = {
@@ -54,8 +54,9 @@ def confirmation_text(bench: BenchFile, request: Confirming) -> str:
     if missing:
         raise StartNotConfirmed(
             f"bench {bench.name} is not simulated: a campaign starts only after a person has confirmed "
-            f"{', '.join(STATEMENTS[check] for check in BENCH_CHECKS if check in missing)}. Look at the bench, then "
-            "send `confirmed_by` and `checks`, or name the person with --clear-confirmed-by NAME",
+            f"{', '.join(STATEMENTS[check] for check in BENCH_CHECKS if check in missing)}. Inspect the bench, then "
+            "send `confirmed_by`"
+            " and `checks`, or name the person with --clear-confirmed-by NAME",
             missing,
         )
     return f"{', '.join(STATEMENTS[check] for check in BENCH_CHECKS)}: confirmed by {by}"

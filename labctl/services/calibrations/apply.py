@@ -26,13 +26,15 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
         raise BadInput(f"--outside {outside!r} is not known (expected clamp or refuse)")
     compensator = Compensator.from_file(calibration, outside=outside)  # type: ignore[arg-type]
     if not source.is_file():
-        raise BadInput(f"{source}: no such file")
+        raise BadInput(f"{source}: no such file; check the path")
     columns = read_table(source)
     if target.suffix not in {".csv", ".parquet"} or target.resolve() == source.resolve():
-        raise BadInput(f"{target}: the result needs a file of its own, ending in .csv or .parquet")
+        raise BadInput(f"{target}: name a result file other than the input, ending in .csv or .parquet")
     for name in (*(f"gyro_{axis}" for axis in compensator.axes), "temperature_c", *compensator.needs):
         if name not in columns:
-            raise BadInput(f"{source}: column {name!r} is missing (the calibration is of axes {compensator.axes})")
+            raise BadInput(
+                f"{source}: column {name!r} is missing; add it (the calibration has axes {compensator.axes})"
+            )
     raw = np.column_stack([_floats(columns[f"gyro_{axis}"]) for axis in compensator.axes])
     corrected = compensator.compensate_output(
         raw, _floats(columns["temperature_c"]), {name: _floats(columns[name]) for name in compensator.needs}

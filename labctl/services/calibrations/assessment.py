@@ -77,11 +77,11 @@ def _of_verdict(criticism: CriticismResponse | None) -> Iterator[Objection]:
         if figure is not None
     )
     version = f"{criticism.serial} --version {criticism.version}"
-    do = f"find out what is missing: labctl criticise {version}"
+    do = f"find out which effect is missing: labctl criticise {version}"
     if criticism.verdict == "missing":
         do = f"add it and certify the new version: labctl improve {version} --add {criticism.named[0]}"
     elif criticism.verdict == "ambiguous":
-        do = f"measure what tells them apart (labctl criticise {version}), add that and certify the new version"
+        do = f"measure what distinguishes them (labctl criticise {version}), add that and certify the new version"
     said = (
         f"the verdict on recording {criticism.recording} is {criticism.verdict!r} ({figures}): {_sentence(criticism)}"
     )
@@ -116,7 +116,7 @@ def _of_errors(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
         worse = worse_than_version(_errors(other), own)
         if worse:
             said = f"{worse} of version {version}, {role}, on the same recording"
-            yield Objection(what="worse", text=said, do=f"certify version {version}, or improve this one")
+            yield Objection(what="worse", text=said, do=f"certify version {version}, or improve this version")
 
 
 def _errors(row: CalibrationRecord) -> CertifiedErrors:

@@ -66,7 +66,7 @@ def certify(store: Store, serial: str, version: int, request: CertifyRequest, at
 
 
 def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: datetime) -> CertificationResponse:
-    """Take a version out of force. Raises NotFound, Conflict."""
+    """Revoke the certification of a version. Raises NotFound, Conflict."""
     store.units.get(serial)
     return _set_in_force(store, serial, version, "revoke", request, at)
 
@@ -97,8 +97,9 @@ def refusal(known: AssessmentResponse) -> str:
     objections = "; ".join(each.text for each in said)
     todo = "; ".join(dict.fromkeys(each.do for each in said))
     return (
-        f"certification of version {known.version} of {known.serial} is refused: {objections}{more}. To do: {todo}. To "
-        f"certify it all the same: --override (override: true), with a reason of at least {LEAST_REASON_CHARACTERS} "
+        f"certification of version {known.version} of {known.serial} is refused: {objections}{more}. To do: {todo}. "
+        "To certify it nevertheless:"
+        f" --override (override: true), with a reason of at least {LEAST_REASON_CHARACTERS} "
         f"characters and {LEAST_REASON_WORDS} words"
     )
 
@@ -109,5 +110,5 @@ def _refuse_short(reason: str) -> None:
     if len(words) < LEAST_REASON_WORDS or len(" ".join(words)) < LEAST_REASON_CHARACTERS:
         raise BadInput(
             f"--reason {reason!r} is too short for an override: say in a sentence of at least "
-            f"{LEAST_REASON_CHARACTERS} characters and {LEAST_REASON_WORDS} words why this version is used all the same"
+            f"{LEAST_REASON_CHARACTERS} characters and {LEAST_REASON_WORDS} words why this version is used nevertheless"
         )

@@ -41,7 +41,7 @@ def worse_than_raw(error: Errors, *, late: bool = False) -> list[Finding]:
     return [
         Finding(
             "worse", "likely" if late else "certain", "fit",
-            f"it leaves {left:.4g} deg/s RMS of its own data, where the output without correction is off by "
+            f"its residual on the data of the fit is {left:.4g} deg/s RMS, and the error without correction is "
             f"{raw:.4g} deg/s", left, "deg/s", f"less than {raw:.4g} deg/s",
             "add time_delay and bandwidth to the effects" if late
             else "check sign, unit and axes of the output, or choose another model",
@@ -65,7 +65,7 @@ def worse_than_before(before: Errors, after: Errors) -> list[Finding]:
 
 def _of_change(said: str, first: float, second: float) -> Finding:
     return Finding(
-        "worse", "likely", "change", said, second, "deg/s", f"less than {first:.4g} deg/s", "leave the model as it was"
+        "worse", "likely", "change", said, second, "deg/s", f"less than {first:.4g} deg/s", "keep the model unchanged"
     )
 
 

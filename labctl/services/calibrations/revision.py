@@ -1,4 +1,4 @@
-"""A version's model changed: effects added or taken out, fitted again; looked at first, or kept as the next version."""
+"""A version's model changed: effects added or taken out, fitted again; previewed, or kept as the next version."""
 
 from __future__ import annotations
 
@@ -133,9 +133,12 @@ def _refuse_what_changes_nothing(
     fixed = {term.effect for term in model.terms if not term.parameters}
     for term in wanted:
         if term.effect in request.remove:
-            raise BadInput(f"effect {term.effect!r} is both added and taken out; say one of the two")
+            raise BadInput(f"effect {term.effect!r} is both added and removed; give one of the two")
         if term.effect in fixed and term == Term(term.effect):
-            raise BadInput(f"effect {term.effect!r} is in version {version} already ({', '.join(model.effect_ids)})")
+            raise BadInput(
+                f"effect {term.effect!r} is in version {version} already; add another one (it has "
+                f"{', '.join(model.effect_ids)})"
+            )
 
 
 def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequest) -> _Change:
@@ -144,13 +147,15 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     context = fit_data_of(measured.points, covered)
     for effect_id in request.remove:
         if effect_id not in model.effect_ids:
-            raise BadInput(f"effect {effect_id!r} is not in version {row.version} ({', '.join(model.effect_ids)})")
+            raise BadInput(
+                f"effect {effect_id!r} is not in version {row.version}; choose one of {', '.join(model.effect_ids)}"
+            )
     written = read_formulas(request.formula)
     if len(request.add) > len(CATALOGUE):
-        raise BadInput(f"{len(request.add)} effects to add; the catalogue has {len(CATALOGUE)}")
+        raise BadInput(f"{len(request.add)} effects to add; give at most {len(CATALOGUE)}")
     wanted = [*(parse_term(text) for text in request.add), *(Term(f.id, formula=f.text) for f in written)]
     if not wanted and not request.remove:
-        raise BadInput("say what to change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
+        raise BadInput("give the change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
     _refuse_what_changes_nothing(wanted, model, request, row.version)
     base, _ = changed(model, (), tuple(request.remove)).build(context)
     add = tuple(_shaped(measured, base, term) for term in wanted)

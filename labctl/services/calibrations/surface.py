@@ -63,7 +63,8 @@ def _held(store: Store, row: CalibrationRecord, calibration: Calibration) -> dic
     if lacking := [name for name in needs if name not in columns]:
         raise BadInput(
             f"{calibration.serial} version {calibration.version}: its model also needs {', '.join(lacking)}, and its "
-            "recording does not say at which value; a surface over rate and temperature alone is not defined"
+            "recording does not say at which value; a surface over rate and temperature alone is not defined; use a "
+            "version without these"
         )
     return {name: float(np.mean(np.asarray(columns[name], dtype=np.float64))) for name in needs}
 

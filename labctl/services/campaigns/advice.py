@@ -14,9 +14,11 @@ DID_SAFE = "labctl stopped the table, set the chamber to its safe set point, and
 DID_UNSAFE = (
     "labctl tried to stop the table and to set the chamber to its safe set point, and could not confirm all of it."
 )
-DID_NOTHING = "labctl did not take the campaign up; every data set that was complete is kept."
+DID_NOTHING = "labctl did not resume the campaign; every data set that was complete is kept."
 LOOK = (
-    "Go to the bench, look at table and chamber, say so with `labctl bench clear` or on the bench page, " + RESUME + "."
+    "Go to the bench, inspect table and chamber, record that with `labctl bench clear` or on the bench page, "
+    + RESUME
+    + "."
 )
 
 
@@ -32,23 +34,23 @@ class Failure:
 #: Kinds of failure by the reason that the engine or the recovery gives; the first that fits counts.
 FAILURES: tuple[Failure, ...] = (
     Failure(
-        r"not taken up: bench .* was not confirmed safe",
+        r"not (?:taken up|resumed): bench .* was not confirmed safe",
         "The bench was not confirmed safe when the campaign was to go on.",
         LOOK,
     ),
     Failure(
-        r"taken up \d+ times without finishing a step",
-        "The campaign was taken up several times and never finished a step.",
-        f"Find out at the bench what ends it each time, {RESUME}.",
+        r"(?:taken up|resumed) \d+ times without finishing a step",
+        "The campaign was resumed several times and never finished a step.",
+        f"Find out at the bench what stops it each time, {RESUME}.",
     ),
     Failure(
-        r"not taken up: ",
-        "The campaign was cut short and could not be taken up.",
-        f"Mend what the reason names, {RESUME}.",
+        r"not (?:taken up|resumed): ",
+        "The campaign was interrupted and could not be resumed.",
+        f"Correct what the reason names, {RESUME}.",
     ),
     Failure(
         r"could not be made safe first",
-        "The campaign was taken up, but the bench could not be made safe first.",
+        "The campaign was resumed, but the bench could not be made safe first.",
         LOOK,
     ),
     Failure(
@@ -74,7 +76,7 @@ FAILURES: tuple[Failure, ...] = (
     Failure(
         r"set point .* read back",
         "The chamber did not take the set point that it was given.",
-        f"Look at the controller's panel for a profile, a lock or a limit, {RESUME}.",
+        f"Check the controller's panel for a profile, a lock or a limit, {RESUME}.",
     ),
     Failure(
         r": alarms \(",
@@ -94,7 +96,7 @@ FAILURES: tuple[Failure, ...] = (
     Failure(
         r" runs .* deg/s instead of|steps took .* instead of|is steady at .* not for the",
         "The table did not turn at the rate that it was asked for.",
-        f"Check that the table turns freely and that its cables have their slack, {RESUME}.",
+        f"Check that the table turns freely and that its cables have enough slack, {RESUME}.",
     ),
     Failure(
         r"still turns|still moves",
@@ -120,15 +122,15 @@ FAILURES: tuple[Failure, ...] = (
     Failure(
         r"database|disk|could be written|could not be written",
         "The database could not be written.",
-        f"Make room on the disk or mend the database, look at the bench, {RESUME}.",
+        f"Free disk space or repair the database, inspect the bench, {RESUME}.",
     ),
     Failure(
         r"^ended by an error of the program|^[A-Za-z_.]*(Error|Exception)\b",
         "labctl met an error of its own.",
-        f"Report the reason with the version of labctl, look at the bench, {RESUME}.",
+        f"Report the reason with the version of labctl, inspect the bench, {RESUME}.",
     ),
 )
-OTHER = Failure("", "A step of the campaign could not be carried out.", f"Mend what the reason names, {RESUME}.")
+OTHER = Failure("", "A step of the campaign could not be carried out.", f"Correct what the reason names, {RESUME}.")
 
 
 def advice_of(state: CampaignState, reason: str) -> AdviceResponse | None:
@@ -138,5 +140,5 @@ def advice_of(state: CampaignState, reason: str) -> AdviceResponse | None:
     unsafe = NOT_SAFE in reason
     cause = reason.partition(NOT_SAFE)[0] or reason
     failure = next((each for each in FAILURES if re.search(each.pattern, cause)), OTHER)
-    done = DID_UNSAFE if unsafe else DID_NOTHING if "taken up" in cause else DID_SAFE
+    done = DID_UNSAFE if unsafe else DID_NOTHING if re.search("taken up|resumed", cause) else DID_SAFE
     return AdviceResponse(happened=failure.happened, done=done, next=LOOK if unsafe else failure.next)

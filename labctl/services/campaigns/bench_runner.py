@@ -89,7 +89,7 @@ class BenchRunner:
 
     @property
     def free(self) -> bool:
-        """Whether a campaign may begin now: nothing runs, or waits to be taken up, and the bench may be driven."""
+        """Whether a campaign may begin now: nothing runs, or waits to be resumed, and the bench may be driven."""
         return self._job is None and not self._recovery.pending and not self._stops and self._may_drive
 
     @property
@@ -125,7 +125,7 @@ class BenchRunner:
 
     def _refuse_unless_free(self) -> None:
         if self._stops:
-            raise BenchBusy(f"bench {self._bench.name}: {STOPS}; nothing is begun any more")
+            raise BenchBusy(f"bench {self._bench.name}: {STOPS} and starts no campaign any more; start it again first")
         if self._job is not None:
             raise BenchBusy(
                 f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
@@ -145,16 +145,16 @@ class BenchRunner:
         job.thread.start()
 
     def resume(self, campaign: int, request: ResumeRequest) -> CampaignResponse:
-        """Let a paused campaign go on, or take up one that was interrupted, failed or aborted.
+        """Continue a paused campaign, or resume one that was interrupted, failed or aborted.
 
         Raises BenchBusy while another runs or without the lease on the bench, Conflict when it is done, or when the
-        bench waits to be looked at.
+        bench waits to be inspected.
         """
         with self._guard:
             job = self._job
             if job is not None and job.row.id == campaign:
                 if not job.control.request.pause:
-                    raise Conflict(f"campaign {campaign} runs and is not paused")
+                    raise Conflict(f"campaign {campaign} runs and is not paused; pause it first, or let it run")
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:
                 self._refuse_unless_free()
@@ -196,7 +196,7 @@ class BenchRunner:
         operator = self._running(campaign).prepared.operator
         if not isinstance(operator, HumanOperator):
             raise StalePrompt(
-                f"question {request.prompt!r} is not asked: this bench turns and switches units by itself"
+                f"question {request.prompt!r} is not asked: this bench turns its units itself; send no answer"
             )
         if request.confirmed:
             operator.confirm(request.prompt, request.by)
@@ -209,7 +209,9 @@ class BenchRunner:
         over = job is not None and job.progress is not None and job.progress.state in ENDED
         if job is None or job.row.id != campaign or over:
             state = self._store.campaigns.get(campaign).state
-            raise Conflict(f"campaign {campaign} does not run on bench {self._bench.name} now; it is {state}")
+            raise Conflict(
+                f"campaign {campaign} does not run on bench {self._bench.name} now, it is {state}; check its number"
+            )
         return job
 
     def _run(self, job: CampaignJob, prepared: Prepared) -> None:

@@ -13,7 +13,7 @@ from procedures.contracts.campaign_state import ENDED, CampaignState
 
 #: An open event stream says that it is alive after this long without an event.
 HEARTBEAT_S = 10.0
-#: What changes all the time, as a unit's output does, is looked at this often.
+#: What changes all the time, as a unit's output does, is read this often.
 LIVE_S = 1.0
 #: What one onlooker was told counts for the others this long, unless the bench rings.
 FRESH_S = 0.5

@@ -96,7 +96,7 @@ def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse
 
 def _stopped(store: Store, prepared: Prepared, engine: Engine) -> str:
     left = describe_safe_state(store.campaigns.get(prepared.id).bench_name, "; ".join(engine.complaints))
-    return f"campaign {prepared.id} was stopped; {left}; `labctl campaign resume {prepared.id}` goes on with it"
+    return f"campaign {prepared.id} was stopped; {left}; `labctl campaign resume {prepared.id}` continues it"
 
 
 def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: StoreError) -> str:
@@ -106,13 +106,14 @@ def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: S
         ended, marked = store.campaigns.get(campaign).state in ENDED, store.benches.unconfirmed(bench)
     left = describe_safe_state(bench, complaints)
     if complaints and not marked:  # nothing that `labctl bench clear` could take back
-        left = f"bench {bench} is NOT confirmed safe, and that could not be written down: {complaints}; look at it"
+        left = f"bench {bench} is NOT confirmed safe, and that could not be recorded: {complaints}; inspect it"
     elif not complaints and not ended:
-        left += ", but that could not be written down"
-    again = "there is room again" if isinstance(error, DiskFull) else "the database can be written again"
+        left += ", but that could not be recorded"
+    again = "there is free space again" if isinstance(error, DiskFull) else "the database can be written again"
     return (
-        f"campaign {campaign} was cut short: {error.cause}; what was measured before is kept; {left}; once {again}, "
-        f"`labctl campaign resume {campaign}` goes on with it"
+        f"campaign {campaign} was interrupted: {error.cause}; the data measured before are stored; {left}; once "
+        f"{again}, "
+        f"`labctl campaign resume {campaign}` continues it"
     )
 
 
@@ -146,7 +147,7 @@ def run_here(
         SafeStateRetry(store, bench_file, lambda: clock).attempt()
         for text in _left_on(store, bench_file):
             if not bench_file.is_simulated:
-                raise Conflict(f"bench {bench_file.name}: {text}; nothing is begun there before")
+                raise Conflict(f"bench {bench_file.name}: {text}; inspect and clear it before a campaign starts")
             if say is not None:
                 say(text)
         refuse_unconfirmed(store, bench_file.name)

@@ -42,7 +42,7 @@ class Prepared:
     clock: Clock
     operator: Operator
     start_at: int = 0
-    restart: Restart | None = None  #: what is known of the interruption that it is taken up after
+    restart: Restart | None = None  #: what is known of the interruption after which it is resumed
     time: CampaignTime | None = None  #: of a resumed campaign; absent: time 0 is when it begins
 
 
@@ -94,7 +94,7 @@ def clock_for(bench: BenchFile, speed: float | None) -> Clock:
     """
     if not bench.is_simulated:
         if speed is not None:
-            raise BadInput(f"--speed {speed:g}: bench {bench.name} keeps its own time; leave the option out")
+            raise BadInput(f"--speed {speed:g}: bench {bench.name} runs in real time; leave the option out")
         simulation = bench.simulation
         return ScaledClock(simulation.speed) if simulation is not None and simulation.control else SystemClock()
     return VirtualClock() if speed is None else ScaledClock(speed)

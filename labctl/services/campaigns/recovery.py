@@ -29,14 +29,14 @@ def describe_recovery(store: Store, bench: str) -> str:
         return ""
     text = how_far(from_rows(store, row))
     if store.benches.unconfirmed(bench):
-        return f"{text} and is not taken up: bench {bench} was not confirmed safe, and has not been checked since"
+        return f"{text} and is not resumed: bench {bench} was not confirmed safe, and has not been checked since"
     if why_not := retries_exhausted(store.resume_points.of_campaign(row.id)):
-        return f"{text} and is not taken up: {why_not}"
-    return f"{text} and is taken up now, safe state first"
+        return f"{text} and is not resumed: {why_not}"
+    return f"{text} and is resumed now, safe state first"
 
 
 def secure_bench(store: Store, bench_file: BenchFile, clock: Clock) -> None:
-    """Make a bench safe whose campaign is not taken up; what cannot be confirmed stays on its status."""
+    """Make a bench safe whose campaign is not resumed; what cannot be confirmed stays on its status."""
     if bench_file.is_simulated:  # it ended with its process
         return
     complaints: tuple[str, ...] = ()
@@ -109,7 +109,10 @@ class CampaignRecovery:
             if row.bench_name != self._bench.name:
                 continue
             if resumed is not None:
-                text = f"not taken up: campaign {resumed} goes on here; then `labctl campaign resume {row.id}`"
+                text = (
+                    f"not resumed: campaign {resumed} is resumed here first; after it run `labctl campaign resume "
+                    f"{row.id}`"
+                )
                 self._close(row.id, text)
                 continue
             why_not = retries_exhausted(self._store.resume_points.of_campaign(row.id))
@@ -121,7 +124,7 @@ class CampaignRecovery:
             except BenchBusy:  # another process was quicker, or the lease was lost just now
                 return
             except (LabctlError, InstrumentError) as error:
-                why_not = f"not taken up: {error}"
+                why_not = f"not resumed: {error}"
             secure()
             self._close(row.id, why_not)
         self._unfinished = False

@@ -25,7 +25,7 @@ from labctl.services.campaigns.preparation import (
 )
 from labctl.services.planning.loading import load_bench, with_drivers
 from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
-from labctl.store import CampaignRow, ResumePoint, Store, TakeUp, open_store
+from labctl.store import CampaignRow, ResumePoint, Resumption, Store, open_store
 from procedures.contracts.campaign_state import CampaignState
 from procedures.execution.resume import Restart
 from procedures.monitoring.campaign_time import CampaignTime
@@ -59,7 +59,7 @@ def with_original_simulation(row: CampaignRow, bench_file: BenchFile) -> BenchFi
         first = error.errors()[0]
         raise Conflict(
             f"campaign {row.id} was simulated by another labctl: simulation.{'.'.join(map(str, first['loc']))}: "
-            f"{first['msg']}; abort it, and start it anew"
+            f"{first['msg']}; abort it, and start a new one"
         ) from error
 
 
@@ -71,15 +71,15 @@ def prepare_resume(
     request: ResumeRequest,
     opened: Bench | None = None,
 ) -> Prepared:
-    """Mark a campaign as taken up, and return it ready to run; nothing has moved when this returns.
+    """Mark a campaign as resumed, and return it ready to run; nothing has moved when this returns.
 
     `opened` is the bench where it is open already. Raises Conflict when the campaign is done, when the bench carries
-    other units, or when it waits to be looked at.
+    other units, or when it waits to be inspected.
     """
     load_libraries()
     row = store.campaigns.get(campaign)
     if row.state is CampaignState.DONE:
-        raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
+        raise Conflict(f"campaign {campaign} is done and cannot be resumed; start a new one")
     bench_file = _same_units(row, bench_file)
     refuse_unconfirmed(store, bench_file.name)
     standing, plan = store.resume_points.of_campaign(campaign), plan_of(store, row)
@@ -94,10 +94,10 @@ def prepare_resume(
     gap_s = t_s - standing.last_t_s
     added = standing.added_runs + int(new_session)
     power = "the power failed meanwhile" if lost else "the units stayed on"
-    reason = f"taken up by {request.by} after {gap_s:.0f} s unwatched; {power}{_other_drivers(row, bench_file)}"
+    reason = f"resumed by {request.by} after {gap_s:.0f} s unwatched; {power}{_other_drivers(row, bench_file)}"
     bench = opened or open_bench(bench_file, clock)
     try:
-        _take_up(store, row, standing, TakeUp(t_s, clock.utc(), reason, added, new_session, boot_id()))
+        _mark_resumed(store, row, standing, Resumption(t_s, clock.utc(), reason, added, new_session, boot_id()))
         if new_world and (position := plan.mounted_at(standing.start_at)):
             bench.unit_handler.mount(position)
     except BaseException:
@@ -115,10 +115,10 @@ def prepare_resume(
     )
 
 
-def _take_up(store: Store, row: CampaignRow, standing: ResumePoint, how: TakeUp) -> None:
-    store.resume_points.take_up(row.id, standing, how)
+def _mark_resumed(store: Store, row: CampaignRow, standing: ResumePoint, how: Resumption) -> None:
+    store.resume_points.mark_resumed(row.id, standing, how)
     log.info(
-        "campaign.taken_up", campaign=row.id, bench=row.bench_name, step=standing.start_at + 1, reason=how.reason,
+        "campaign.resumed", campaign=row.id, bench=row.bench_name, step=standing.start_at + 1, reason=how.reason,
         was=row.state, units=sorted(row.recordings),
     )  # fmt: skip
 
@@ -175,6 +175,6 @@ def _newest_unfinished(store: Store) -> CampaignRow:
     rows = store.campaigns.unfinished()
     if not rows:
         raise Conflict(
-            "no campaign was interrupted; `labctl campaign resume ID` takes up one that failed or was aborted"
+            "no campaign was interrupted; `labctl campaign resume ID` resumes one that failed or was aborted"
         )
     return rows[0]

@@ -146,13 +146,13 @@ def abandoned_campaigns(store: Store) -> list[CampaignResponse]:
 
 def how_far(answer: CampaignResponse) -> str:
     """Say that a campaign was left, and how far it was."""
-    return f"campaign {answer.id} was cut short at {100 * answer.progress:.0f} %"
+    return f"campaign {answer.id} was interrupted at {100 * answer.progress:.0f} %"
 
 
 def describe_interrupted(answer: CampaignResponse) -> str:
     """Say that a campaign was left, and what a person can do about it."""
-    takes_up, ends = f"`labctl campaign resume {answer.id}`", f"`labctl campaign abort {answer.id}`"
-    return f"{how_far(answer)}; {takes_up} takes it up, {ends} ends it"
+    resumes, ends = f"`labctl campaign resume {answer.id}`", f"`labctl campaign abort {answer.id}`"
+    return f"{how_far(answer)}; {resumes} resumes it, {ends} ends it"
 
 
 def outlives_its_process(row: CampaignRow) -> bool:
@@ -166,9 +166,10 @@ def mark_abandoned(answer: CampaignResponse, *, attended: bool) -> CampaignRespo
     if answer.state in ENDED or attended:
         return answer
     left_safe = answer.state is CampaignState.INTERRUPTED
-    why = answer.reason if left_safe else "no process runs it any more: look after the bench"
+    why = answer.reason if left_safe else "no process runs it any more: inspect the bench"
     reason = (
-        f"{why}; `labctl campaign resume` or a service on its bench takes it up where it was, `labctl campaign abort` "
+        f"{why}; `labctl campaign resume` or a service on its bench resumes it where it stopped, `labctl campaign "
+        "abort` "
         "ends it"
     )
     return answer.model_copy(update={"reason": reason, "abandoned": True, "active": False})

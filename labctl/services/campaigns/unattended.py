@@ -24,9 +24,11 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
     """Close a campaign that no process runs any more. Raises NotFound, and Conflict for one that has ended."""
     answer = campaign_status(store, campaign)
     if answer.state in ENDED:
-        raise Conflict(f"campaign {campaign} is over already: {answer.state}")
+        raise Conflict(
+            f"campaign {campaign} has already ended ({answer.state}); start a new one, or resume it if it failed"
+        )
     if not store.is_sole_writer and (driver := driver_of(store, answer.bench, at)) is not None:
-        raise Conflict(f"campaign {campaign} may run: {described(driver)}; abort it there. Nothing was changed")
+        raise Conflict(f"campaign {campaign} may be running: {described(driver)}; abort it there. Nothing was changed")
     record_action(store, at, "abort", campaign, reason)
     row = store.campaigns.get(campaign)
     said = f"left unfinished; {reason}"
@@ -42,4 +44,7 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
 def not_running(store: Store, campaign: int, action: str) -> Conflict:
     """Return the refusal of an action that only a running campaign can take. Raises NotFound."""
     state = store.campaigns.get(campaign).state
-    return Conflict(f"campaign {campaign} is {state} and no process runs it, so it is not possible to {action}")
+    return Conflict(
+        f"campaign {campaign} is {state} and no process runs it, so it is not possible to {action}; `labctl campaign "
+        f"resume {campaign}` continues it"
+    )

@@ -60,7 +60,9 @@ class ForegroundControl:
         """Enter a campaign into the schedule of a bench; a service that holds this bench and database starts it."""
         for option, value in (("--speed", asked.speed), ("--seed", asked.seed)):
             if value is not None:
-                raise BadInput(f"{option} {value}: the service that runs it then sets its own; leave the option out")
+                raise BadInput(
+                    f"{option} {value}: the service that runs a scheduled start sets it; leave the option out"
+                )
         bench = load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
         answer = queue.add_start(context.store, asked.body, bench, context.now())
         note = "; ".join(filter(None, (queue.NOBODY.format(bench=bench.name), answer.note)))

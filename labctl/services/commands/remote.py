@@ -41,8 +41,8 @@ class HttpExecutor:
             if address[name] is not None:
                 raise Conflict(
                     f"--{name} {address[name]}: the service at {self._connection.url} holds this database and runs "
-                    "campaigns on its own bench at its own pace; leave the option out, stop it, or name another "
-                    "--database"
+                    "campaigns on its own bench at its own speed; leave the option out, stop the service, or name "
+                    "another --database"
                 )
         newest = command.newest
         if newest is not None and address[newest.parameter] is None:

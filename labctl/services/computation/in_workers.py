@@ -115,8 +115,9 @@ class InWorkers(Pool):
             ready = wait([receiving, worker.sentinel], max(deadline_s - self._clock.now_s(), 0.0))
             if not ready:
                 raise ComputationEnded(
-                    f"the computation was ended after {self.limits.deadline_s:g} s, which is all that one may take; "
-                    "ask for less at a time: a recording of fewer data sets, or fewer effects that compete"
+                    f"the computation was ended after {self.limits.deadline_s:g} s, the limit of one computation; "
+                    "send less at a time:"
+                    " a recording of fewer data sets, or fewer effects that compete"
                 )
             try:
                 message = receiving.recv() if receiving.poll() else None
@@ -138,8 +139,9 @@ class InWorkers(Pool):
             worker.join(END_S)
             code = worker.exitcode
         return ComputationEnded(
-            f"the computation was ended: its process {_end_in_words(code)} before it had a result. Ask again; if it "
-            f"happens again, take a recording of fewer data sets (memory limit {self.limits.memory_mib} MiB)"
+            f"the computation was ended: its process {_end_in_words(code)} before it had a result. Try again; if it "
+            "happens again,"
+            f" take a recording of fewer data sets (memory limit {self.limits.memory_mib} MiB)"
         )
 
     @staticmethod

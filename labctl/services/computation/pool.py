@@ -22,8 +22,8 @@ T = TypeVar("T")
 #: How many durations the estimate for `Retry-After` is made from, and what is taken for one before the first, s.
 REMEMBERED, FIRST_GUESS_S = 16, 5.0
 LONGEST_RETRY_S = 300
-WAITING = "waiting for {n} before it"
-ENDS = "the service ends; ask again when it is back"
+WAITING = "waiting for {n} earlier computations"
+ENDS = "the service is stopping; try again when it runs again"
 
 
 def _ignore(_stage: str) -> None:
@@ -94,8 +94,9 @@ class Pool(ABC):
         if len(self._waiting) >= self.limits.waiting:
             wait_s = self._retry_after_s()
             raise TooBusy(
-                f"{len(self._attended)} computations run and {len(self._waiting)} wait, which is all that this service "
-                f"takes on at once; ask again in about {wait_s} s",
+                f"{len(self._attended)} computations run and {len(self._waiting)} wait, the limit of this service; "
+                "try again in about"
+                f" {wait_s} s",
                 retry_after_s=wait_s,
             )
         self._waiting.append(job)

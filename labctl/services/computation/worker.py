@@ -142,6 +142,6 @@ def _failed(error: Exception) -> Outcome:
 def out_of_memory(limits: Limits) -> ComputationEnded:
     """Return the error of a computation that asked for more memory than it may have."""
     return ComputationEnded(
-        f"the computation was ended: memory limit {limits.memory_mib} MiB; ask for less at a time: a recording of "
+        f"the computation was ended: memory limit {limits.memory_mib} MiB; send less at a time: a recording of "
         "fewer data sets or readings, or fewer points of a picture"
     )

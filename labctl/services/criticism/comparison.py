@@ -40,7 +40,8 @@ def compare_version(
     data, (errors, _) = fit_data_of(points), applied_errors(calibration, points)
     if lacking := data.channels.missing(calibration.fitted.model.needs):
         raise BadInput(
-            f"{serial} version {version} needs {', '.join(lacking)}, which recording {measured.id} does not have"
+            f"{serial} version {version} needs {', '.join(lacking)}, which recording {measured.id} does not have; "
+            "name another recording"
         )
     held = {
         name: float(np.mean(np.asarray(data.channels[name], dtype=np.float64)))
@@ -67,7 +68,7 @@ def comparison_json(store: Store, serial: str, version: int, recording: int) -> 
 
 def _source(calibration: Calibration, fitted_to: int | None, recording: int) -> str:
     own = "which it was fitted to" if fitted_to == recording else "which it was not fitted to"
-    return f"version {calibration.version} as it is, nothing refitted, beside recording {recording}, {own}"
+    return f"version {calibration.version} without refitting, on recording {recording}, {own}"
 
 
 def _columns(data: FitData, errors: Mapping[str, Array]) -> ComparisonColumns:

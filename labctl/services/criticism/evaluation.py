@@ -38,7 +38,7 @@ def evaluate(
         found = criticise(measured.readings, model_of(calibration), catalogue, points=measured.points)
     except NotConverged as error:
         what = f"criticism of version {calibration.version} on recording {recording.id}"
-        refuse_wrong(warnings, what, accepted=False, insist=f"; as they are, {error}")
+        refuse_wrong(warnings, what, accepted=False, insist=f"; without refitting,  {error}")
         raise
     columns = residual_columns(found.data, found.residuals, measured.points, found.base)
     serial, version = calibration.serial, calibration.version
@@ -71,5 +71,8 @@ def model_of(row: CalibrationRecord) -> ErrorModel:
     """Return the whole model of a version, also the effects that are not exported. Raises BadInput for an old row."""
     record = row.answer["model"]
     if "terms" not in record:
-        raise BadInput(f"version {row.version} was made by an older labctl; fit it again, then criticise that")
+        raise BadInput(
+            f"version {row.version} was made by an older labctl; fit the recording again, then criticise the new "
+            "version"
+        )
     return ErrorModel.from_dict(record)

@@ -48,7 +48,10 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) ->
     Raises BadInput for a table of coefficients, which holds no measurement.
     """
     if row.kind == "coefficients":
-        raise BadInput(f"recording {row.id} is a table of coefficients: a model is held against readings or means")
+        raise BadInput(
+            f"recording {row.id} is a table of coefficients: a model is compared with readings or means; name a "
+            "recording of these"
+        )
     if row.kind != "samples" or is_profile(row):  # of a rate that changes decimated readings are those of another
         return points
     info = points.info.model_copy(update={"kind": "samples"})

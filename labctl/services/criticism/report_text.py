@@ -142,9 +142,11 @@ def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[
     if verdict.remainder is not None and verdict.groups:
         said.append(_remainder(verdict))
     if verdict.form == "unexplained" and verdict.confounded:
-        said.append(f"This schedule cannot tell {verdict.depends_on[0]} from {_list(verdict.confounded)}: confounded.")
+        said.append(
+            f"This schedule cannot distinguish {verdict.depends_on[0]} from {_list(verdict.confounded)}: confounded."
+        )
     if _leg(found) and (verdict.groups or verdict.form == "unexplained"):
-        said.append("That is as far as one rising leg of temperatures can show.")
+        said.append("More cannot be concluded from temperatures that only rise.")
     if verdict.form == "ambiguous" and verdict.indistinguishable:
         wanted = [str(experiment["do"]) for experiment in experiments[:1]]
         if not wanted:
@@ -154,11 +156,11 @@ def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[
         said += [f"To tell: {experiment}." for experiment in wanted]
     if verdict.not_physical:
         technology = found.data.info.technology or "this technology"
-        said.append(f"Alike in these data, but not physical for {technology}: {_list(verdict.not_physical)}.")
+        said.append(f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}.")
     said += _further(found)
     factor = found.drift_over_datasheet
     if verdict.form == "adequate" and factor is not None and factor >= LARGE_DRIFT:
-        said.append(f"The drift is larger than specified: {factor:.1f} times what the data sheet lets expect.")
+        said.append(f"The drift is larger than specified: {factor:.1f} times the value expected from the data sheet.")
     if found.data.left_out:
         said.append(f"{found.data.left_out} readings far outside their data set were left out.")
     return said
@@ -172,7 +174,7 @@ def _remainder(verdict: Verdict) -> str:
     follows = f", and follows {channels[0]}" if channels else ""
     return (
         f"{' and '.join(group[0] for group in verdict.groups)} {'explains' if len(verdict.groups) == 1 else 'explain'} "
-        f"{explained} % of the excess; what remains is {float(left['over_floor']):.1f} times the floor{follows}."
+        f"{explained} % of the excess; the residual is {float(left['over_floor']):.1f} times the floor{follows}."
     )
 
 
@@ -184,7 +186,7 @@ def _further(found: Criticism) -> list[str]:
     if not names or found.base is None:
         return []
     worth = f": at best the error falls from {found.base.error.rms_dps:.4g} to {min(after):.4g} deg/s" if after else ""
-    return [f"Further suspects, within the noise{worth}: {_list(sorted(names))}."]
+    return [f"Further suspected effects, within the noise{worth}: {_list(sorted(names))}."]
 
 
 def _leg(found: Criticism) -> bool:
@@ -203,10 +205,10 @@ def _list(names: Sequence[str]) -> str:
 def _adequate(found: Criticism) -> str:
     floor, left = found.floor.rms_dps, found.base.error.rms_dps if found.base else None
     if not floor or left is None or left <= AT_FLOOR * floor:
-        return "Adequate: nothing is missing, what is left is noise."
+        return "Adequate: no effect is missing, the residual is noise."
     return (
-        f"Adequate: nothing is missing that this recording can show; what is left is {left / floor:.1f} times the "
-        "noise floor, and does not follow anything that was recorded."
+        f"Adequate: no effect is missing that this recording can detect; the residual is {left / floor:.1f} times the "
+        "noise floor, and depends on no recorded channel."
     )
 
 
@@ -222,7 +224,7 @@ def _first(found: Criticism) -> str:
             return _ambiguous(verdict, words)
         case "unexplained":
             channel = verdict.depends_on[0] if verdict.depends_on else "an unknown channel"
-            return f"Something that no effect of the catalogue describes hangs on {channel}."
+            return f"The residual depends on {channel} in a way that no effect of the catalogue describes."
         case _:
             return f"Too little data for a verdict: {verdict.reason}."
 
@@ -236,11 +238,11 @@ def _on_axes(group: tuple[str, ...], found: Criticism) -> str:
 
 def _ambiguous(verdict: Verdict, words: list[str]) -> str:
     if len(words) > 1:
-        return f"Missing: {'; and '.join(words)}; this recording cannot tell which of those joined by or."
+        return f"Missing: {'; and '.join(words)}; this recording cannot distinguish those joined by 'or'."
     if not verdict.indistinguishable:
-        return f"Something like {words[0]} is missing, but it explains only a part of what is left."
+        return f"Something like {words[0]} is missing, but it explains only a part of the residual."
     names = "; ".join(map(_word, verdict.indistinguishable))
-    return f"Missing is one of these, and this recording cannot tell which: {names}."
+    return f"One of these effects is missing, and this recording cannot tell which: {names}."
 
 
 def _word(effect_id: str) -> str:

@@ -74,7 +74,7 @@ def applied_errors(
     if missing:
         raise BadInput(
             f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}; the "
-            f"recording has no column gyro_{missing[0]}"
+            f"recording has no column gyro_{missing[0]}, name another recording"
         )
     compensator = Compensator(calibration)
     raw = np.column_stack([data.outputs[axis] for axis in calibration.axes])
@@ -87,7 +87,9 @@ def applied_errors(
 def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[np.float64]]:
     absent = [name for name in compensator.needs if name not in data.channels]
     if absent:
-        raise BadInput(f"the model needs channel {absent[0]!r}, which the recording does not have")
+        raise BadInput(
+            f"the model needs channel {absent[0]!r}, which the recording does not have; name another recording"
+        )
     return {name: np.asarray(data.channels[name], dtype=np.float64) for name in compensator.needs}
 
 

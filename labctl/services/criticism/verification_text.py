@@ -9,11 +9,12 @@ def verification_sentence(found: VerificationResponse) -> str:
     """Return what a version leaves of a recording in words."""
     of = "" if found.recorded_unit == found.serial else f" of unit {found.recorded_unit}"
     text = (
-        f"Version {found.version} applied as it is to recording {found.recording}{of}: error {found.rms_dps:.3g} deg/s "
+        f"Version {found.version} applied without refitting to recording {found.recording}{of}: error "
+        f"{found.rms_dps:.3g} deg/s "
         f"RMS, {found.max_dps:.3g} deg/s at most"
     )
     if found.expected_dps is None:
-        text += "; this version states no error to hold it against"
+        text += "; this version states no error to compare it with"
     else:
         text += f"; expected of this version: {found.expected_dps:.3g} deg/s RMS"
     if found.outside_validity:

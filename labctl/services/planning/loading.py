@@ -68,7 +68,7 @@ def load_bench(source: str) -> BenchFile:
         known = ", ".join(shipped_benches())
         raise BadBench(f"bench {source!r} is neither a file nor a bench that ships with labctl ({known})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
-        raise BadBench(f"bench file {source}: not TOML: {error}") from error
+        raise BadBench(f"bench file {source}: not TOML: {error}; correct it") from error
     except ValidationError as error:
         raise BadBench(f"bench file {source}: {_first(error)}") from error
 

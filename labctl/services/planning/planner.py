@@ -54,7 +54,7 @@ def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
     """Say which axes a recipe turns that no unit of the bench records, if any; it would run, and show little."""
     recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
     if lacking := sorted({position.lstrip("-") for position in positions} - recorded):
-        return f"it turns the units about {', '.join(lacking)}, which none of bench {bench.name} records"
+        return f"it turns the units about {', '.join(lacking)}, an axis that no unit of bench {bench.name} measures"
     return ""
 
 
@@ -72,8 +72,9 @@ def plan_steps(
     plan = make_plan(recipe, limits_of(on), clip=request.clip)
     if request.visibility and plan.expected_s > LONGEST_LOOK_S:
         raise BadInput(
-            f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days; what it could find is worked out for up "
-            f"to {LONGEST_LOOK_S / 86_400:.0f}"
+            f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days; what it can detect can be computed "
+            "only for shorter plans; leave it out, or plan at most "
+            f"{LONGEST_LOOK_S / 86_400:.0f} days"
         )
     answer = plan_answer(plan, on, look if request.visibility else None, start)
     columns = timeline_columns([step_json(step) for step in plan.steps])

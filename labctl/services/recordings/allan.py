@@ -19,13 +19,16 @@ NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "te
 
 
 def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanResponse:
-    """Return the Allan deviation of a data set, or of the longest stretch at rest and at one temperature.
+    """Return the Allan deviation of a data set, or of the longest section at rest and at one temperature.
 
     Raises NotFound, BadInput for a recording without readings, NotEnoughData.
     """
     head = store.recordings.get(recording)
     if head.kind != "samples":
-        raise BadInput(f"recording {recording} holds {head.kind}: an Allan deviation needs the readings themselves")
+        raise BadInput(
+            f"recording {recording} holds {head.kind}: an Allan deviation needs single readings; name a recording of "
+            "readings"
+        )
     info = RecordingInfo.model_validate(head.info)
 
     def work() -> AllanResponse:
@@ -48,14 +51,14 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(n, dtype=bool)
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]
     if len(t_s) < LEAST_READINGS:
-        raise NotEnoughData(
-            f"data set {dataset} has {len(t_s)} valid readings; an Allan deviation needs {LEAST_READINGS} or more"
-        )
+        raise NotEnoughData(f"data set {dataset} has {len(t_s)} valid readings; name one with {LEAST_READINGS} or more")
     period_s = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
     found = {str(axis): allan(recording.gyro_dps(axis)[valid], period_s) for axis in recording.info.axes}
     axes = {axis: noise for axis, noise in found.items() if noise is not None}
     if not axes:
-        raise NotEnoughData(f"data set {dataset}: its readings do not scatter, so they say nothing about noise")
+        raise NotEnoughData(
+            f"data set {dataset}: its readings are all equal, so their noise is unknown; name another data set"
+        )
     warm = temperature_of(columns)
     mean_c = float(warm[valid].mean()) if warm is not None else np.nan
     return StaticRecord(dataset, dataset, mean_c, len(t_s) * period_s, axes)
@@ -75,6 +78,6 @@ def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
         if (found := static_record(Recording(info, together))) is not None:
             return found
     raise NotEnoughData(
-        f"recording {recording} has no stretch of {LEAST_READINGS} readings at rest and at one temperature; "
+        f"recording {recording} has no section of {LEAST_READINGS} readings at rest and at one temperature; "
         "name a data set, or record the unit at rest"
     )

@@ -1,4 +1,4 @@
-"""Recordings to look at: which there are, and their data sets as columns."""
+"""The catalogue of recordings, and their data sets as columns."""
 
 from __future__ import annotations
 

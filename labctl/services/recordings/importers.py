@@ -71,7 +71,7 @@ def surest(path: Path) -> str:
             )
         return INTERCHANGE
     if len(names) > 1:
-        raise BadInput(f"{path}: {' and '.join(names)} are equally sure that it is theirs; name one with --format")
+        raise BadInput(f"{path}: {' and '.join(names)} recognise the file equally well; name one with --format")
     return names[0]
 
 
@@ -126,5 +126,8 @@ def _arrays(path: Path, columns: Mapping[str, Any], read_by: str) -> dict[str, A
     shapes = {values.shape for values in arrays.values()}
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
         lengths = ", ".join(f"{name}: {'x'.join(map(str, values.shape))}" for name, values in arrays.items())
-        raise BadRecording(f"{path}: {read_by}: columns need one length, at least 1 (are {lengths or 'none'})")
+        raise BadRecording(
+            f"{path}: {read_by}: the importer returned columns of different or no length (are {lengths or 'none'}); "
+            "report this to its author"
+        )
     return arrays

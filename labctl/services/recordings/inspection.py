@@ -71,7 +71,7 @@ def as_json(warning: DataWarning) -> FindingJson:
     }  # fmt: skip
 
 
-INSIST = "; to do it all the same: --accept-warnings"
+INSIST = "; to do it nevertheless: --accept-warnings"
 
 
 def refuse_wrong(warnings: list[DataWarning], what: str, *, accepted: bool, insist: str = INSIST) -> None:

@@ -65,10 +65,12 @@ def newest_row(store: Store, serial: str, recording: int | None, *, other_unit: 
     store.units.get(serial)
     rows = store.recordings.of_unit(serial) if recording is None else [store.recordings.get(recording)]
     if not rows:
-        raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign makes one")
+        raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign creates one")
     row = next((row for row in rows if _measured(row)), rows[0])
     if row.serial != serial and not other_unit:
-        raise NotFound(f"recording {recording} is of unit {row.serial!r}, not of {serial!r}")
+        raise NotFound(
+            f"recording {recording} is of unit {row.serial!r}, not of {serial!r}; name another, or give --other-unit"
+        )
     if not _measured(row):
         raise NotEnoughData(
             f"recording {row.id} of unit {serial!r} holds no complete data set yet; wait for its first, or name another"

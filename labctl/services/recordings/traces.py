@@ -34,7 +34,10 @@ def trace(
     else:
         table = dict(store.recordings.points(recording).columns)
         if "t_s" not in table:
-            raise BadInput(f"recording {recording} holds {head.kind} without times (no column t_s): there is no trace")
+            raise BadInput(
+                f"recording {recording} holds {head.kind} without times (no column t_s), so it has no trace; show "
+                "its data sets instead"
+            )
         known = courses_of(table)
         begins = ends = np.asarray(table["t_s"], dtype=np.float64).tolist()
     if known and channel not in known:
@@ -69,11 +72,11 @@ def _window(
 ) -> tuple[float | None, float | None]:
     for name, value in (("from_s", from_s), ("until_s", until_s)):
         if value is not None and not math.isfinite(value):
-            raise BadInput(f"{name} = {value} s: must be a number")
+            raise BadInput(f"{name} = {value} s: give a number")
     low = from_s if from_s is not None else min(begins, default=None)
     high = until_s if until_s is not None else max(ends, default=None)
     if low is not None and high is not None and (low > high or (low == high and from_s is not None)):
-        raise BadInput(f"from_s = {low:g} s and until_s = {high:g} s: a window begins before it ends")
+        raise BadInput(f"from_s = {low:g} s and until_s = {high:g} s: give a window whose start lies before its end")
     return low, high
 
 

@@ -60,7 +60,7 @@ def import_files(
         if name not in FILE_NAMES:
             raise BadRecording(f"file {name!r} is not part of a recording (expected {', '.join(sorted(FILE_NAMES))})")
         if names.count(name) > 1:
-            raise BadRecording(f"file {name!r} came more than once")
+            raise BadRecording(f"file {name!r} was sent more than once; send it once")
     with staging_folder() as folder:
         for name, content in files:
             with (folder / name).open("wb") as target:

@@ -1,4 +1,4 @@
-"""The start that a plan is looked at for: now, at a time, or when a cron line is due next."""
+"""The start for which a plan is made: now, at a time, or when a cron line is due next."""
 
 from __future__ import annotations
 

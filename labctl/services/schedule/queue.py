@@ -15,7 +15,7 @@ from labctl.services.schemas.schedule import ScheduledResponse, StartEventRespon
 from labctl.store import NewStart, StartRow, Store
 from procedures.planning.plan import make_plan
 
-NOBODY = "no service runs: it begins only while `labctl serve` holds this database with bench {bench}"
+NOBODY = "no service runs: it is started only while `labctl serve` holds this database with bench {bench}"
 
 
 def is_scheduled(request: CampaignRequest) -> bool:

@@ -24,7 +24,7 @@ from procedures.contracts.errors import ProcedureError
 log = get_logger()
 
 POLL_S = 1.0
-#: A start within this is on time: the schedule is looked at once a second, and a service takes a while to start.
+#: A start within this is on time: the schedule is read once a second, and a service takes a while to start.
 GRACE_S = 60.0
 
 
@@ -37,7 +37,7 @@ class Runs(Protocol):
         ...
 
     def resume_interrupted(self) -> None:
-        """Take up what was cut short, once that may be."""
+        """Take up what was interrupted, once that may be."""
         ...
 
     def start(self, request: CampaignRequest) -> CampaignResponse:
@@ -54,11 +54,11 @@ class Scheduler:
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
         self.attended: Callable[[], bool] = lambda: True  #: whether a campaign that begins could be seen and ended
-        self.trouble = ""  #: why the schedule could not be looked at
+        self.trouble = ""  #: why the schedule could not be read
         self._owes = False  #: what became of a start could not be written down
 
     def start(self) -> None:
-        """Settle what an earlier process left, then look at the schedule from now on, in a thread."""
+        """Settle what an earlier process left, then carry out the schedule from now on, in a thread."""
         self.settle()
         self._thread = threading.Thread(target=self._watch, name="scheduler", daemon=True)
         self._thread.start()
@@ -82,7 +82,7 @@ class Scheduler:
                 self._note_trouble(f"{type(error).__name__}: {error}", error)
 
     def _note_trouble(self, trouble: str, error: Exception | None = None) -> None:
-        """Show why the schedule could not be looked at, and log that it changed."""
+        """Show why the schedule could not be read, and log that it changed."""
         if trouble != self.trouble and error is not None:
             log.error("schedule.trouble", bench=self._bench, error=trouble, exc_info=error)
         elif trouble != self.trouble:
@@ -104,7 +104,7 @@ class Scheduler:
                 self._store.starts.put_back(event)
 
     def tick(self) -> None:
-        """Go on with what was cut short, drop what is too late, then begin what is due and goes first.
+        """Go on with what was interrupted, drop what is too late, then begin what is due and goes first.
 
         Raises StoreError.
         """

@@ -45,14 +45,17 @@ def moment(text: str, zone: ZoneInfo, now: datetime) -> datetime:
         there = meant.astimezone(UTC)
     except (ValueError, OverflowError) as error:
         raise BadInput(
-            f"time {text!r} is not one; write 2026-03-28T22:00, with +01:00 or Z behind it, or now"
+            f"time {text!r} cannot be read; write 2026-03-28T22:00, with +01:00 or Z behind it, or now"
         ) from error
     if there.astimezone(zone).replace(tzinfo=None, fold=0) != meant.replace(tzinfo=None, fold=0):
-        raise BadInput(f"time {text!r} does not exist in {zone.key}: the clocks jump over it that day; name another")
+        raise BadInput(
+            f"time {text!r} does not exist in {zone.key}: it is skipped by the change to summer time; give another"
+        )
     if there <= now:
         here = now.astimezone(zone)
         raise BadInput(
-            f"time {text!r} ({meant:%Y-%m-%d %H:%M %z}) is past, it is {here:%Y-%m-%d %H:%M %z} in {zone.key}; "
+            f"time {text!r} ({meant:%Y-%m-%d %H:%M %z}) is in the past, it is now {here:%Y-%m-%d %H:%M %z} in "
+            f"{zone.key}; "
             "name a later one, or now"
         )
     return there
@@ -80,11 +83,11 @@ def check_cron(line: str, zone: ZoneInfo, now: datetime) -> datetime:
     """Return when a cron line is due for the first time. Raises BadInput naming what is wrong with it."""
     shape = "minute hour day-of-month month day-of-week, such as '30 2 * * MON'"
     if len(line.split()) != FIELDS:
-        raise BadInput(f"cron line {line!r} has {len(line.split())} fields, not {FIELDS}: {shape}")
+        raise BadInput(f"cron line {line!r} has {len(line.split())} fields; write {FIELDS}: {shape}")
     try:
         due = next_due(line, zone, now)
     except CronSimError as error:
-        raise BadInput(f"cron line {line!r}: {str(error).lower()}; a line is {shape}") from error
+        raise BadInput(f"cron line {line!r}: {str(error).lower()}; write {shape}") from error
     if due is None:
-        raise BadInput(f"cron line {line!r} never comes true within 50 years; look at its days and months")
+        raise BadInput(f"cron line {line!r} matches no time within 50 years; correct its days and months")
     return due

@@ -96,7 +96,7 @@ class FindingResponse(ResponseModel):
 
 
 class CheckResponse(ResponseModel):
-    """What was looked at, and what was found."""
+    """What was checked, and what was found."""
 
     ok: bool
     database: str

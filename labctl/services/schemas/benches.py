@@ -10,10 +10,10 @@ from labctl.services.schemas.base import Request, ResponseModel
 
 
 class ClearRequest(Request):
-    """Who has looked at a bench whose safe state was not confirmed."""
+    """Who has inspected a bench whose safe state was not confirmed."""
 
     by: str = Field(min_length=1, max_length=200)
-    reason: str = "looked at the bench"
+    reason: str = "inspected the bench"
 
 
 class BenchStatus(ResponseModel):
@@ -21,13 +21,15 @@ class BenchStatus(ResponseModel):
 
     name: str
     last_used_at: datetime
-    unconfirmed: str = Field(default="", description="Until a person has looked and clears it; empty when all is well.")
+    unconfirmed: str = Field(
+        default="", description="Until a person has inspected the bench and clears it; empty when all is well."
+    )
     unconfirmed_at: datetime | None = None
     attempts: int = Field(default=0, description="How often the safe state was tried again since.")
     attempted_at: datetime | None = None
     confirmed_at: datetime | None = Field(
         default=None,
-        description="When such an attempt confirmed the safe state; a person has still to look and clear it.",
+        description="When such an attempt confirmed the safe state; a person has still to inspect and clear it.",
     )
     left: list[str] = Field(
         default_factory=list, description="Campaigns that no process runs any more and that have not been ended."

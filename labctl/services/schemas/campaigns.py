@@ -31,13 +31,18 @@ class CampaignRequest(Request):
         max_length=64,
         description="When to begin, ISO 8601; without offset in `time_zone`. `now`: as soon as the bench is free.",
     )
-    cron: str | None = Field(default=None, max_length=200, description="Begin again and again: five fields of cron.")
+    cron: str | None = Field(default=None, max_length=200, description="Cron line of repeated starts: five fields.")
     time_zone: str | None = Field(
         default=None,
         max_length=100,
         description="Time zone of `at` and `cron`, such as Europe/Berlin; default: that of the service's computer.",
     )
-    priority: int = Field(default=0, ge=-100, le=100, description="Of starts that are due, the highest goes first.")
+    priority: int = Field(
+        default=0,
+        ge=-100,
+        le=100,
+        description="Of the starts that are due, the one with the highest number begins first.",
+    )
     late_limit_s: float | None = Field(
         default=None,
         ge=0,
@@ -67,7 +72,7 @@ class StartRequest(Request):
     speed: float | None = Field(
         default=None, gt=0, allow_inf_nan=False, description="Of a simulated bench; absent: as fast as it can."
     )
-    seed: int | None = Field(default=None, ge=0, description="Of a simulated bench.")
+    seed: int | None = Field(default=None, ge=0, description="Speed of a simulated bench: X times real time.")
     confirmed_by: str = Field(default="", max_length=200, description="As of CampaignRequest.")
     checks: list[BenchCheck] = Field(default_factory=list, description="As of CampaignRequest.")
 
@@ -160,7 +165,7 @@ class CampaignResponse(ResponseModel):
     rate_dps: float | None = None
     outputs: list[OutputResponse] = Field(default_factory=list, description="Of a campaign that runs here, now.")
     last_error: str | None = None
-    wish: Literal["pause", "abort"] | None = Field(default=None, description="Asked for, and not yet taken up.")
+    wish: Literal["pause", "abort"] | None = Field(default=None, description="Requested, and not yet carried out.")
     prompt: PromptResponse | None = Field(default=None, description="The question that waits for a person.")
     links: dict[str, str] = Field(default_factory=dict, description="Instruments that are degraded or lost.")
     dropped: dict[str, str] = Field(default_factory=dict, description="Units that take no further part: name -> why.")

@@ -86,7 +86,8 @@ class CriticismResponse(ResponseModel):
     readings_left_out: int = Field(default=0, description="Readings far outside their data set.")
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     applied: VerificationResponse | None = Field(
-        default=None, description="The version as it is on this recording; everything else is of a refit to it."
+        default=None,
+        description="The version without refitting on this recording; everything else is of a refit to it.",
     )
     views: Views = Field(
         default_factory=Views, description="Where and how the model fails, as numbers for pictures, by view."

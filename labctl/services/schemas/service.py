@@ -18,7 +18,7 @@ class HealthResponse(ResponseModel):
     database: str = Field(description="Name of the file, without folder, or of the database.")
     since: str = Field(description="When the service was started, ISO 8601, UTC.")
     bench: BenchDescription | None
-    schedule_trouble: str = Field(description="Why the schedule could not be looked at; empty when all is well.")
+    schedule_trouble: str = Field(description="Why the schedule could not be read; empty when all is well.")
 
 
 class PulseResponse(ResponseModel):

@@ -11,19 +11,14 @@ from labctl.services.cache import UNNAMED, compute
 from labctl.services.planning.loading import LocalStart
 from labctl.services.planning.planner import plan_steps
 from labctl.services.schemas.plans import PlannedResponse, PlanRequest, Visibility
-from labctl.services.simulation.plan_simulation import hidden_recording
+from labctl.services.simulation.walks import walked
 from labctl.store import Store
 from procedures.planning.plan import Plan
-
-#: Readings per second at which a plan is walked through: its channels are slow.
-WALK_HZ = 1.0
-SEED = 1
 
 
 def planned_schedule(plan: Plan, bench: BenchFile, model: ErrorModel | None = None) -> Schedule:
     """Return the schedule of a plan beside a model; default: the published model for such a recording."""
-    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": WALK_HZ})
-    return schedule_of(hidden_recording(plan, bench, gyro, SEED, {}), model)
+    return schedule_of(walked(plan, bench), model)
 
 
 def visibility(plan: Plan, bench: BenchFile) -> list[Visibility]:

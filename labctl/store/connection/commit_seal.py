@@ -65,6 +65,6 @@ def missing(connection: sa.Connection | None, location: str) -> str | None:
         return None
     return (
         f"{counted - found} commits that were made are not in it: its write-ahead log ({Path(location).name}-wal) was "
-        "deleted, or it was cut short, or an older copy was put in its place; restore the newest backup, or, to "
+        "deleted, or it was interrupted, or an older copy was put in its place; restore the newest backup, or, to "
         f"continue without these commits, remove {seal_path(location)}"
     )

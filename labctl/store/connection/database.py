@@ -96,7 +96,7 @@ class Database:
                 migrate.upgrade(connection)
         except DatabaseError as error:
             trouble = self._trouble(error)
-            if isinstance(trouble, DiskFull | DatabaseUnreachable):
+            if isinstance(trouble, DiskFull | DatabaseUnreachable) or self._backend.words_for(error):
                 raise trouble from error
             raise StoreError(
                 f"{self._shown}: not a labctl database, or damaged ({error.orig}); "
@@ -137,7 +137,7 @@ class Database:
         """
         if self.writer is not None:
             raise StoreError(
-                f"{self._shown}: another process writes to it; only a marked transaction can be sent there"
+                f"{self._shown}: another process writes to it; send a marked transaction, or wait until it ends"
             )
         number, ended = 0, False
         with self._turn.take():
@@ -167,13 +167,13 @@ class Database:
     def _trouble(self, error: exc.DatabaseError) -> StoreError:
         if self._backend.is_disk_full(error):
             cause = f"{self._shown}: the disk is full"
-            return DiskFull(f"{cause}; nothing of this act was kept. Make room, then go on", cause=cause)
+            return DiskFull(f"{cause}; nothing was stored. Free disk space, then continue", cause=cause)
         said = " ".join(str(error.orig).split())
         if self._backend.is_unreachable(error):
             cause = f"{self._shown}: the database server does not answer ({said})"
-            return DatabaseUnreachable(f"{cause}; nothing of this act was kept. Try again once it runs", cause=cause)
+            return DatabaseUnreachable(f"{cause}; nothing was stored. Try again once it runs", cause=cause)
         cause = f"{self._shown}: {self._backend.words_for(error) or said}"
-        return StoreError(f"{cause}; nothing of this act was kept", cause=cause)
+        return StoreError(f"{cause}; nothing was stored, try again", cause=cause)
 
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:
@@ -191,7 +191,7 @@ class Database:
         except exc.DatabaseError as error:
             raise self._unread(error) from error
         except exc.TimeoutError as error:
-            raise StoreError(f"{self._shown}: as many connections as there may be are in use; try again") from error
+            raise StoreError(f"{self._shown}: all connections are in use; try again in a few seconds") from error
 
     def _unread(self, error: exc.DatabaseError) -> StoreError:
         text = f"{self._shown}: {error.orig}"

@@ -69,4 +69,4 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> 
         raise BadInput(
             f"--database {shown(url)}: {error.name} is not installed here: `pip install 'labctl[postgresql]'`; {known}"
         ) from error
-    raise BadInput(f"--database {shown(url)}: no database that labctl knows; {known}")
+    raise BadInput(f"--database {shown(url)}: unknown kind of database; {known}")

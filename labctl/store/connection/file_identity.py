@@ -45,8 +45,9 @@ class FileIdentity:
             elif known != now:
                 was = "deleted" if now is None else "replaced by another file"
                 return (
-                    f"{self._paths[0]}: {path.name} was {was} while this process had it open; nothing is written "
-                    "any more. Stop this process, put the file or the newest backup there, look at it with `labctl "
+                    f"{self._paths[0]}: {path.name} was {was} while this process had it open; labctl writes nothing "
+                    "more."
+                    " Stop this process, put the file or the newest backup there, check it with `labctl "
                     "check`, and start again"
                 )
         return ""

@@ -27,6 +27,8 @@ DISK_FULL, LOCK_NOT_AVAILABLE = "53100", "55P03"
 #: shut down, was killed, starts, or drops its database. The codes are SQLSTATEs.
 CONNECTION_CLASS = "08"
 SERVER_AWAY = frozenset({"57P01", "57P02", "57P03", "57P05", "25P03", "53300"})
+#: What a server says that refuses a connection, which waiting does not mend. The client library gives no SQLSTATE.
+REFUSALS = ("authentication failed", "does not exist", "no pg_hba.conf entry", "permission denied", "not permitted")
 
 _BEGIN = sa.text("SELECT pg_current_xact_id()::text FROM (SELECT pg_advisory_xact_lock(:key)) AS turn")
 _STATUS = sa.text("SELECT pg_xact_status(CAST(:number AS xid8))")
@@ -77,8 +79,8 @@ class PostgresqlServer:
     def is_unreachable(self, error: exc.DatabaseError) -> bool:
         """Return whether the connection is lost, or the server shuts down, starts, or is not there."""
         state = getattr(error.orig, "sqlstate", None)
-        if state is None:  # said by the client library: refused, lost, timed out
-            return isinstance(error, exc.OperationalError)
+        if state is None:  # said by the client library: no answer, lost, timed out
+            return isinstance(error, exc.OperationalError) and not _is_refusal(error)
         return state in SERVER_AWAY or state.startswith(CONNECTION_CLASS)
 
     def is_disk_full(self, error: exc.DatabaseError) -> bool:
@@ -86,10 +88,16 @@ class PostgresqlServer:
         return getattr(error.orig, "sqlstate", None) == DISK_FULL
 
     def words_for(self, error: exc.DatabaseError) -> str:
-        """Return what a lock means that the server gave to no one in time."""
-        if getattr(error.orig, "sqlstate", None) != LOCK_NOT_AVAILABLE:
+        """Return what a refused connection means, and a lock that the server gave to no one in time."""
+        state = getattr(error.orig, "sqlstate", None)
+        if state is None and _is_refusal(error):
+            said = " ".join(str(error.orig).split())
+            return f"the database server refuses the connection ({said}); check user, password and database in the URL"
+        if state != LOCK_NOT_AVAILABLE:
             return ""
-        return f"no turn to write within {LOCK_TIMEOUT_S:g} s: another process has it; look at what writes there"
+        return (
+            f"no write access within {LOCK_TIMEOUT_S:g} s: another process has it; find out which process writes there"
+        )
 
     def was_committed(self, number: int) -> bool:
         """Ask the server what became of a transaction, once it is over: it had the turn until then."""
@@ -102,3 +110,7 @@ class PostgresqlServer:
 
     def close(self) -> None:
         """Do nothing: nothing is held beside the connections."""
+
+
+def _is_refusal(error: exc.DatabaseError) -> bool:
+    return any(words in str(error.orig) for words in REFUSALS)

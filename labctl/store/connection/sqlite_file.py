@@ -1,4 +1,5 @@
-"""An SQLite database as a file: one writing process, private files, and a file that is not lost, cut short or replaced.
+"""An SQLite database as a file: one writing process, private files, and a file that is not lost, interrupted or
+replaced.
 
 SQLite before 3.51.3 can damage a write-ahead log when two connections write at once, so exactly one connection of one
 process writes; `writer_lock` enforces it.
@@ -87,7 +88,7 @@ class SqliteFile:
     def refuse_other(self) -> None:
         """Raise StoreError when the database was deleted or replaced since it was opened."""
         if self._identity is not None and (text := self._identity.changed()):
-            raise StoreError(f"{text}. Nothing of this act was kept", cause=text)
+            raise StoreError(f"{text}. Nothing was stored; try again", cause=text)
 
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
         """Let the next commits reach the disk before they are answered, or with a later one: a log is in order."""

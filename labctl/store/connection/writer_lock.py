@@ -40,10 +40,10 @@ def _describe(holder: Holder) -> str:
     if holder.campaign is not None:
         return (
             f"campaign {holder.campaign} runs in process {holder.pid}'s terminal: Ctrl-C there ends it safely; a "
-            "campaign under `labctl serve` can be paused and aborted from here. Anything else waits for its end"
+            "campaign under `labctl serve` can be paused and aborted from here. Everything else has to wait for its end"
         )
     who = f"the service at {holder.url}" if holder.url else f"another labctl (process {holder.pid})"
-    return f"{who} writes to this database now; wait for it, or ask it"
+    return f"{who} writes to this database now; wait until it ends, or send the request to it"
 
 
 def holder_of(location: str) -> Holder | None:

@@ -64,9 +64,9 @@ class WriterTurn:
             held_s = self._clock.now_s() - turn.began_s
             who = f"{turn.function} in thread {turn.thread!r}, for {held_s:.3g} s already"
         cause = (
-            f"{self._location}: no turn to write within {waited_s:.3g} s; the one writing connection is held by {who}"
+            f"{self._location}: no write access within {waited_s:.3g} s; the one writing connection is held by {who}"
         )
-        return StoreError(f"{cause}; nothing of this act was kept", cause=cause)
+        return StoreError(f"{cause}; nothing was stored, try again", cause=cause)
 
 
 def _caller() -> str:

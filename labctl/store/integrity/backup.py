@@ -50,7 +50,9 @@ def copy_database(location: str, target: Path) -> Copy:
         made.rename(target)
         _sync_folder(target.absolute().parent)
     except sqlite3.Error as error:
-        raise StoreError(f"{target}: the copy of {location} is not whole ({error}); nothing was kept of it") from error
+        raise StoreError(
+            f"{target}: the copy of {location} is incomplete ({error}) and was removed; try again"
+        ) from error
     finally:
         for left in (made, Path(f"{name}-wal"), Path(f"{name}-shm"), Path(f"{name}-journal")):
             left.unlink(missing_ok=True)

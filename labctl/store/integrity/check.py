@@ -98,7 +98,7 @@ class _Check:
         except exc.DatabaseError as error:
             self.find(part, f"cannot be read: {error.orig}")
         except (ValueError, TypeError) as error:  # the row is there, its content is of another kind
-            self.find(part, f"cannot be read: {error}")
+            self.find(part, f"cannot be read: {error}; check path and permissions")
         return part != "schema"
 
     def _check_file(self, connection: sa.Connection) -> bool:
@@ -108,7 +108,7 @@ class _Check:
             if text != "ok":
                 self.find("file", text)
         for table, row, parent, _ in connection.exec_driver_sql("PRAGMA foreign_key_check"):
-            self.find("file", f"row {row} of {table} names a row of {parent} that is not there")
+            self.find("file", f"row {row} of {table} refers to a row of {parent} that is missing")
         return True
 
     def _check_schema(self, connection: sa.Connection) -> bool:
@@ -116,9 +116,9 @@ class _Check:
         if found == migrate.HEAD:
             return True
         if found is None:
-            self.find("schema", "this is not a labctl database, or all of it is lost: there are no tables")
+            self.find("schema", "this is not a labctl database, or its content is lost: there are no tables")
         else:
-            hint = "any other command brings it there" if found in migrate.KNOWN else "use a newer labctl"
+            hint = "any other command migrates it" if found in migrate.KNOWN else "use a newer labctl"
             self.find("schema", f"the database is at step {found}, this labctl at {migrate.HEAD}: {hint}")
         return False
 
@@ -139,10 +139,10 @@ class _Check:
                 )
         for recording, kind in kinds.items():
             if kind != "samples" and (recording, WHOLE_TABLE) not in valid:
-                self.find("readings", f"recording {recording} ({kind}) has lost its table")
+                self.find("readings", f"recording {recording} ({kind}) has no table any more")
         for recording, number in sorted(valid.keys() - known):
             if number != WHOLE_TABLE:
-                self.find("readings", f"recording {recording} holds readings of data set {number}, which is not there")
+                self.find("readings", f"recording {recording} holds readings of data set {number}, which is missing")
         return True
 
     def _valid_readings(self, connection: sa.Connection, total: int) -> dict[tuple[int, int], int | None]:
@@ -189,7 +189,7 @@ class _Check:
             self.find("readings", f"{place}: cannot be unpacked ({error})")
             return None
         if any(len(values) != block.n for values in columns.values()):
-            self.find("readings", f"{place}: its columns are not the {block.n} readings that it counts")
+            self.find("readings", f"{place}: its columns do not have the {block.n} readings that its header states")
             return None
         return columns
 
@@ -206,7 +206,7 @@ class _Check:
                 continue
             if (calibration.serial, calibration.version, calibration.hash) != (serial, version, own):
                 said = f"{calibration.serial} version {calibration.version}"
-                self.find("calibrations", f"{serial} version {version}: its document is another one ({said})")
+                self.find("calibrations", f"{serial} version {version}: its document was changed ({said})")
         return True
 
     def _check_audit(self, connection: sa.Connection) -> bool:

@@ -102,12 +102,12 @@ def first_broken(connection: sa.Connection, anchor: Head | None = None) -> Broke
     query = sa.select(a.id, at, a.actor, a.action, a.subject, detail, a.previous_hash, a.hash).order_by(a.id)
     for number, *content, before, own in connection.execute(query):
         if own != _hash_of_row(before, *content):
-            return Broken(int(number), "its content is not what was written")
+            return Broken(int(number), "its content was changed")
         if before != previous:
             return Broken(int(number), f"it does not follow row {last}: a row is missing before it, or rows were moved")
         previous, last, length = own, int(number), length + 1
         if anchor is not None and length == anchor.length and own != anchor.hash:
-            return Broken(last, "it is not the row that the anchor names: the trail was written anew")
+            return Broken(last, "it is not the row that the anchor names: the trail was rewritten")
     if anchor is not None and length < anchor.length:
         return Broken(last + 1, f"{anchor.length - length} rows that the anchor counts are missing at the end")
     return _end_broken(connection, Head(length, previous), last)

@@ -28,7 +28,7 @@ class BenchRow:
     confirmed_at: datetime | None = None  #: by such an attempt; `unconfirmed` stays until a person clears it
 
     @property
-    def is_in_doubt(self) -> bool:
+    def is_unconfirmed(self) -> bool:
         """Whether it is not known that the bench is in its safe state."""
         return bool(self.unconfirmed) and self.confirmed_at is None
 
@@ -76,7 +76,7 @@ class Benches:
         b = tables.benches
         with self._database.writing() as connection:
             found = connection.execute(_ROWS.where(b.c.name == name)).one_or_none()
-            if found is None or not BenchRow(*found).is_in_doubt:  # a person was quicker
+            if found is None or not BenchRow(*found).is_unconfirmed:  # a person was quicker
                 return
             was, attempts = found.unconfirmed, found.attempts + 1
             values = {"attempts": attempts, "attempted_at": at}
@@ -93,7 +93,7 @@ class Benches:
         if found is None:
             raise NotFound(f"bench {name!r} was never used with this database; `labctl bench status` lists them")
         if not found.unconfirmed:
-            raise Conflict(f"bench {name}: nothing is unconfirmed")
+            raise Conflict(f"bench {name}: its safe state is confirmed already; start a campaign")
         b = tables.benches
         with self._database.writing() as connection:
             connection.execute(sa.update(b).where(b.c.name == name).values({**_UNTRIED, "unconfirmed_at": None}))

@@ -112,7 +112,7 @@ class Calibrations:
             "serial": serial, "version": version, "parent": new.parent, "recording_id": new.recording,
             "model": new.model, "created_at": at, "hash": new.hash, "document": new.document, "answer": new.answer,
         }  # fmt: skip
-        taken = VersionTaken(f"{serial} version {version} was made by another fit meanwhile; fit again")
+        taken = VersionTaken(f"{serial} version {version} was made by another fit in the meantime; fit again")
         try:
             with self._database.writing() as connection:
                 if _next_version(connection, serial) != version:
@@ -133,7 +133,9 @@ class Calibrations:
         """Return one version; raises NotFound."""
         rows = self._rows(tables.calibrations.c.serial == serial, tables.calibrations.c.version == version)
         if not rows:
-            raise NotFound(f"unit {serial!r} has no calibration version {version}")
+            raise NotFound(
+                f"unit {serial!r} has no calibration version {version}; `labctl ladder {serial}` lists the versions"
+            )
         return rows[0]
 
     def of_unit(self, serial: str) -> list[CalibrationRecord]:
@@ -154,8 +156,8 @@ class Calibrations:
         if act is None or act.act != "certify":
             raise NotCertified(
                 f"unit {serial!r} has no certified calibration; "
-                f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts one in force, "
-                "`--version N` names one that is not"
+                f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts one in force, `--version N` takes "
+                "one that is not in force"
             )
         return act.version
 
@@ -187,7 +189,10 @@ class Calibrations:
         last = self._last_act(serial)
         in_force = last.version if last is not None and last.act == "certify" else None
         if act == "revoke" and in_force != version:
-            raise Conflict(f"{serial} version {version} is not in force (in force: {in_force or 'none'})")
+            raise Conflict(
+                f"{serial} version {version} is not in force (in force: {in_force or 'none'}); give the version in "
+                "force"
+            )
         row = CertificationRow(serial, version, act, by, reason, at, due_at, judgement)
         with self._database.writing() as connection:
             connection.execute(
@@ -214,10 +219,12 @@ class Calibrations:
         with self._database.reading() as connection:
             known = connection.scalar(sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN))
         if known is None:
-            raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign brings one in")
+            raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
         if version is None:
             self.certified_version(serial)  # says why there is none
-        raise NotFound(f"unit {serial!r} has no calibration version {version}")
+        raise NotFound(
+            f"unit {serial!r} has no calibration version {version}; `labctl ladder {serial}` lists the versions"
+        )
 
     def history(self, serial: str) -> list[CertificationRow]:
         """Return every act of certifying and revoking, newest first."""

@@ -103,7 +103,7 @@ class StoreJournal:
 
     @outlasting
     def unit_dropped(self, gyro: str, reason: str) -> None:
-        """Record that a unit takes no further part."""
+        """Record that a unit is excluded from the rest of the campaign."""
         r = tables.recordings
         with self._writing() as connection:
             connection.execute(sa.update(r).where(r.c.id == self._recordings[gyro]).values(dropped=reason))
@@ -232,7 +232,7 @@ class StoreJournal:
 
     @outlasting
     def event(self, event: Event, t_s: float, at: datetime) -> None:
-        """Record something worth telling a person; what is not safe stays on the bench's status from then on."""
+        """Record something worth telling a person; what is not safe not part of a calibration's status from then on."""
         with self._writing() as connection:
             self._add_event(connection, event, t_s, at)
             if event.kind == "safe_state" and event.level == "error":

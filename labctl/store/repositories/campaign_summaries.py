@@ -48,7 +48,9 @@ class CampaignSummary:
     last_t_s: float | None = None  #: of the last event, campaign time
     last_error: str | None = None
     environment: LastEnvironment = LastEnvironment()
-    dropped: Mapping[str, str] = field(default_factory=dict)  #: gyro -> why it takes no further part
+    dropped: Mapping[str, str] = field(
+        default_factory=dict
+    )  #: gyro -> why it is excluded from the rest of the campaign
 
 
 class CampaignSummaries:

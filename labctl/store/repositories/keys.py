@@ -30,7 +30,9 @@ class Keys:
         """Keep a new key's digest. Raises Conflict when the name was used before."""
         with self._database.writing() as connection:
             if connection.scalar(sa.select(_k.name).where(_k.name == name)) is not None:
-                raise Conflict(f"key {name!r} was made before; a name is used once, also after a revocation")
+                raise Conflict(
+                    f"key {name!r} exists already; choose another name: each is used once, also after a revocation"
+                )
             connection.execute(
                 sa.insert(tables.api_keys).values(name=name, role=role, digest=digest, created_at=at, revoked_at=None)
             )
@@ -39,13 +41,15 @@ class Keys:
 
     @transaction
     def revoke(self, name: str, reason: str, at: datetime) -> KeyRow:
-        """Take a key's power away, at once. Raises NotFound, Conflict when it was revoked before."""
+        """Revoke a key, at once. Raises NotFound, Conflict when it was revoked before."""
         with self._database.writing() as connection:
             row = connection.execute(_ALL.where(_k.name == name)).first()
             if row is None:
                 raise NotFound(f"there is no key {name!r}; `labctl key list` shows them")
             if row.revoked_at is not None:
-                raise Conflict(f"key {name!r} was revoked before, at {row.revoked_at.isoformat()}")
+                raise Conflict(
+                    f"key {name!r} was already revoked at {row.revoked_at.isoformat()}; no further action is needed"
+                )
             connection.execute(sa.update(tables.api_keys).where(_k.name == name).values(revoked_at=at))
             append(connection, at, "key revoke", f"key {name}", {"role": row.role, "reason": reason})
         return KeyRow(row.name, row.role, row.digest, row.created_at, at)

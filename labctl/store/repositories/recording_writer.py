@@ -162,7 +162,7 @@ def _give_sign(connection: sa.Connection, ticket: ImportTicket, *, token: str | 
     if connection.execute(signed).rowcount == 0:
         raise Conflict(
             f"recording {ticket.recording}: its import was discarded when the writing process was started again; "
-            "nothing of it was kept, import it again"
+            "nothing was stored; import it again"
         )
 
 

@@ -54,7 +54,7 @@ class Recordings:
         """Return one recording's head; raises NotFound."""
         found = self._heads(tables.recordings.c.id == recording)
         if not found:
-            raise NotFound(f"recording {recording} is not in this database")
+            raise NotFound(f"recording {recording} is not in this database; check its number")
         return found[0]
 
     def of_unit(self, serial: str) -> list[RecordingRow]:
@@ -188,7 +188,7 @@ class Recordings:
             )
             head = connection.execute(chosen).mappings().first()
             if head is None:
-                raise NotFound(f"recording {recording} has no data set {number}")
+                raise NotFound(f"recording {recording} has no data set {number}; check its number")
             return readings_in_units(connection, cast(DataSetHead, dict(head)), channels_of(connection, recording))
 
 

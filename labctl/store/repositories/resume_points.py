@@ -36,13 +36,13 @@ class ResumePoint:
     soak_owed: bool
     added_runs: int
     boot_id: str | None
-    dropped: dict[str, str]  #: gyro -> why it takes no further part
-    tries: int  #: how often it was taken up since a step ended
+    dropped: dict[str, str]  #: gyro -> why it is excluded from the rest of the campaign
+    tries: int  #: how often it was resumed since a step ended
 
 
 @dataclass(frozen=True)
-class TakeUp:
-    """What is written down when a campaign is taken up."""
+class Resumption:
+    """What is written down when a campaign is resumed."""
 
     t_s: float
     at: datetime
@@ -111,7 +111,7 @@ class ResumePoints:
 
     @staticmethod
     def _events(connection: sa.Connection, campaign: int, ended_s: float) -> tuple[bool, int]:
-        """Return whether a soak is owed, and how often the campaign was taken up since its last step ended."""
+        """Return whether a soak is owed, and how often the campaign was resumed since its last step ended."""
         v = tables.events.c
 
         def last(kinds: tuple[str, ...]) -> int:
@@ -122,8 +122,8 @@ class ResumePoints:
         return last(OWED) > last(PAID), int(connection.scalar(tries) or 0)
 
     @transaction
-    def take_up(self, campaign: int, point: ResumePoint, how: TakeUp) -> None:
-        """Mark what the interruption left half done, and the campaign as running again. Safe to be cut short itself.
+    def mark_resumed(self, campaign: int, point: ResumePoint, how: Resumption) -> None:
+        """Mark what the interruption left half done, and the campaign as running again. Safe to be interrupted itself.
 
         Raises Conflict when it is done already.
         """
@@ -143,7 +143,7 @@ class ResumePoints:
                 sa.update(c).where(c.c.id == campaign, c.c.state != CampaignState.DONE).values(**values)
             )
             if taken.rowcount == 0:
-                raise Conflict(f"campaign {campaign} is done; it cannot be finished twice")
+                raise Conflict(f"campaign {campaign} is done and cannot be resumed; start a new one")
             mine = s.c.campaign_id == campaign
             self._mark(connection, mine & s.c.number.in_(point.complete), "done", how, "its data set was complete")
             running = mine & (s.c.state == "running")
@@ -165,7 +165,7 @@ class ResumePoints:
         connection: sa.Connection,
         which: sa.ColumnElement[bool],
         outcome: str,
-        how: TakeUp,
+        how: Resumption,
         reason: str,
     ) -> None:
         result = StepResult.model_validate({"outcome": outcome, "reason": reason}).model_dump(mode="json")
@@ -178,7 +178,7 @@ class ResumePoints:
         )
 
     def _close_open_data_sets(self, campaign: int) -> None:
-        """Keep what a data set had when it was cut short, and mark it; it is never merged with what redoes it."""
+        """Keep what a data set had when it was interrupted, and mark it; it is never merged with what redoes it."""
         r, d = tables.recordings.c, tables.data_sets.c
         query = (
             sa.select(d.number)

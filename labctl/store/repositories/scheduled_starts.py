@@ -182,7 +182,9 @@ class Starts:
         waiting = sa.update(s).where(s.c.id == start, s.c.state == "waiting")
         with self._database.writing() as connection:
             if connection.execute(waiting.values(state="cancelled")).rowcount != 1:
-                raise Conflict(f"scheduled start {start} is over already: {self.get(start).state}")
+                raise Conflict(
+                    f"scheduled start {start} has already ended: {self.get(start).state}; add a new one to the schedule"
+                )
             audit.append(
                 connection, at, "schedule cancel", _subject(start, row.bench_name), {"recipe": row.recipe_name}
             )

@@ -55,7 +55,7 @@ class Units:
         with self._database.reading() as connection:
             row = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial, SEEN)).first()
         if row is None:
-            raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign brings one in")
+            raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
         return Unit(*row)
 
     def count(self) -> int:

@@ -12,8 +12,9 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Is the service well?
-         * @description Whether the service answers and in which version; to those who may read, also the database and the bench.
+         * State of the service
+         * @description Whether the service answers and in which version; with a key that may read, also the state of the database
+         *     and of the bench.
          */
         get: operations["health_health_get"];
         put?: never;
@@ -32,10 +33,11 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Does the service answer?
+         * Sign of life of the service
          * @description Whether the service answers: what every open page asks once a second.
          *
-         *     No key is asked for and no database is read. `heard_s`, where it is there: how long the bench was not heard.
+         *     No key is asked for and no database is read. `heard_s`, where present: seconds since the last answer of the
+         *     bench process.
          */
         get: operations["heartbeat_health_heartbeat_get"];
         put?: never;
@@ -54,8 +56,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Figures for a monitor
-         * @description Counts in the text format that Prometheus reads.
+         * Metrics for monitoring
+         * @description Metrics in the text format of Prometheus.
          */
         get: operations["metrics_metrics_get"];
         put?: never;
@@ -95,7 +97,7 @@ export interface paths {
         };
         /**
          * One unit
-         * @description Who the unit is, its recordings and calibrations, and which version is in force.
+         * @description The unit, its recordings and calibrations, and which version is in force.
          */
         get: operations["one_unit_api_units__serial__get"];
         put?: never;
@@ -134,7 +136,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * What could not be confirmed safe
+         * Benches, and unconfirmed safe states
          * @description Every bench of this database, with what its last safe state could not confirm.
          */
         get: operations["bench_states_api_benches_status_get"];
@@ -156,8 +158,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Say that a bench was looked at
-         * @description Take in that a person has looked at a bench whose safe state was not confirmed; campaigns may start again.
+         * Record that a bench was inspected
+         * @description Record that a person has inspected a bench whose safe state was not confirmed; campaigns may start again.
          */
         post: operations["clear_api_benches__bench__clear_post"];
         delete?: never;
@@ -175,7 +177,8 @@ export interface paths {
         };
         /**
          * The catalogue of physical effects
-         * @description Every effect a model can be made of: its standard term, sentence, origin, channels, coefficients and ranges.
+         * @description Every effect that a model can contain: its standard term, description, origin, channels, coefficients and
+         *     ranges.
          */
         get: operations["effects_api_effects_get"];
         put?: never;
@@ -197,7 +200,7 @@ export interface paths {
          * The calibration to use
          * @description The calibration as a file: the bytes never change, the ETag is their hash. 304 when the caller has them already.
          *
-         *     A point read of tens of microseconds: it runs in the event loop, without a hand-over to a thread.
+         *     A point read of tens of microseconds: it runs in the event loop, without a switch to a thread.
          */
         get: operations["calibration_api_units__serial__calibration_get"];
         put?: never;
@@ -243,7 +246,7 @@ export interface paths {
         put?: never;
         /**
          * Change a model
-         * @description Add effects to a version, or take some out, and fit everything again; it becomes the unit's next version.
+         * @description Add effects to a version, or remove some, and fit everything again; it becomes the unit's next version.
          */
         post: operations["improve_api_units__serial__calibrations__version__improve_post"];
         delete?: never;
@@ -261,7 +264,7 @@ export interface paths {
         };
         /**
          * One version
-         * @description The version as its fit answered, when and from what it was made, and whether it is in force.
+         * @description The result of the fit of a version, when and from which data it was made, and whether it is in force.
          */
         get: operations["one_version_api_units__serial__calibrations__version__get"];
         put?: never;
@@ -280,8 +283,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * What was certified and revoked
-         * @description Every act of certifying and revoking a version of the unit, newest first: who, why, when, and due when.
+         * Certifications and revocations
+         * @description Every certification and revocation of a version of the unit, newest first: who, why, when, and until when.
          */
         get: operations["certifications_api_units__serial__certifications_get"];
         put?: never;
@@ -300,8 +303,9 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * What speaks against certifying a version
-         * @description The verdict on the version by its own recording, its errors, and what certifying it would have to override.
+         * Objections to certifying a version
+         * @description The verdict on the version from its own recording, its errors, and the objections that certifying it would
+         *     override.
          */
         get: operations["assessment_api_units__serial__calibrations__version__assessment_get"];
         put?: never;
@@ -321,7 +325,7 @@ export interface paths {
         };
         /**
          * Apply a version to a recording
-         * @description What the version leaves of the recording as it is, nothing refitted, and whether that is as expected of it.
+         * @description The residual of the version on the recording, without refitting, and whether it is as small as expected.
          */
         get: operations["verification_api_units__serial__calibrations__version__verification_get"];
         put?: never;
@@ -340,8 +344,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Hold a model against a recording
-         * @description What the model leaves, where, which effect may be missing, and what this recording cannot say.
+         * Compare a model with a recording
+         * @description The residual of the model, where it is large, which effects may be missing, and which ones cannot be tested.
          *
          *     The computation is cancelled when the client leaves.
          */
@@ -384,8 +388,9 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * What a model leaves, data set by data set
-         * @description The rows behind the map of the criticism, one per data set and axis: measured, modelled, and what is left.
+         * Residuals of a model, by data set
+         * @description The data of the residual map of the criticism, one row per data set and axis: measured error, modelled error
+         *     and residual.
          */
         get: operations["residuals_api_units__serial__calibrations__version__residuals_get"];
         put?: never;
@@ -405,7 +410,7 @@ export interface paths {
         };
         /**
          * The pictures of a criticism
-         * @description Every picture that there is something to draw in, as a Plotly figure, with how to read it.
+         * @description Every picture of the criticism that has data, as a Plotly figure, with a caption that explains it.
          */
         get: operations["pictures_api_units__serial__calibrations__version__pictures_get"];
         put?: never;
@@ -424,7 +429,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * A version as it is, beside a recording
+         * A version without refitting, compared with a recording
          * @description Measured and modelled error, data set by data set, and the version's model as lines; nothing is refitted.
          */
         get: operations["comparison_api_units__serial__calibrations__version__comparison_get"];
@@ -445,7 +450,8 @@ export interface paths {
         };
         /**
          * The modelled error over rate and temperature
-         * @description What the calibration takes off each axis, turned about itself, on a grid over what was calibrated.
+         * @description The error that the calibration subtracts from each axis, turned about itself, on a grid over the calibrated
+         *     range.
          */
         get: operations["surface_api_units__serial__calibrations__version__surface_get"];
         put?: never;
@@ -466,8 +472,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * What a changed model would be
-         * @description The same change as `improve` makes, fitted, with its errors before and after; nothing is kept.
+         * Preview of a changed model
+         * @description The same change as `improve` makes, fitted, with its errors before and after; nothing is stored.
          */
         post: operations["preview_api_units__serial__calibrations__version__preview_post"];
         delete?: never;
@@ -484,8 +490,9 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * How far a corrected rate may be off
-         * @description GUM components of a corrected rate at one rate and temperature, and whether that was calibrated at all.
+         * Uncertainty of a corrected rate
+         * @description GUM components of a corrected rate at one rate and temperature, and whether that point lies in the
+         *     calibrated range.
          */
         get: operations["uncertainty_api_units__serial__calibrations__version__uncertainty_get"];
         put?: never;
@@ -504,8 +511,9 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * The error, version by version
-         * @description The errors of the versions fitted to one recording, each after its parent, and the noise floor.
+         * Errors of the versions
+         * @description The errors of the versions fitted to one recording, each after the version it was changed from, and the
+         *     noise floor.
          */
         get: operations["ladder_api_units__serial__ladder_get"];
         put?: never;
@@ -526,11 +534,12 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Make a version current
-         * @description Make a version the one in force: who, why, and when it is due again. An older version again is a rollback.
+         * Certify a version
+         * @description Put a version in force: who, why, and when the next calibration is due. An older version again is a rollback.
          *
-         *     Its verdict is kept with the act. 409 where something speaks against it, unless `override` is set and the reason is
-         *     a sentence. Asks for an approver.
+         *     The verdict is stored with the certification. 409 where there are objections, unless `override` is set and the
+         *     reason is
+         *     a sentence. Needs an approver's key.
          */
         post: operations["certify_api_units__serial__calibrations__version__certify_post"];
         delete?: never;
@@ -549,8 +558,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Take a version out of force
-         * @description Take the version out of force; the unit then has no certified calibration. Asks for an approver.
+         * Revoke a version
+         * @description Revoke the version; the unit then has no certified calibration. Needs an approver's key.
          */
         post: operations["revoke_api_units__serial__calibrations__version__revoke_post"];
         delete?: never;
@@ -568,9 +577,9 @@ export interface paths {
         };
         /**
          * The recipes that come with labctl
-         * @description Each with its text, and what it would take on this service's bench, or why it cannot be done there.
+         * @description Each with its text, the time and data sets it needs on this service's bench, or why it cannot run there.
          *
-         *     A service without a bench says it for the simulated one that fits the recipe best.
+         *     A service without a bench answers for the simulated bench that suits the recipe best.
          */
         get: operations["recipes_api_recipes_get"];
         put?: never;
@@ -592,7 +601,7 @@ export interface paths {
         put?: never;
         /**
          * Plan a recipe
-         * @description What a campaign would do, step by step, and what it could find. Nothing moves, nothing is kept.
+         * @description The steps of a campaign, and which effects it could detect. Nothing moves, nothing is stored.
          *
          *     `attendance` says when a person is needed if it begins now, at `at` or when `cron` is due next.
          */
@@ -620,7 +629,7 @@ export interface paths {
          * Run a recipe
          * @description Run a recipe on this service's bench, now (201) or, with `at` or `cron`, later (202: an entry of the schedule).
          *
-         *     Refused when the bench or a unit cannot do it, naming the limit.
+         *     Refused where it exceeds a limit of the bench or of a unit; the answer names the limit.
          */
         post: operations["start_api_campaigns_post"];
         delete?: never;
@@ -658,7 +667,7 @@ export interface paths {
         };
         /**
          * Its steps
-         * @description The whole plan as it was written down, with what became of each step.
+         * @description The whole plan of the campaign, with the outcome of each step.
          */
         get: operations["plan_api_campaigns__campaign__plan_get"];
         put?: never;
@@ -680,7 +689,7 @@ export interface paths {
         put?: never;
         /**
          * End a campaign
-         * @description End a running campaign now, in the safe state. What was measured is kept.
+         * @description End a running campaign now, in the safe state. The data measured so far are stored.
          *
          *     Answered within a second; `wish` is `abort` while the safe state is still being reached.
          */
@@ -721,8 +730,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Let a campaign go on
-         * @description Let a paused campaign go on, or take up one that was interrupted, failed or aborted, safe state first.
+         * Resume a campaign
+         * @description Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first.
          */
         post: operations["resume_api_campaigns__campaign__resume_post"];
         delete?: never;
@@ -762,7 +771,7 @@ export interface paths {
          * Follow a campaign
          * @description Server-sent events from the first or, with `Last-Event-ID`, from the one after it, until the campaign ends.
          *
-         *     Between them `progress`, without an id: where the campaign stands, whenever that has changed.
+         *     Between them `progress`, without an id: the present status, whenever it has changed.
          */
         get: operations["events_api_campaigns__campaign__events_get"];
         put?: never;
@@ -781,8 +790,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * What begins when
-         * @description Every entry that waits, next first, with what became of its starts.
+         * Scheduled starts
+         * @description Every waiting entry of the schedule, the next first, with the outcome of its past starts.
          */
         get: operations["schedule_api_schedule_get"];
         put?: never;
@@ -802,14 +811,14 @@ export interface paths {
         };
         /**
          * One entry
-         * @description When it begins next, and what became of each start that fell due.
+         * @description When the entry begins next, and the outcome of each past start.
          */
         get: operations["start_api_schedule__start__get"];
         put?: never;
         post?: never;
         /**
          * Cancel an entry
-         * @description Take an entry out of the schedule. A campaign that it has begun runs on.
+         * @description Remove an entry from the schedule. A campaign that it has started continues.
          */
         delete: operations["cancel_api_schedule__start__delete"];
         options?: never;
@@ -832,8 +841,9 @@ export interface paths {
         put?: never;
         /**
          * Import a recording
-         * @description Take in a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
-         *     environment file, as parts of one multipart form. All of it or nothing; an error names file, column and row.
+         * @description Import a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
+         *     environment file, as parts of one multipart form. Either the whole recording is stored or nothing; an error
+         *     names file, column and row.
          */
         post: operations["import_recording_api_recordings_post"];
         delete?: never;
@@ -853,7 +863,7 @@ export interface paths {
         put?: never;
         /**
          * Simulate a recording
-         * @description Walk through a recipe in simulation, with effects hidden in the unit, and take in what it would have given.
+         * @description Simulate a recipe with effects hidden in the unit, and store the resulting recording.
          */
         post: operations["simulated_api_recordings_simulated_post"];
         delete?: never;
@@ -872,8 +882,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Take in an example
-         * @description Take in one of the recordings of real gyros that come with labctl.
+         * Import an example
+         * @description Import one of the recordings of real gyros that come with labctl.
          */
         post: operations["example_api_recordings_example_post"];
         delete?: never;
@@ -910,7 +920,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Its data sets
+         * Data sets of a recording
          * @description One row per data set, as columns, with mean and standard deviation of every channel; also incomplete ones.
          */
         get: operations["datasets_api_recordings__recording__datasets_get"];
@@ -931,7 +941,7 @@ export interface paths {
         };
         /**
          * A channel over time
-         * @description Least, largest and mean reading of a channel in bins of equal time, only those that hold readings.
+         * @description Smallest, largest and mean reading of a channel in time bins of equal length; empty bins are left out.
          */
         get: operations["trace_api_recordings__recording__trace_get"];
         put?: never;
@@ -950,8 +960,9 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Its noise at rest
-         * @description The overlapping Allan deviation of each axis with 95 % intervals, and N, B and K as far as they show.
+         * Noise of a recording at rest
+         * @description The overlapping Allan deviation of each axis with 95 % intervals, and the coefficients N, B and K where they
+         *     can be determined.
          */
         get: operations["allan_api_recordings__recording__allan_get"];
         put?: never;
@@ -970,7 +981,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * The recording to take away
+         * Download the recording
          * @description The recording in the interchange format, every reading, as one zip; it imports again.
          */
         get: operations["file_api_recordings__recording__file_get"];
@@ -1011,13 +1022,13 @@ export interface paths {
         };
         /**
          * All keys
-         * @description Every key that was made, with its role; the keys themselves are kept nowhere. Asks for an approver.
+         * @description Every key that was made, with its role; the keys themselves are not stored. Needs an approver's key.
          */
         get: operations["keys_api_keys_get"];
         put?: never;
         /**
          * Make a key
-         * @description Make a key. The answer is the only place where it is ever shown. Asks for an approver.
+         * @description Make a key. The answer is the only place where it is ever shown. Needs an approver's key.
          */
         post: operations["create_key_api_keys_post"];
         delete?: never;
@@ -1037,7 +1048,7 @@ export interface paths {
         put?: never;
         /**
          * Revoke a key
-         * @description Take a key's power away, at once. Asks for an approver.
+         * @description Revoke a key, at once. Needs an approver's key.
          */
         post: operations["revoke_key_api_keys__name__revoke_post"];
         delete?: never;
@@ -1077,7 +1088,7 @@ export interface paths {
         put?: never;
         /**
          * Note a backup
-         * @description Write down in the audit trail that a backup was made; `labctl backup` sends it.
+         * @description Record in the audit trail that a backup was made; `labctl backup` sends it.
          */
         post: operations["note_backup_api_backups_post"];
         delete?: never;
@@ -1474,7 +1485,7 @@ export interface components {
             last_used_at: string;
             /**
              * Unconfirmed
-             * @description Until a person has looked and clears it; empty when all is well.
+             * @description Until a person has inspected the bench and clears it; empty when all is well.
              * @default
              */
             unconfirmed: string;
@@ -1490,7 +1501,7 @@ export interface components {
             attempted_at: string | null;
             /**
              * Confirmed At
-             * @description When such an attempt confirmed the safe state; a person has still to look and clear it.
+             * @description When such an attempt confirmed the safe state; a person has still to inspect and clear it.
              */
             confirmed_at: string | null;
             /**
@@ -1612,7 +1623,7 @@ export interface components {
             at?: string | null;
             /**
              * Cron
-             * @description Begin again and again: five fields of cron.
+             * @description Cron line of repeated starts: five fields.
              */
             cron?: string | null;
             /**
@@ -1622,7 +1633,7 @@ export interface components {
             time_zone?: string | null;
             /**
              * Priority
-             * @description Of starts that are due, the highest goes first.
+             * @description Of the starts that are due, the one with the highest number begins first.
              * @default 0
              */
             priority?: number;
@@ -1698,7 +1709,7 @@ export interface components {
             last_error: string | null;
             /**
              * Wish
-             * @description Asked for, and not yet taken up.
+             * @description Requested, and not yet carried out.
              */
             wish: ("pause" | "abort") | null;
             /** @description The question that waits for a person. */
@@ -1959,14 +1970,14 @@ export interface components {
         };
         /**
          * ClearRequest
-         * @description Who has looked at a bench whose safe state was not confirmed.
+         * @description Who has inspected a bench whose safe state was not confirmed.
          */
         ClearRequest: {
             /** By */
             by: string;
             /**
              * Reason
-             * @default looked at the bench
+             * @default inspected the bench
              */
             reason?: string;
         };
@@ -2265,7 +2276,7 @@ export interface components {
              * @description What is certainly or probably wrong with the data or the fit, the certain first; empty where nothing is.
              */
             warnings: components["schemas"]["DataWarning"][];
-            /** @description The version as it is on this recording; everything else is of a refit to it. */
+            /** @description The version without refitting on this recording; everything else is of a refit to it. */
             applied: components["schemas"]["VerificationResponse"] | null;
             /** @description Where and how the model fails, as numbers for pictures, by view. */
             views: components["schemas"]["Views"];
@@ -2680,7 +2691,7 @@ export interface components {
             bench: components["schemas"]["BenchDescription"] | null;
             /**
              * Schedule Trouble
-             * @description Why the schedule could not be looked at; empty when all is well.
+             * @description Why the schedule could not be read; empty when all is well.
              */
             schedule_trouble: string;
         };
@@ -5038,7 +5049,7 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description The recording may be of another unit. */
+                /** @description Accept a recording of another unit. */
                 other_unit?: boolean;
             };
             header?: never;
@@ -5075,9 +5086,9 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description The recording may be of another unit. */
+                /** @description Accept a recording of another unit. */
                 other_unit?: boolean;
-                /** @description Effects of your own that compete: 'name: expr'. */
+                /** @description Your own effects to include in the comparison: 'name: expr'. */
                 formula?: string[] | null;
             };
             header?: never;
@@ -5114,9 +5125,9 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description The recording may be of another unit. */
+                /** @description Accept a recording of another unit. */
                 other_unit?: boolean;
-                /** @description Effects of your own that compete: 'name: expr'. */
+                /** @description Your own effects to include in the comparison: 'name: expr'. */
                 formula?: string[] | null;
             };
             header?: never;
@@ -5223,7 +5234,7 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description The recording may be of another unit. */
+                /** @description Accept a recording of another unit. */
                 other_unit?: boolean;
             };
             header?: never;
@@ -5333,7 +5344,7 @@ export interface operations {
                 rate_dps: number;
                 /** @description The gyro's thermometer, deg C. */
                 temperature_c: number;
-                /** @description Also on a small grid over what was calibrated. */
+                /** @description Also on a small grid over the calibrated range. */
                 grid?: boolean;
             };
             header?: never;
@@ -5824,7 +5835,7 @@ export interface operations {
     schedule_api_schedule_get: {
         parameters: {
             query?: {
-                /** @description Also entries that are over. */
+                /** @description Also entries that have ended. */
                 ended?: boolean;
             };
             header?: never;
@@ -6142,7 +6153,7 @@ export interface operations {
     allan_api_recordings__recording__allan_get: {
         parameters: {
             query?: {
-                /** @description A data set; default: the longest stretch at rest. */
+                /** @description A data set; default: the longest section at rest. */
                 dataset?: number | null;
             };
             header?: never;
@@ -6176,7 +6187,7 @@ export interface operations {
     file_api_recordings__recording__file_get: {
         parameters: {
             query?: {
-                /** @description Of its tables. */
+                /** @description Format of the tables in the zip. */
                 format?: "parquet" | "csv";
             };
             header?: never;
@@ -6332,7 +6343,7 @@ export interface operations {
     audit_api_audit_get: {
         parameters: {
             query?: {
-                /** @description From this instant on; without a zone: UTC. */
+                /** @description Only rows from this instant on; without a time zone: UTC. */
                 since?: string | null;
                 /** @description Rows with a number above this one. */
                 after?: number;

@@ -23,7 +23,10 @@ from instruments.transport.factory import Ports
     ],
 )
 def test_a_simulated_address_needs_a_simulation(opener: Any) -> None:
-    with pytest.raises(LinkError, match=r"table: sim://.* is a simulated instrument, but this bench has no simulation"):
+    with pytest.raises(
+        LinkError,
+        match=r"table: sim://.* is a simulated instrument, but this bench has no simulation; correct the address",
+    ):
         opener(Ports(VirtualClock()))
 
 

@@ -56,7 +56,7 @@ class Guarded:
             "missing": None,
             "revoked": f"Bearer {revoked.key}",
             "wrong": "Bearer labctl_" + "x" * 43,
-            "cut short": f"Bearer {good[:-1]}",
+            "interrupted": f"Bearer {good[:-1]}",
             "another scheme": f"Basic {good}",
             "no scheme": good,
             "empty": "Bearer ",
@@ -208,7 +208,7 @@ def test_this_machine_needs_no_key(loopback: Ask, host: str) -> None:
 def test_a_name_that_was_bent_to_this_machine_is_refused(loopback: Ask, host: str) -> None:
     answer = loopback(host=host)
     assert answer.status_code == 403
-    assert "without keys this service answers to" in answer.json()["detail"]
+    assert "without keys this service accepts only the host names" in answer.json()["detail"]
 
 
 @pytest.mark.parametrize(

@@ -51,4 +51,4 @@ def test_answers_and_resumes_at_a_terminal_are_in_the_audit_trail(
         assert store.campaigns.get(1).state == "done"
     assert any(row.action == "campaign confirm" for row in rows)
     resumed = [row for row in rows if row.action == "campaign resume"]
-    assert [(row.who, "taken up by Ada" in row.detail["reason"]) for row in resumed] == [("ada", True)]
+    assert [(row.who, "resumed by Ada" in row.detail["reason"]) for row in resumed] == [("ada", True)]

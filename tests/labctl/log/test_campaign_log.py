@@ -101,7 +101,7 @@ def test_a_campaign_that_fails(tmp_path: Path) -> None:
     assert records.all()[-1]["event"] == "campaign.state"  # nothing is said after why it ended
 
 
-def test_a_campaign_that_is_interrupted_and_taken_up(tmp_path: Path) -> None:
+def test_a_campaign_that_is_interrupted_and_resumed(tmp_path: Path) -> None:
     location, control = str(tmp_path / "lab.sqlite"), Control()
 
     def stop(progress: Progress) -> None:
@@ -115,9 +115,9 @@ def test_a_campaign_that_is_interrupted_and_taken_up(tmp_path: Path) -> None:
         resume_here(location, 1, None, None, ResumeRequest(by="Ada"))
     assert [state for state, _ in states(records)] == ["running", "aborted", "running", "done"]
     assert states(records)[1] == ("aborted", "aborted: tea")
-    (up,) = records.named("campaign.taken_up")
+    (up,) = records.named("campaign.resumed")
     assert (up["campaign"], up["was"], up["units"]) == (1, "aborted", ["FOG-0001"])
-    assert up["reason"].startswith("taken up by Ada")
+    assert up["reason"].startswith("resumed by Ada")
 
 
 def test_a_journal_that_refuses_is_told_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""The log of a process: one line per record, whoever made it and whatever went wrong."""
+"""The log of a process: one line per record, of labctl or another library, after any failure."""
 
 from __future__ import annotations
 
@@ -72,6 +72,7 @@ def test_the_level_is_the_environments(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("variable", ["JOURNAL_STREAM", "INVOCATION_ID"])
 def test_a_terminal_gets_words_and_a_service_manager_json(monkeypatch: pytest.MonkeyPatch, variable: str) -> None:
+    monkeypatch.setenv(LOG_LEVEL_VARIABLE, "info")
     main, terminal = os.openpty()
     try:
         for name in ("JOURNAL_STREAM", "INVOCATION_ID"):
@@ -89,6 +90,36 @@ def test_a_terminal_gets_words_and_a_service_manager_json(monkeypatch: pytest.Mo
     finally:
         os.close(main)
         os.close(terminal)
+
+
+def test_a_terminal_without_a_level_gets_one_sentence_for_each_change_of_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("JOURNAL_STREAM", "INVOCATION_ID", LOG_LEVEL_VARIABLE):
+        monkeypatch.delenv(name, raising=False)
+    main, terminal = os.openpty()
+    at = {"campaign": 7, "bench": "triaxial-sim"}
+    try:
+        with running_log("test", logging.INFO, descriptor=terminal):
+            log.info("request.ended", method="POST", path="/api/campaigns", status=201)
+            log.info("campaign.state", **at, state="running", reason="started", t_s=0.0)
+            log.info("step.ended", **at, step=1, steps=9, outcome="done")
+            logging.getLogger("instruments.x").info("link.retry")
+            log.error("step.ended", **at, step=2, steps=9, kind="acquire", outcome="failed", reason="no answer")
+            log.info("bench.made_safe", bench="triaxial-sim", unconfirmed=[])
+            log.warning("bench.made_safe", bench="triaxial-sim", unconfirmed=["table to rest"])
+            log.warning("schedule.missed", start=3)
+            log.info("campaign.state", **at, state="failed\x1b[2J", reason="no answer", t_s=9.0)
+        lines = os.read(main, 4096).decode().splitlines()
+    finally:
+        os.close(main)
+        os.close(terminal)
+    assert [line[9:] for line in lines if "schedule.missed" not in line] == [
+        "campaign 7 on triaxial-sim: running: started",
+        "error: campaign 7 on triaxial-sim: step 2 of 9 (acquire) failed: no answer",
+        "bench triaxial-sim is in its safe state",
+        "warning: bench triaxial-sim is not confirmed safe: table to rest; inspect it",
+        "campaign 7 on triaxial-sim: failed\\x1b[2J: no answer",
+    ]
+    assert [line for line in lines if "schedule.missed" in line]  # its fields, as no sentence fits them
 
 
 def test_what_other_libraries_log_is_in_it_with_its_source(tmp_path: Path) -> None:

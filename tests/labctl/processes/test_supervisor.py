@@ -77,11 +77,11 @@ def test_numbers_out_of_range_are_refused_before_anything_starts(asked: ServeReq
         supervisor.serve_forever(asked, lambda _: None)
 
 
-@pytest.mark.parametrize(("in_doubt", "status"), [(True, 1), (False, 0)])
-def test_a_bench_left_in_doubt_ends_the_command_with_a_failure(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_doubt: bool, status: int
+@pytest.mark.parametrize(("unconfirmed", "status"), [(True, 1), (False, 0)])
+def test_a_bench_left_unconfirmed_ends_the_command_with_a_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unconfirmed: bool, status: int
 ) -> None:
-    left = BenchLeft("bench b was left", in_doubt=in_doubt)
+    left = BenchLeft("bench b was left", unconfirmed=unconfirmed)
     monkeypatch.setattr(supervisor.Supervisor, "run", lambda *_: left)
     ended = CliRunner().invoke(app, ["serve", "--port", "0", "--database", str(tmp_path / "lab.sqlite")])
     assert (ended.exit_code, "labctl: stopped; bench b was left" in ended.stderr) == (status, True)

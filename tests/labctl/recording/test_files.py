@@ -86,7 +86,10 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path) -> None:
     ("change", "said"),
     [
         (lambda r: [",".join(x.split(",")[:-1]) for x in r], r"samples.csv: column 'gyro_z' is missing"),
-        (lambda r: [*r[:3], "2,5.0,20,warm,20.1", *r[4:]], r"column 'temperature_c', row 3: 'warm' is not a number"),
+        (
+            lambda r: [*r[:3], "2,5.0,20,warm,20.1", *r[4:]],
+            r"column 'temperature_c', row 3: 'warm' is not a number; correct it",
+        ),
         (lambda r: [*r[:2], "1,0.1,10,nan,10.2", *r[3:]], r"column 'temperature_c', row 2: nan"),
         (lambda r: [*r[:2], "1,0.1,10,25.0,", *r[3:]], r"column 'gyro_z', row 2: nan"),
         (lambda r: [r[0], r[2], r[1], *r[3:]], r"column 't_s', row 2: 0 s does not follow 0.1 s"),

@@ -74,7 +74,7 @@ def test_padding_counts_by_what_it_unpacks_to(tmp_path: Path, monkeypatch: pytes
     words = pa.array([f"{n}" + "x" * 5000 for n in range(100)])
     pq.write_table(pa.table({"note": words}), file, compression="zstd", use_dictionary=False)
     monkeypatch.setattr(limits, "MOST_UNPACKED_BYTES", 400_000)
-    with pytest.raises(BadRecording, match=r"unpacks to 0\.5\d* MB; at most 0\.4 MB are read"):
+    with pytest.raises(BadRecording, match=r"has an unpacked size of 0\.5\d* MB; at most 0\.4 MB are read"):
         read_table(file)
 
 
@@ -142,5 +142,5 @@ def test_an_extra_column_is_words_where_one_of_its_blocks_is(tmp_path: Path) -> 
     file.write_text("\n".join(["dataset,more", *rows]))
     assert read_table(file)["more"][-1] == 99_999 / 2
     file.write_text("\n".join(["dataset,more", *rows, "x,1"]))
-    with pytest.raises(BadRecording, match="column 'dataset', row 100001: 'x' is not a number"):
+    with pytest.raises(BadRecording, match="column 'dataset', row 100001: 'x' is not a number; correct it"):
         read_table(file)

@@ -61,7 +61,7 @@ def test_others_that_are_always_quicker_end_it(store: Store) -> None:
         store.calibrations.add("G-1", AT, version, calibration(version))
         return calibration(version)
 
-    with pytest.raises(VersionTaken, match="was made by another fit meanwhile; fit again"):
+    with pytest.raises(VersionTaken, match="was made by another fit in the meantime; fit again"):
         keep_next_version(store, "G-1", AT, slow)
     assert len(store.calibrations.versions("G-1")) == TRIES
 

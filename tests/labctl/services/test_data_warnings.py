@@ -45,7 +45,7 @@ def test_good_data_have_no_warning_anywhere(lab: Lab, brought_in: Callable[[Reco
     assert lab.json("fit", FOG, "--model", "ojeda2000")["warnings"] == []
     found = lab.json("criticise", FOG)
     assert found["warnings"] == []
-    assert found["text"][0] == "Adequate: nothing is missing, what is left is noise."
+    assert found["text"][0] == "Adequate: no effect is missing, the residual is noise."
     improved = lab.json("improve", FOG, "--add", "scale_factor_asymmetry")
     assert [each["said"] for each in improved["warnings"]] == [
         each.said for each in worse_than_before(errors(improved["before"]), errors(improved["error"]))

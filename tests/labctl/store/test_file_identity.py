@@ -119,9 +119,9 @@ def test_a_campaign_ends_in_the_safe_state_when_its_database_is_lost(
     with pytest.raises(StoreError) as caught:
         run_here(location, StartRequest(recipe="short", bench=BENCH.name), seen)
     text = str(caught.value)
-    assert text.startswith("campaign 1 was cut short: ")
+    assert text.startswith("campaign 1 was interrupted: ")
     assert says in text
-    assert "bench single-axis-sim is safe, but that could not be written down" in text
+    assert "bench single-axis-sim is safe, but that could not be recorded" in text
     assert "once the database can be written again, `labctl campaign resume 1`" in text
     assert left == [()]
 

@@ -118,16 +118,16 @@ def test_a_block_that_was_cut_short_under_a_new_checksum_is_found(location: str)
     [
         ("DELETE FROM sample_blocks WHERE id = 1", "readings", "holds 0"),
         ("UPDATE sample_blocks SET seq = 1 WHERE id = 1", "readings", "blocks before block 1 are missing"),
-        ("UPDATE sample_blocks SET number = 900 WHERE id = 1", "readings", "data set 900, which is not there"),
+        ("UPDATE sample_blocks SET number = 900 WHERE id = 1", "readings", "data set 900, which is missing"),
         ("UPDATE data_sets SET n = n + 1 WHERE recording_id = 1 AND number = 2", "readings", "data set 2 counts"),
-        ("DELETE FROM sample_blocks WHERE recording_id = 2", "readings", "recording 2 (points) has lost its table"),
+        ("DELETE FROM sample_blocks WHERE recording_id = 2", "readings", "recording 2 (points) has no table any more"),
         ("UPDATE sample_blocks SET n = n - 1 WHERE id = 1", "readings", "recording 1 data set 1 block 0"),
         ("UPDATE calibrations SET document = replace(document, '\"z\"', '\"y\"')", "calibrations", "edited or damaged"),
         ("UPDATE calibrations SET hash = substr(hash, 2) || '0'", "calibrations", "its document is another one"),
         ("UPDATE certifications SET version = 7", "file", "row 1 of certifications names a row of calibrations"),
         ("UPDATE audit SET actor = 'nobody' WHERE id = 3", "audit", "row 3: its content"),
         ("DELETE FROM audit WHERE id = 6", "audit", "row 6: 1 rows are missing at the end"),
-        ("UPDATE alembic_version SET version_num = '0001'", "schema", "any other command brings it there"),
+        ("UPDATE alembic_version SET version_num = '0001'", "schema", "any other command migrates it"),
         ("UPDATE alembic_version SET version_num = '9999'", "schema", "use a newer labctl"),
         ("DROP TABLE sample_blocks", "readings", "cannot be read"),
         ("UPDATE data_sets SET n = 'many' WHERE number = 2", "readings", "data set 2 counts many"),
@@ -289,7 +289,7 @@ def fill(store: Store, pages: int) -> None:
 def test_a_full_disk_is_one_clear_error_and_nothing_is_half_written(store: Store, location: str) -> None:
     before = [row.id for row in store.audit.rows()], [unit.serial for unit in store.units.all()]
     fill(store, 2)
-    with pytest.raises(DiskFull, match="the disk is full; nothing of this act was kept"):
+    with pytest.raises(DiskFull, match="the disk is full; nothing was stored"):
         local_executor(store, VirtualClock()).execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
     assert before == ([row.id for row in store.audit.rows()], [unit.serial for unit in store.units.all()])
     assert check(location).findings == ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
@@ -187,7 +188,7 @@ def test_a_server_that_stays_away_is_told(cluster: Cluster, url: str, monkeypatc
     with open_store(url, write=True) as store:
         cluster.stop()
         try:
-            with pytest.raises(DatabaseUnreachable, match=r"does not answer .*nothing of this act was kept"):
+            with pytest.raises(DatabaseUnreachable, match=r"does not answer .*nothing was stored"):
                 note(store, 1)
             with pytest.raises(DatabaseUnreachable):
                 subjects(store)
@@ -195,6 +196,17 @@ def test_a_server_that_stays_away_is_told(cluster: Cluster, url: str, monkeypatc
             cluster.start()
         note(store, 2)
         assert subjects(store) == ["row 2"]
+
+
+@pytest.mark.parametrize(("part", "wrong"), [("database", "nowhere"), ("username", "nobody")])
+@pytest.mark.parametrize("write", [True, False])
+def test_a_refused_connection_is_said_at_once(url: str, part: str, wrong: str, write: bool) -> None:
+    elsewhere = sa.make_url(url).set(**{part: wrong}).render_as_string(hide_password=False)
+    begun_s = time.monotonic()
+    said = r"refuses the connection .*check user, password and database in the URL"
+    with pytest.raises(StoreError, match=said), open_store(elsewhere, write=write):
+        pass
+    assert time.monotonic() - begun_s < postgresql_server.READER_PATIENCE_S
 
 
 def opened(url: str, monkeypatch: pytest.MonkeyPatch, **limits: float) -> Store:
@@ -211,7 +223,7 @@ def test_a_writer_that_hangs_is_told_and_then_ended_by_the_server(url: str, monk
 
     def hang() -> None:
         with hanging.audit._database.writing():
-            with pytest.raises(StoreError, match=r"no turn to write within .*another process has it"):
+            with pytest.raises(StoreError, match=r"no write access within .*another process has it"):
                 note(hasty, 1)
             note(patient, 2)
 

@@ -216,7 +216,7 @@ def test_progress_rises_to_one_and_the_forecast_is_aware_and_close(rig: Any) -> 
     assert (progress.state, progress.step, progress.steps) == ("done", progress.steps, len(rig.engine.plan.steps))
 
 
-def test_a_campaign_can_be_taken_up_in_the_middle(rig: Any) -> None:
+def test_a_campaign_can_be_resumed_in_the_middle(rig: Any) -> None:
     plan = rig.plan()
     acquires = [index for index, step in enumerate(plan.steps) if step.kind == "acquire"]
     outcome = rig.run(start_at=acquires[1])

@@ -29,7 +29,7 @@ class ReducedRecording:
     white_var: Mapping[str, Array] | None  #: axis -> (m,) of the mean, white noise, (deg/s)^2
     dataset: NDArray[np.int64]  #: (m,) numbers
     left_out: int = 0  #: number of readings left out as outliers
-    static: StaticRecord | None = None  #: the longest stretch at rest, where criticism uses one
+    static: StaticRecord | None = None  #: the longest section at rest, where criticism uses one
 
     def __len__(self) -> int:
         return self.present.shape[1]

@@ -86,7 +86,7 @@ def test_a_model_that_leaves_less_than_the_noise_is_adequate_whatever_is_like_th
     found = held(read_recording(EXAMPLES / "osu-fog"), full=True)
     assert (found.verdict.form, found.verdict.named) == ("adequate", ())
     assert found.verdict.further
-    assert any(line.startswith("Further suspects, within the noise: at best") for line in sentences(found))
+    assert any(line.startswith("Further suspected effects, within the noise: at best") for line in sentences(found))
     assert all(suspect.share_removed < 1 for suspect in found.suspects)
 
 

@@ -113,7 +113,7 @@ def test_the_safe_state_is_tried_until_it_is_confirmed_and_every_attempt_counts(
     for attempts in (1, 2, 3):
         retry.attempt()
         row = bench(store)
-        assert (row.attempts, row.attempted_at, row.is_in_doubt) == (attempts, real.clock.utc(), True)
+        assert (row.attempts, row.attempted_at, row.is_unconfirmed) == (attempts, real.clock.utc(), True)
         assert "table to rest: table: " in row.unconfirmed
     assert trail(store) == [("labctl", 1, False)]
     real.silence(CHAMBER)
@@ -126,7 +126,7 @@ def test_the_safe_state_is_tried_until_it_is_confirmed_and_every_attempt_counts(
     real.heal(CHAMBER)
     retry.attempt()
     row = bench(store)
-    assert (row.attempts, row.confirmed_at, row.is_in_doubt, real.turns) == (6, real.clock.utc(), False, False)
+    assert (row.attempts, row.confirmed_at, row.is_unconfirmed, real.turns) == (6, real.clock.utc(), False, False)
     assert trail(store)[2:] == [("labctl", 6, True)]
     opened = real.opened
     retry.attempt()
@@ -156,10 +156,10 @@ def test_a_new_doubt_is_tried_anew(store: Store, real: RealBench) -> None:
     retry = retry_of(store, real)
     retry.attempt()
     store.benches.mark(BENCH.name, "campaign 7 ended while nothing could be written", AT)
-    assert bench(store).is_in_doubt
+    assert bench(store).is_unconfirmed
     retry.attempt()
     row = bench(store)
-    assert (row.attempts, row.is_in_doubt, row.unconfirmed[:10]) == (1, False, "campaign 7")
+    assert (row.attempts, row.is_unconfirmed, row.unconfirmed[:10]) == (1, False, "campaign 7")
 
 
 def test_a_simulated_bench_ended_with_its_process(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,7 +167,7 @@ def test_a_simulated_bench_ended_with_its_process(store: Store, monkeypatch: pyt
     retry = SafeStateRetry(store, BENCH, VirtualClock)
     retry.start()
     retry.close()
-    assert (bench(store).attempts, bench(store).is_in_doubt) == (0, True)
+    assert (bench(store).attempts, bench(store).is_unconfirmed) == (0, True)
 
 
 def test_what_cannot_be_written_or_read_keeps_no_bench_from_being_tried(
@@ -188,7 +188,7 @@ def test_what_cannot_be_written_or_read_keeps_no_bench_from_being_tried(
     assert (real.opened, bench(store).attempts) == (opened + 1, 1)
     real.heal(TABLE)
     retry.attempt()
-    assert not bench(store).is_in_doubt
+    assert not bench(store).is_unconfirmed
 
 
 def test_nothing_is_tried_while_a_campaign_runs_or_without_the_lease(store: Store, real: RealBench) -> None:
@@ -217,7 +217,7 @@ def test_nothing_is_tried_while_a_campaign_runs_or_without_the_lease(store: Stor
     assert (real.opened, bench(store).attempts) == (1, 0)
     hold.renew()
     runner.safe_state.attempt()
-    assert (real.opened, bench(store).is_in_doubt) == (2, False)
+    assert (real.opened, bench(store).is_unconfirmed) == (2, False)
     runner.close()
 
 
@@ -249,7 +249,7 @@ def test_a_service_tries_when_it_starts_in_the_background_and_before_it_ends(loc
     real.heal(TABLE)
     service.close()
     assert "was confirmed safe by labctl" in service.left.text
-    assert not service.left.in_doubt
+    assert not service.left.unconfirmed
 
 
 def labctl(location: str, *arguments: str) -> Result:
@@ -257,7 +257,7 @@ def labctl(location: str, *arguments: str) -> Result:
 
 
 @pytest.mark.parametrize("healed", [False, True])
-def test_a_service_says_whether_it_leaves_its_bench_in_doubt(
+def test_a_service_says_whether_it_leaves_its_bench_unconfirmed(
     location: str, real: RealBench, monkeypatch: pytest.MonkeyPatch, healed: bool
 ) -> None:
     def silent(*_: Any) -> Any:
@@ -270,13 +270,13 @@ def test_a_service_says_whether_it_leaves_its_bench_in_doubt(
         service.start()
         service.close()
     said = "was confirmed safe by labctl at" if healed else "is NOT confirmed safe: table: no answer"
-    assert (service.left.in_doubt, f"bench {BENCH.name} {said}" in service.left.text) == (not healed, True)
+    assert (service.left.unconfirmed, f"bench {BENCH.name} {said}" in service.left.text) == (not healed, True)
     looked = labctl(location, "bench", "status")
     assert (looked.exit_code, "the safe state was tried again" in looked.stdout) == (1, True)
     assert ("labctl confirmed it at" in looked.stdout) == healed
 
 
-def test_a_campaign_in_the_foreground_that_leaves_its_bench_in_doubt_ends_with_a_failure(
+def test_a_campaign_in_the_foreground_that_leaves_its_bench_unconfirmed_ends_with_a_failure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     location = str(tmp_path / "lab.sqlite")
@@ -290,7 +290,7 @@ def test_a_campaign_in_the_foreground_that_leaves_its_bench_in_doubt_ends_with_a
 
 
 @pytest.mark.parametrize("act", [("start", "short", "--bench", BENCH.name), ("resume", "1")])
-def test_a_campaign_in_the_foreground_tries_a_bench_in_doubt_before_it_is_refused(
+def test_a_campaign_in_the_foreground_tries_a_bench_unconfirmed_before_it_is_refused(
     location: str, real: RealBench, monkeypatch: pytest.MonkeyPatch, act: tuple[str, ...]
 ) -> None:
     monkeypatch.setattr(execution, "clock_for", lambda *_: real.clock)

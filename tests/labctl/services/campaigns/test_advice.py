@@ -57,8 +57,9 @@ def test_every_guard_is_told_in_its_own_words(kind: str, change: dict[str, Any])
         (BadData("fog", "not one of about 500 readings came; check cable, power and baud rate"), "readings"),
         (NoReply("table", "/dev/ttyUSB0 gave no answer in 2.0 s; check power, cable and baud rate"), "did not answer"),
         ("Ann declined: turn the units: no wrench", "cannot be done"),
-        ("taken up 5 times without finishing a step; look at the bench", "never finished a step"),
-        ("not taken up: bench b was not confirmed safe: table to rest", "not confirmed safe"),
+        ("resumed 5 times without finishing a step; inspect the bench", "never finished a step"),
+        ("taken up 5 times without finishing a step; look at the bench", "never finished a step"),  # of an older labctl
+        ("not resumed: bench b was not confirmed safe: table to rest", "not confirmed safe"),
         ("ended by an error of the program", "error of its own"),
         ("ZeroDivisionError: division by zero", "error of its own"),
         ("something new", "could not be carried out"),
@@ -79,7 +80,7 @@ def test_every_sentence_is_short_and_says_what_to_do() -> None:
 def test_what_labctl_did_depends_on_the_safe_state() -> None:
     safe, unsafe, left = (
         advice_of(CampaignState.FAILED, reason)
-        for reason in ("x", f"x. {NOT_SAFE}table to rest: it still moves", "not taken up: chamber: no answer")
+        for reason in ("x", f"x. {NOT_SAFE}table to rest: it still moves", "not resumed: chamber: no answer")
     )
     assert safe is not None
     assert unsafe is not None

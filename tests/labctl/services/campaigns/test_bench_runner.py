@@ -146,7 +146,7 @@ def test_what_is_due_waits_for_a_bench_that_was_lost(lab: Lab, moves: list[str])
     assert (lab.event(due)[0], lab.states()) == ("started", ["done"])
 
 
-def test_a_campaign_whose_bench_was_lost_is_taken_up_before_the_queue_goes_on(lab: Lab) -> None:
+def test_a_campaign_whose_bench_was_lost_is_resumed_before_the_queue_continues(lab: Lab) -> None:
     lab.begin_and_lose(at=200)
     lost = campaign_status(lab.store, 1)
     assert (lost.state, lost.ended_at) == ("interrupted", None)
@@ -188,7 +188,7 @@ def test_a_campaign_that_waits_keeps_its_bench_and_lets_it_go_when_it_is_lost(
     assert lab.states() == ["interrupted"]
 
 
-def test_without_the_lease_nothing_is_taken_up_and_nothing_moves(tmp_path: Path, moves: list[str]) -> None:
+def test_without_the_lease_nothing_is_resumed_and_nothing_moves(tmp_path: Path, moves: list[str]) -> None:
     location = str(tmp_path / "lab.sqlite")
     first = Lab(location)
     left = prepare(first.store, "short", BENCH, VirtualClock(), clip=False)
@@ -225,7 +225,7 @@ def test_a_command_that_takes_a_campaign_up_needs_the_lease_too(
     assert resume.resume_here(location, None, None, None, ResumeRequest(by="Ada")).state == "done"
 
 
-def test_a_service_takes_up_what_was_left_before_its_queue(tmp_path: Path) -> None:
+def test_a_service_resumes_a_left_campaign_before_its_queue(tmp_path: Path) -> None:
     location = str(tmp_path / "lab.sqlite")
     first = Lab(location)
     first.begin_and_lose(at=200)
@@ -243,7 +243,7 @@ def test_a_service_takes_up_what_was_left_before_its_queue(tmp_path: Path) -> No
     second.lab_service.close()
 
 
-def test_what_cannot_be_taken_up_waits_for_a_person_and_the_queue_goes_on(
+def test_what_cannot_be_resumed_waits_for_a_person_and_the_queue_continues(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lab.begin_and_lose(at=200)
@@ -257,7 +257,7 @@ def test_what_cannot_be_taken_up_waits_for_a_person_and_the_queue_goes_on(
     monkeypatch.setattr(resume, "open_bench", silent)
     lab.tick()
     left = campaign_status(lab.store, 1)
-    assert (left.state, left.reason) == ("failed", "not taken up: table: no answer")
+    assert (left.state, left.reason) == ("failed", "not resumed: table: no answer")
     lab.rest()
     lab.tick()
     assert lab.event(due)[0] == "started"

@@ -68,7 +68,7 @@ def test_an_engine_that_cannot_write_stops_its_table(store: Store, monkeypatch: 
         assert store.campaigns.get(campaign).state == "running"  # its end could not be written
     runner.resume_interrupted()
     row = store.campaigns.get(campaign)
-    assert (row.state, "no turn to write within" in row.reason) == ("failed", True)
+    assert (row.state, "no write access within" in row.reason) == ("failed", True)
     assert runner.free
 
 
@@ -136,9 +136,9 @@ def test_an_abort_is_written_down_after_it_is_done(store: Store, monkeypatch: py
     assert (last.action, last.detail["reason"]) == ("campaign abort", "smoke (Ada)")
 
     def unwritable(*_: Any) -> None:
-        raise StoreError("the disk is full; nothing of this act was kept", cause="the disk is full")
+        raise StoreError("the disk is full; nothing was stored", cause="the disk is full")
 
     monkeypatch.setattr(store.audit, "record", unwritable)
     answer = context.control.abort(context, asked)
     assert done[-1] == "aborted: smoke (Ada)"
-    assert answer.unrecorded == "it was aborted, but who did it and why is not in the audit trail: the disk is full"
+    assert answer.unrecorded == "it was aborted, but that is not in the audit trail: the disk is full"

@@ -1,4 +1,4 @@
-"""Campaigns that are cut short: by a kill, a power cut, a fault or a person; a fixed selection of the studies."""
+"""Campaigns that are interrupted: by a kill, a power cut, a fault or a person; a fixed selection of the studies."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_after_a_fault_a_person_takes_it_up_and_it_cannot_be_finished_twice(tmp_
         again = run(store, prepare_resume(store, prepared.id, bench, lambda s: VirtualClock(s.last_at), request))
         assert again.state == "done"
         events = store.campaigns.events(prepared.id)
-        assert any("taken up by Ada" in event.message for event in events if event.kind == "taken_up")
+        assert any("resumed by Ada" in event.message for event in events if event.kind == "taken_up")
         times = [event.t_s for event in events]
         assert times == sorted(times)
         points = store.recordings.points(again.recordings["FOG-0001"])
@@ -144,7 +144,7 @@ def test_what_is_not_confirmed_safe_stays_until_a_person_clears_it(tmp_path: Pat
     assert (status.exit_code, "no answer" in json.loads(status.stdout)[0]["unconfirmed"]) == (1, True)
     assert labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").exit_code == 0
     assert labctl(location, "bench", "status").exit_code == 0
-    assert "nothing is unconfirmed" in labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").stderr
+    assert "the safe state is confirmed" in labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").stderr
     assert json.loads(labctl(location, "campaign", "resume", "1", "--by", "Ada", "--json").stdout)["state"] == "done"
     with open_store(location, write=False) as store:
         assert store.audit.first_broken() is None
@@ -207,7 +207,7 @@ def test_run_here_leaves_an_uninterrupted_campaign_as_it_was(tmp_path: Path) -> 
     assert (answer.state, answer.reason, answer.wish, answer.prompt) == ("done", "all steps done", None, None)
 
 
-def test_another_release_of_a_driver_is_said_when_a_campaign_is_taken_up() -> None:
+def test_another_release_of_a_driver_is_stated_when_a_campaign_is_resumed() -> None:
     bench = load_bench("single-axis-sim")
     record = bench.model_dump(mode="json")
     record["drivers"]["fog"] |= {"distribution": "acme-fog", "version": "0.1"}

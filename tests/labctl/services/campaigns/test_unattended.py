@@ -1,4 +1,4 @@
-"""What a campaign leaves that nobody takes up: its bench made safe, or said to be unsafe, and its end written."""
+"""What a campaign leaves that no process resumes: its bench made safe, or reported unsafe, and its end written."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def rest(runner: BenchRunner) -> None:
 
 
 @pytest.mark.usefixtures("real")
-def test_a_bench_that_is_silent_when_its_campaign_is_to_be_taken_up_is_not_held_safe(
+def test_a_bench_that_is_silent_when_its_campaign_is_to_be_resumed_is_not_reported_safe(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     left_running(store)
@@ -97,11 +97,11 @@ def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, m
         states.append(store.campaigns.get(1).state)
         return ("table to rest: it still moves",)
 
-    monkeypatch.setattr(recovery, "retries_exhausted", lambda _: "taken up 5 times")
+    monkeypatch.setattr(recovery, "retries_exhausted", lambda _: "resumed 5 times")
     monkeypatch.setattr(recovery, "make_safe", safe)
     BenchRunner(store, BENCH, VirtualClock).resume_unfinished()
     assert states == ["running"]
-    assert store.campaigns.get(1).reason == "taken up 5 times"
+    assert store.campaigns.get(1).reason == "resumed 5 times"
     assert store.benches.unconfirmed(BENCH.name) == "table to rest: it still moves"
 
 
@@ -297,8 +297,10 @@ def test_a_campaign_that_ends_while_it_is_looked_at_was_not_left(
 @pytest.mark.usefixtures("real")
 def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str) -> None:
     status = labctl(left, "bench", "status")
-    assert (status.exit_code, "nothing is unconfirmed" in status.stdout) == (1, False)
-    what = "campaign 1 was cut short at 0 %; `labctl campaign resume 1` takes it up, `labctl campaign abort 1` ends it"
+    assert (status.exit_code, "the safe state is confirmed" in status.stdout) == (1, False)
+    what = (
+        "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` takes it up, `labctl campaign abort 1` ends it"
+    )
     assert what in status.stdout
     assert json.loads(labctl(left, "bench", "status", "--json").stdout)[0]["left"] == [what]
     refused = labctl(left, "campaign", "start", "short", "--bench", BENCH.name)
@@ -314,13 +316,13 @@ def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str
 def test_a_simulated_bench_only_says_that_a_campaign_was_left(left: str) -> None:
     assert labctl(left, "bench", "status").exit_code == 0
     started = labctl(left, "campaign", "start", "short", "--bench", BENCH.name, "--json")
-    assert "campaign 1 was cut short at 0 %; `labctl campaign resume 1` takes it up" in started.stderr
+    assert "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` takes it up" in started.stderr
     assert (json.loads(started.stdout)["id"], json.loads(started.stdout)["state"]) == (2, "done")
 
 
 @pytest.mark.parametrize(("complaints", "said"), [
-    ((), "bench single-axis-sim is safe, but that could not be written down;"),
-    (("table to rest: no answer",), "NOT confirmed safe, and that could not be written down: table to rest: no answer"),
+    ((), "bench single-axis-sim is safe, but that could not be recorded;"),
+    (("table to rest: no answer",), "NOT confirmed safe, and that could not be recorded: table to rest: no answer"),
 ])  # fmt: skip
 def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, complaints: tuple[str, ...], said: str
@@ -334,7 +336,7 @@ def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes
     with pytest.raises(DiskFull) as caught:
         run_here(location, StartRequest(recipe="short", bench=BENCH.name), fills)
     text = str(caught.value)
-    assert text.startswith("campaign 1 was cut short: the disk is full; what was measured before is kept; ")
+    assert text.startswith("campaign 1 was interrupted: the disk is full; the data measured before are stored; ")
     assert said in text
     assert text.endswith("`labctl campaign resume 1` goes on with it")
     assert "nothing of this act" not in text
@@ -346,13 +348,13 @@ def test_a_service_that_starts_says_what_it_finds(left: str, monkeypatch: pytest
         return ""
 
     monkeypatch.setattr("labctl.processes.supervisor.serve_forever", serve)
-    assert "campaign 1 was cut short at 0 % and is taken up now" in labctl(left, "serve", "--bench", BENCH.name).stdout
+    assert "campaign 1 was interrupted at 0 % and is resumed now" in labctl(left, "serve", "--bench", BENCH.name).stdout
     with open_store(left, write=True) as opened:
         opened.benches.mark(BENCH.name, "table to rest: no answer", AT)
     lines = labctl(left, "serve", "--bench", BENCH.name).stdout.splitlines()
     assert len(lines) == 3
     assert "is NOT confirmed safe: table to rest: no answer" in lines[1]
-    assert lines[2].startswith("campaign 1 was cut short at 0 % and is not taken up: ")
+    assert lines[2].startswith("campaign 1 was interrupted at 0 % and is not resumed: ")
     told = json.loads(labctl(left, "serve", "--bench", BENCH.name, "--json").stdout)
     assert (told["url"], "no answer" in told["unconfirmed"]) == ("http://127.0.0.1:1", True)
     other = json.loads(labctl(left, "serve", "--bench", "triaxial-sim", "--json").stdout)

@@ -56,7 +56,7 @@ def test_criticism_says_first_what_the_version_itself_leaves(two_days: Lab) -> N
     assert said["applied"] == two_days.json("verify", FOG, "--version", "1", "--recording", "2", status=1)
     assert said["applied"]["rms_dps"] > 20 * said["error"]["rms_dps"]
     lines = two_days.run("criticise", FOG, "--version", "1", "--recording", "2").stdout.splitlines()
-    assert lines[0].startswith("Version 1 applied as it is to recording 2")
+    assert lines[0].startswith("Version 1 applied without refitting to recording 2")
     assert lines[1] == "Refitted to recording 2:"
 
 

@@ -52,7 +52,7 @@ def test_the_surest_importer_reads(monkeypatch: pytest.MonkeyPatch, file: Path) 
 def test_two_that_are_equally_sure_are_a_question(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
     register(monkeypatch, IMPORTERS, "one", importer(True))
     register(monkeypatch, IMPORTERS, "other", importer(1.0))
-    with pytest.raises(BadInput, match="one and other are equally sure that it is theirs; name one with --format"):
+    with pytest.raises(BadInput, match="one and other recognise the file equally well; name one with --format"):
         surest(file)
 
 

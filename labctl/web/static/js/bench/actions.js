@@ -41,10 +41,15 @@ export const stopButton = (campaign) =>
           "Stop now and leave the bench safe?",
           [
             { ...operatorNameField(), required: false },
-            { name: "reason", label: "Why", value: "stopped by hand", hint: "It is written beside the campaign." },
+            {
+              name: "reason",
+              label: "Why",
+              value: "stopped by hand",
+              hint: "The answer is recorded with the campaign.",
+            },
           ],
           {
-            text: "The table comes to rest, the chamber goes to its safe set point, the campaign ends. What was measured is kept, and the campaign can be resumed.",
+            text: "The table comes to rest, the chamber goes to its safe set point, the campaign ends. The data measured so far are stored, and the campaign can be resumed.",
             confirm: "Stop now",
             kind: "danger",
           },
@@ -92,9 +97,9 @@ export async function askBenchClear(bench, { later = false } = {}) {
     [operatorNameField(), ...questions.map(([name, label]) => ({ name, label, type: "checkbox" }))],
     {
       text: later
-        ? "The table turns and the chamber heats and cools when the campaign begins, without asking again. Tick what you make sure of for that time."
-        : "The table turns and the chamber heats and cools as soon as you start. Look at the bench, then tick what you have seen.",
-      confirm: later ? "I make sure of it" : "Start now",
+        ? "The table turns and the chamber heats and cools when the campaign begins, without asking again. Tick what you confirm for that time."
+        : "The table turns and the chamber heats and cools as soon as you start. Inspect the bench, then tick what you have checked.",
+      confirm: later ? "I confirm it for that time" : "Start now",
     },
   );
   if (!answers) return null;
@@ -111,12 +116,12 @@ export function resumeControl(campaign) {
   const { resumable, resume_reason: reason } = campaign;
   if (resumable === false)
     return [
-      h("button", { type: "button", class: "button", disabled: true, title: reason }, "Resume where it was"),
+      h("button", { type: "button", class: "button", disabled: true, title: reason }, "Resume where it stopped"),
       h("span", { class: "small muted" }, `Cannot be resumed now: ${reason}.`),
     ];
   return [
     resumeButton(campaign.id, { whole: true, kind: reason ? "" : "primary" }),
-    reason ? h("span", { class: "small warn-text" }, `Look first: ${reason}.`) : null,
+    reason ? h("span", { class: "small warn-text" }, `Inspect the bench first: ${reason}.`) : null,
   ];
 }
 
@@ -127,22 +132,22 @@ export function resumeControl(campaign) {
  */
 export const resumeButton = (campaign, { whole = false, kind = "primary" } = {}) =>
   button(
-    whole ? "Resume where it was" : "Go on",
+    whole ? "Resume where it stopped" : "Continue",
     async () => {
       const answers = await askOperator(
-        whole ? "Take the campaign up where it was?" : "Go on with the campaign?",
+        whole ? "Resume the campaign where it stopped?" : "Continue the campaign?",
         [operatorNameField(), { name: "reason", label: "Why", required: false }],
         {
           text: whole
-            ? "First the safe state, then home, temperature and soak again; the first incomplete data set is measured anew."
+            ? "First the safe state, then home, temperature and soak again; the first incomplete data set is measured again."
             : null,
-          confirm: whole ? "Resume" : "Go on",
+          confirm: whole ? "Resume" : "Continue",
         },
       );
       if (!answers) return;
       const body = { by: answers.by, reason: answers.reason };
       await post("/api/campaigns/{campaign}/resume", { path: { campaign }, body });
-      toast("good", whole ? `Campaign ${campaign} is taken up.` : "It goes on.");
+      toast("good", whole ? `Campaign ${campaign} is resumed.` : "The campaign continues.");
       if (whole) await navigate("/bench");
     },
     { kind },
@@ -186,11 +191,11 @@ export const answerButtons = (campaign, prompt) => [
  */
 export const clearButton = (bench, then) =>
   button(
-    "I have looked, it is safe",
+    "I have inspected it, it is safe",
     async () => {
       const answers = await askOperator(
         `Is bench ${bench} safe?`,
-        [operatorNameField(), { name: "reason", label: "What you saw", value: "looked at the bench" }],
+        [operatorNameField(), { name: "reason", label: "What you saw", value: "inspected the bench" }],
         { confirm: "It is safe" },
       );
       if (!answers) return;

@@ -38,7 +38,7 @@ export async function followCampaign(campaign, handlers, signal) {
   let [connection, asked] = [new AbortController(), Date.now()];
   const watch = setInterval(() => {
     if (Date.now() - heard <= SILENCE_LIMIT_MS || connection.signal.aborted) return;
-    report(true, "the service says nothing");
+    report(true, "the service does not answer");
     if (Date.now() - asked > SILENCE_LIMIT_MS) connection.abort(); // a connection of a suspended computer never ends by itself
   }, CHECK_MS);
   signal.addEventListener("abort", () => clearInterval(watch));
@@ -65,7 +65,11 @@ export async function followCampaign(campaign, handlers, signal) {
       if (signal.aborted) break;
       report(
         true,
-        error instanceof Problem ? error.message : isAbort(error) ? "the service says nothing" : "the connection broke",
+        error instanceof Problem
+          ? error.message
+          : isAbort(error)
+            ? "the service does not answer"
+            : "the connection broke",
       );
       if (error instanceof Problem && error.status < 500) break;
     }

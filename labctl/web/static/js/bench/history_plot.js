@@ -53,7 +53,7 @@ export function historyPlot(history) {
   };
   const element = figure(
     "Bench since this page was opened",
-    "From the event stream, since this tab began to listen.",
+    "From the event stream, since this tab was opened.",
     draw,
     {
       height: "21rem",

@@ -18,7 +18,7 @@ import { linkButton, resumeControl } from "./actions.js";
 export function noBenchCard() {
   return card(
     "This service drives no bench",
-    h("p", {}, "It serves calibrations and takes recordings in. A bench comes with it when it is started so:"),
+    h("p", {}, "It serves calibrations and imports recordings. To run a bench, start it with one of these commands:"),
     h("pre", { class: "command" }, "labctl serve --simulate\nlabctl serve --bench FILE"),
     h(
       "p",
@@ -56,13 +56,13 @@ export function idleBench(bench, last, next) {
     "div",
     { class: "columns", style: "--column-min: 17rem" },
     presentCard(
-      "Nothing runs",
+      "No campaign is running",
       "State of the bench",
       h(
         "p",
         {},
         bench.unconfirmed
-          ? "No campaign starts before the bench was looked at."
+          ? "No campaign starts before the bench was inspected."
           : presentWords(
               `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`,
             ),
@@ -83,7 +83,7 @@ export function idleBench(bench, last, next) {
               "p",
               { class: "muted" },
               `${next.recipe} on ${next.bench}`,
-              next.cron ? [", then again: ", h("code", {}, next.cron)] : null,
+              next.cron ? [", repeated at ", h("code", {}, next.cron)] : null,
             ),
             attendanceNotice(next.attendance),
           ]

@@ -46,13 +46,13 @@ export function liveOutput(campaign) {
   const figures = h(
     "div",
     { class: "live-values", "aria-live": "off" },
-    h("p", { class: "muted" }, "The units are off, or have not been heard yet."),
+    h("p", { class: "muted" }, "The units are off, or have sent no reading yet."),
   );
   const place = h("div", {});
   const units = () => [...new Set([...courses.values()].map((course) => course.gyro))];
   const picture = figure(
     "Gyro output now",
-    "Means of what each unit sent last, since this tab began to listen.",
+    "Mean of the latest readings of each unit, since this tab was opened.",
     () => {
       const drawn = [...courses.values()];
       const several = units().length > 1;

@@ -165,7 +165,7 @@ export function operatorPrompt(campaign, prompt) {
     h(
       "div",
       { class: "stack" },
-      h("h2", {}, prompt.kind === "mount" ? `Turn the unit: ${prompt.position} up` : "The bench asks"),
+      h("h2", {}, prompt.kind === "mount" ? `Turn the unit: ${prompt.position} up` : "The campaign has a question"),
       h("p", {}, `${prompt.text[0].toUpperCase()}${prompt.text.slice(1)}.`),
       h("p", { class: "muted" }, "The table is at rest and waits for you."),
       h("div", { class: "row" }, answerButtons(campaign, prompt)),

@@ -104,9 +104,9 @@ export function runningCampaign(status, plan, { signal, over }) {
                 h(
                   "strong",
                   {},
-                  `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `,
+                  `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (real time)" : ""}. `,
                 ),
-                `What you see may no longer be so: ${why}. Trying again.`,
+                `What is shown may be out of date: ${why}. The page retries every few seconds.`,
               )
             : null,
         );
@@ -211,8 +211,8 @@ function warnings(now) {
   const listed = (found, text) =>
     Object.entries(found).map(([name, why]) => notice("warn", h("strong", {}, `${name} `), `${text}: ${why}`));
   return [
-    ...listed(now.links, "does not answer as it should"),
-    ...listed(now.dropped, "takes no further part"),
+    ...listed(now.links, "does not answer normally"),
+    ...listed(now.dropped, "is excluded from the rest of the campaign"),
     now.state === "paused" ? notice("warn", `Paused: ${now.reason || "no reason given"}.`) : null,
     now.last_error ? notice("bad", h("strong", {}, "Last fault: "), now.last_error) : null,
   ].filter(Boolean);

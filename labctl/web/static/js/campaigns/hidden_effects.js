@@ -32,7 +32,7 @@ export function hiddenEffectForm(effects, asked, chosen) {
       type: "number",
       step: "any",
       value: row.size,
-      placeholder: "the simulator's own",
+      placeholder: "the simulator's default",
       oninput: () => {
         row.size = input.value;
         tell();
@@ -40,9 +40,9 @@ export function hiddenEffectForm(effects, asked, chosen) {
     });
     const hint =
       can?.visible && can.smallest_size
-        ? `This plan shows it from ${number(can.smallest_size, 2)} ${unit || `(${sizeText(can.smallest_size, "1")})`} on.`
+        ? `This plan detects it from ${number(can.smallest_size, 2)} ${unit || `(${sizeText(can.smallest_size, "1")})`} on.`
         : can
-          ? "This plan would not show it."
+          ? "This plan cannot detect it."
           : null;
     return setChildren(
       beside,

@@ -38,7 +38,7 @@ export function recipeChoice(all, choice, chosen) {
     labelledField("Recipe as TOML", text, "Planned again as you type. Nothing moves before you start it."),
   );
   const shippedText = h("pre", { class: "command" });
-  const shipped = h("details", {}, h("summary", {}, "Its text"), shippedText);
+  const shipped = h("details", {}, h("summary", {}, "Recipe text"), shippedText);
   const edit = h(
     "button",
     {
@@ -122,7 +122,7 @@ export function recipeChoice(all, choice, chosen) {
               : null,
         ),
       ),
-      option("own", "Your own", "A recipe as text."),
+      option("own", "Your own recipe", "A recipe as text."),
     ),
     shipped,
     own,

@@ -31,7 +31,7 @@ export function startForm(bench, order) {
   const onBench = [
     ["now", "Now"],
     ["at", "At a time"],
-    ["cron", "Again and again"],
+    ["cron", "Repeatedly"],
   ];
   /** @type {[When, string][]} */
   const when = [...(bench ? onBench : []), ["simulation", "In simulation, without a bench"]];
@@ -88,7 +88,7 @@ export function startForm(bench, order) {
   async function later() {
     const { hide, ...rest } = order();
     if (hide.length) throw new Error("An effect can be hidden only in a campaign that begins now.");
-    if (chosen === "at" && !at.value) throw new Error("Say when it is to begin.");
+    if (chosen === "at" && !at.value) throw new Error("Enter a time or a cron line.");
     const clear = bench && (await askBenchClear(bench, { later: true }));
     if (!clear) return;
     const made = await post("/api/campaigns", {
@@ -112,7 +112,7 @@ export function startForm(bench, order) {
   /** @param {Bench} there */
   const startNow = (there) => [
     there.unconfirmed
-      ? notice("bad", "The bench was not confirmed safe: ", h("a", { href: "/bench" }, "look at it first"), ".")
+      ? notice("bad", "The bench was not confirmed safe: ", h("a", { href: "/bench" }, "inspect it first"), ".")
       : there.campaign
         ? notice(
             "warn",
@@ -134,11 +134,15 @@ export function startForm(bench, order) {
         { class: "row", style: "align-items: start" },
         labelledField("Begin at", at),
         labelledField("Time zone", zone),
-        labelledField("Priority", priority, "Of starts that are due, the highest goes first."),
-        labelledField("May be late by, h", late, "Empty: any time, once."),
+        labelledField(
+          "Priority",
+          priority,
+          "Of the starts that are due, the one with the highest number begins first.",
+        ),
+        labelledField("May be late by, h", late, "Empty: no limit; the start is made once, however late."),
         zones,
       ),
-      h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" })),
+      h("div", { class: "row" }, button("Add to the schedule", later, { kind: "primary large" })),
     ],
     cron: () => [
       h(
@@ -146,17 +150,21 @@ export function startForm(bench, order) {
         { class: "row", style: "align-items: start" },
         labelledField("Cron line", cron, "minute hour day month weekday"),
         labelledField("Time zone", zone),
-        labelledField("Priority", priority, "Of starts that are due, the highest goes first."),
-        labelledField("May be late by, h", late, "Empty: any time, once."),
+        labelledField(
+          "Priority",
+          priority,
+          "Of the starts that are due, the one with the highest number begins first.",
+        ),
+        labelledField("May be late by, h", late, "Empty: no limit; the start is made once, however late."),
         zones,
       ),
-      h("div", { class: "row" }, button("Put on the schedule", later, { kind: "primary large" })),
+      h("div", { class: "row" }, button("Add to the schedule", later, { kind: "primary large" })),
     ],
     simulation: () => [
       h(
         "p",
         { class: "muted" },
-        "A recording of this plan is made at once in simulation and taken in; no bench moves, no campaign is kept.",
+        "A recording of this plan is simulated and imported at once; no bench moves, no campaign is stored.",
       ),
       h(
         "div",

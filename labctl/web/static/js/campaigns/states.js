@@ -42,7 +42,7 @@ export const canResume = ({ active, state }) => !active && state !== "done";
  * @param {Placed} campaign
  */
 export const stateText = ({ state, abandoned }) =>
-  abandoned ? `${state}, left alone` : (factsOf(state).text ?? state);
+  abandoned ? `${state}, no process runs it` : (factsOf(state).text ?? state);
 /**
  * The kind of the chip of a state: its colour.
  * @param {Placed} campaign

@@ -24,17 +24,17 @@ export function visibilityReport(rows) {
     h(
       "p",
       {},
-      h("strong", {}, `It could find ${seen.length} of ${rows.length} effects`),
-      unseen.length ? ` and could not find ${unseen.length}; ` : "; ",
+      h("strong", {}, `It can detect ${seen.length} of ${rows.length} effects`),
+      unseen.length ? ` and cannot detect ${unseen.length}; ` : "; ",
       fitted.length ? `${fitted.length} are part of the usual model and are fitted.` : null,
     ),
     h(
       "ul",
-      { class: "detectable-effects", "aria-label": "Effects this plan could find, from which size on" },
+      { class: "detectable-effects", "aria-label": "Effects this plan can detect, with the smallest detectable size" },
       seen.map((row) =>
         h(
           "li",
-          { title: `${Math.round(100 * row.share)} % of it is left beside the usual model` },
+          { title: `${Math.round(100 * row.share)} % of it is not absorbed by the usual model` },
           effectLink(row),
           h("span", { class: "nowrap" }, smallestSize(row)),
         ),
@@ -48,28 +48,28 @@ export function visibilityReport(rows) {
     unseen.length
       ? table(
           [
-            { title: "Could not be found", cell: effectLink },
+            { title: "Cannot be detected", cell: effectLink },
             {
-              title: "Why, and what would show it",
+              title: "Reason, and which experiment would detect it",
               prose: true,
               cell: (row) =>
                 row.why === "channel"
                   ? `needs ${row.needs.map(idText).join(", ")}, which is not logged`
                   : [
-                      h("span", {}, "this schedule does not part it from the rest"),
+                      h("span", {}, "this schedule does not separate it from other effects"),
                       row.experiment ? h("span", { class: "muted small secondary" }, `Try: ${row.experiment}`) : null,
                     ],
             },
           ],
           unseen,
-          { label: "Effects this plan could not find" },
+          { label: "Effects this plan cannot detect" },
         )
-      : notice("good", "Nothing of the catalogue stays hidden from it."),
+      : notice("good", "It can detect every effect of the catalogue."),
     fitted.length
       ? h(
           "p",
           { class: "muted small" },
-          "In the usual model already: ",
+          "Already in the usual model: ",
           fitted.flatMap((row, k) => (k ? [", ", effectLink(row)] : [effectLink(row)])),
           ".",
         )

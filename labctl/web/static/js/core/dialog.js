@@ -13,7 +13,7 @@ import { uniqueId, h } from "./elements.js";
  * @param {{ text?: string | null, body?: Child, confirm?: string, kind?: string }} [options]
  * @returns {Promise<Answers | null>}
  */
-export function dialog(title, fields, { text, body, confirm = "Go on", kind = "primary" } = {}) {
+export function dialog(title, fields, { text, body, confirm = "Continue", kind = "primary" } = {}) {
   return new Promise((resolve) => {
     const inputs = fields.map((f) =>
       h("input", {

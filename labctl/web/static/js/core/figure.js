@@ -19,7 +19,7 @@ export function loadPlotly() {
   script ??= new Promise((resolve, reject) => {
     const failed = () => {
       script = null; // the next figure tries again
-      reject(new Error("the drawing library could not be loaded"));
+      reject(new Error("the plotting library could not be loaded; reload the page"));
     };
     document.head.append(
       h("script", { src: "/static/plotly.js", onload: () => resolve(window.Plotly), onerror: failed }),

@@ -70,7 +70,7 @@ export function buildLayout() {
     if (asking) return null;
     asking = true;
     const given = await dialog(
-      "This service asks for a key",
+      "This service requires a key",
       [
         {
           name: "key",
@@ -89,7 +89,7 @@ export function buildLayout() {
   }
 
   window.addEventListener("labctl:key", (event) =>
-    askKey(event.detail ?? "Reading asks for a viewer's key, acting for an operator's."),
+    askKey(event.detail ?? "Reading needs a viewer's key, starting or changing something an operator's."),
   );
   window.addEventListener("labctl:moved", () =>
     links.forEach((link) => {

@@ -43,7 +43,7 @@ export function effectDetail(effect, all) {
         { class: "row" },
         h("code", {}, effect.id),
         chip(origin, effect.leaves ? "accent" : ""),
-        chip(effect.leaves ? "leaves with a calibration" : "stays on the bench", effect.leaves ? "good" : ""),
+        chip(effect.leaves ? "part of a calibration" : "not part of a calibration", effect.leaves ? "good" : ""),
       ),
       ...[turn(all[at - 1], "‹ Before"), turn(all[at + 1], "Next ›")].filter(Boolean),
     ),
@@ -52,8 +52,8 @@ export function effectDetail(effect, all) {
       "div",
       { class: "columns", style: "--column-min: 24rem" },
       card(
-        "Its signature",
-        signatureFigure(effect) ?? h("p", { class: "muted" }, "There is no drawing of it."),
+        "Signature",
+        signatureFigure(effect) ?? h("p", { class: "muted" }, "There is no picture of it."),
         effect.draws.length
           ? h(
               "p",
@@ -74,12 +74,12 @@ export function effectDetail(effect, all) {
             { class: "lead" },
             effect.experiment
               ? `${effect.experiment[0].toUpperCase()}${effect.experiment.slice(1)}.`
-              : "None is written down.",
+              : "None is listed.",
           ),
           h(
             "div",
             { class: "row" },
-            linkButton("Practise on it", `/campaigns/new?hide=${effect.id}`),
+            linkButton("Practise with it", `/campaigns/new?hide=${effect.id}`),
             h("span", { class: "muted small" }, "a simulated campaign with it hidden in the unit"),
           ),
         ),
@@ -97,13 +97,13 @@ export function effectDetail(effect, all) {
                 h(
                   "p",
                   { class: "muted small" },
-                  "These draw the same whatever the schedule, so they are always named together.",
+                  "These have the same signature on every schedule, so they are always named together.",
                 ),
               ]
             : h(
                 "p",
                 { class: "muted" },
-                "Nothing in the catalogue draws the same on every schedule. On a given schedule others may come close; the criticism says which.",
+                "No other effect of the catalogue has the same signature on every schedule. On a given schedule others may be similar; the criticism lists them.",
               ),
         ),
         card(
@@ -112,7 +112,7 @@ export function effectDetail(effect, all) {
             ? h(
                 "p",
                 {},
-                "Beside rate and temperature: ",
+                "Besides rate and temperature: ",
                 commaSeparated(
                   effect.needs.map((name) =>
                     h("span", {}, CHANNELS[name] ?? idText(name), " (", h("code", {}, name), ")"),
@@ -130,9 +130,9 @@ export function effectDetail(effect, all) {
       effect.leaves ? "good" : "",
       h("strong", {}, effect.leaves ? "Exported. " : "Not exported. "),
       effect.leaves
-        ? "A calibration carries it and the Compensator takes it off."
+        ? "It is part of a calibration, and the Compensator subtracts it."
         : ["sensor", "package"].includes(effect.origin)
-          ? "It belongs to the unit, but what it takes to correct it is known on the bench only."
+          ? "It is a property of the unit, but the channels that its correction needs are known on the bench only."
           : about,
     ),
   );
@@ -150,7 +150,7 @@ const axesParagraph = (effect) => h("p", { class: "muted" }, AXES_TEXTS[effect.r
 /** @param {Effect} effect */
 function sizeCard(effect) {
   const rows = Object.entries(effect.plausible);
-  if (!rows.length) return card("How large it is", h("p", { class: "muted" }, "No sizes are written down for it."));
+  if (!rows.length) return card("How large it is", h("p", { class: "muted" }, "No plausible sizes are listed for it."));
   /** @param {number} value */
   const sizeCell = (value) => h("span", { class: "nowrap" }, sizeText(value, effect.unit ?? ""));
   return card(
@@ -181,19 +181,19 @@ function shapeCard(effect) {
       ? null
       : h("p", {}, `A polynomial up to order ${effect.max_order}; ${effect.order} by default.`);
   if (!effect.parameters.length)
-    return card("Its shape", orders ?? h("p", {}, "It has no shape to choose: one size says all."));
+    return card("Its shape", orders ?? h("p", {}, "It has no shape parameters: one size describes it."));
   return card(
     "Its shape",
     orders,
     table(
       [
         { title: "Parameter", cell: (each) => h("code", {}, each.name) },
-        { title: "Tried from", number: true, cell: (each) => `${plainNumber(each.low)} ${unitText(each.unit)}` },
+        { title: "Searched from", number: true, cell: (each) => `${plainNumber(each.low)} ${unitText(each.unit)}` },
         { title: "to", number: true, cell: (each) => `${plainNumber(each.high)} ${unitText(each.unit)}` },
       ],
       effect.parameters,
       { label: "Parameters" },
     ),
-    h("p", { class: "muted small" }, "Beside its size it has a shape, and the fit tries these ranges."),
+    h("p", { class: "muted small" }, "Besides its size it has shape parameters; the fit searches these ranges."),
   );
 }

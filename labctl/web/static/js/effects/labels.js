@@ -6,10 +6,13 @@ export const ORIGINS = {
   package: ["Package", "How the sensing axes lie in the unit's case."],
   fixture: [
     "Fixture",
-    "How the unit sits on the table. Fitted, so that it does not hide in the gyro's coefficients; stays here.",
+    "How the unit sits on the table. Fitted, so that it does not distort the gyro's coefficients; not part of a calibration.",
   ],
-  bench: ["Bench", "What table and thermometer do. Reported against the bench; stays here."],
-  environment: ["Environment", "The Earth, its field, and what changes from one switching-on to the next. Stays here."],
+  bench: ["Bench", "Errors of table and thermometer. Reported as errors of the bench; not part of a calibration."],
+  environment: [
+    "Environment",
+    "The Earth's rate and field, and what changes from one power-on to the next. Not part of a calibration.",
+  ],
 };
 
 /** @type {Record<string, string>} */

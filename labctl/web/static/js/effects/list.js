@@ -34,7 +34,12 @@ export function effectList(all, query) {
     const chapters = Object.entries(ORIGINS)
       .map(([name, [title, about]]) => ({ title, about, effects: shown.filter((each) => each.origin === name) }))
       .filter(({ effects }) => effects.length);
-    setChildren(place, chapters.length ? chapters.map(originSection) : emptyState(`No effect speaks of "${asked}".`));
+    setChildren(
+      place,
+      chapters.length
+        ? chapters.map(originSection)
+        : emptyState(`No effect matches "${asked}". Search for another word.`),
+    );
   }
   /** @type {HTMLInputElement} */
   const input = h("input", {
@@ -53,7 +58,7 @@ export function effectList(all, query) {
     { class: "page" },
     pageHeader(
       "Effects",
-      `${all.length} physical causes of a gyro's error: what each does, how it looks, and what tells it from its likes.`,
+      `${all.length} physical causes of a gyro's error: what each does, its signature, and what distinguishes it from similar effects.`,
     ),
     h(
       "div",

@@ -35,7 +35,7 @@ function against({ warnings, message }) {
     : [message];
   return notice(
     "bad",
-    h("p", {}, h("strong", {}, "This speaks against it:")),
+    h("p", {}, h("strong", {}, "Objections:")),
     h(
       "ul",
       { class: "plain" },

@@ -41,11 +41,11 @@ export function ladderFigure(ladder) {
   const draw = () => ({
     data: [
       {
-        ...line("raw_rms_dps", "as the unit is", { color: colour("border-strong"), dash: "dot" }, "diamond-open"),
+        ...line("raw_rms_dps", "without correction", { color: colour("border-strong"), dash: "dot" }, "diamond-open"),
         visible: dwarfs ? "legendonly" : true,
       },
       line("rms_dps", "after the fit", { color: colour("accent"), width: 2.5 }, "circle"),
-      line("heldout_rms_dps", "at unseen temperatures", { color: colour("warn"), width: 2.5 }, "square"),
+      line("heldout_rms_dps", "at left-out temperatures", { color: colour("warn"), width: 2.5 }, "square"),
     ],
     layout: {
       yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: "D2", tickformat: "~g" },
@@ -81,7 +81,7 @@ export function ladderFigure(ladder) {
   });
   return figure(
     "Error ladder",
-    `The versions fitted to recording ${ladder.recording}: each one's RMS error on that data and on temperatures that its fit has not seen, down to the noise floor. What falls on its own data alone was bought with coefficients.`,
+    `The versions fitted to recording ${ladder.recording}: each one's RMS error on that data and on temperatures left out of its fit, down to the noise floor. An error that falls on the fitted data only is overfitting.`,
     draw,
     { height: "19rem" },
   );
@@ -94,7 +94,7 @@ export function ladderFigure(ladder) {
 export function errorLadder(state, signal) {
   const place = h("div", { class: "stack" });
   const { serial } = state;
-  loadInto(place, "Climbing down the ladder", async () => {
+  loadInto(place, "RMS error by version", async () => {
     const ladder = await get("/api/units/{serial}/ladder", { path: { serial }, signal });
     const here = ladder.steps.find((step) => step.version === state.version);
     const parts = [ladderFigure(ladder), versionTable(ladder, state)];
@@ -128,14 +128,14 @@ export function errorLadder(state, signal) {
         h(
           "div",
           {},
-          h("h3", {}, k ? `Version ${state.version}: what is left now` : `Version ${parent}: what was left`),
+          h("h3", {}, k ? `Version ${state.version}: residual now` : `Version ${parent}: residual before`),
           each,
         ),
       ),
     );
   }
 
-  return cardWithHeader("Watch the error fall", null, place);
+  return cardWithHeader("Error of the versions", null, place);
 }
 
 /**
@@ -169,10 +169,10 @@ function versionTable(ladder, state) {
       { title: "Effects", cell: (step) => step.effects.map(idText).join(", ") },
       { title: "Recording", number: true, cell: (step) => `${step.recording ?? "–"}` },
       { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
-      { title: "Unseen, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
+      { title: "Left-out temperatures, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
       ladder.others.length
         ? {
-            title: `As it is on recording ${ladder.recording}, deg/s`,
+            title: `Without refitting, on recording ${ladder.recording}, deg/s`,
             number: true,
             cell: (step) => number(step.applied_rms_dps ?? (step.recording === ladder.recording ? step.rms_dps : null)),
           }

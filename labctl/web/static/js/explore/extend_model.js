@@ -16,9 +16,9 @@ import { plausibility, relativeChange, residualFigure } from "./preview_result.j
 
 /** @type {["raw_rms_dps" | "rms_dps" | "heldout_rms_dps" | "noise_floor_dps", string][]} */
 const ERRORS = [
-  ["raw_rms_dps", "As the unit is"],
+  ["raw_rms_dps", "Without correction"],
   ["rms_dps", "Left after the fit"],
-  ["heldout_rms_dps", "At unseen temperatures"],
+  ["heldout_rms_dps", "At left-out temperatures"],
   ["noise_floor_dps", "Noise floor"],
 ];
 
@@ -54,7 +54,7 @@ export function extendModel(state, effects) {
     },
   );
   const drop = selectField(
-    "Take one out",
+    "Remove an effect",
     [["", "choose one"], ...has.map((id) => option(id, idText(id)))],
     "",
     (value) => {
@@ -76,7 +76,7 @@ export function extendModel(state, effects) {
       {
         type: "button",
         class: "chip accent",
-        "aria-label": `leave ${idText(id)} as it is`,
+        "aria-label": `do not change ${idText(id)}`,
         onclick: () => {
           set.delete(id);
           show();
@@ -143,7 +143,7 @@ export function extendModel(state, effects) {
         "div",
         { class: "row" },
         button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }),
-        h("span", { class: "muted small" }, "Versions are never changed; this one stays as it is."),
+        h("span", { class: "muted small" }, "Versions are never changed; this one is kept."),
       ),
     ];
   }

@@ -22,7 +22,7 @@ export function residualDiagnostics(state) {
   const rows = () => selectedRows(state);
   const picture = residualMap(
     "Residual over floor",
-    `Every measured cell: the mean residual of its data sets over the noise floor. ${cellsText(state.criticism)} Faded cells are within two floors of zero: by themselves they mean nothing. Drag over cells to pick them, press one to pick it.`,
+    `Every measured cell: the mean residual of its data sets over the noise floor. ${cellsText(state.criticism)} Faded cells are within two noise floors of zero: a single one is not significant. Drag over cells to select them, press one to select it.`,
     () => ({
       maps: mapsOf(state.criticism, state.axis),
       limit: colourLimit(mapsOf(state.criticism, state.axis)),
@@ -59,12 +59,12 @@ export function residualDiagnostics(state) {
     }
   });
   return cardWithHeader(
-    "See where it fails",
-    h("span", { class: "muted small" }, "a pick in one picture shows in all"),
+    "Where the model fails",
+    h("span", { class: "muted small" }, "a selection in one picture is shown in all"),
     h(
       "p",
       { class: "muted small" },
-      `Judged: the model of version ${state.version} refitted to recording ${state.recording}, so that only what it cannot describe remains. The version as it is stands under Compare.`,
+      `Judged: the model of version ${state.version} refitted to recording ${state.recording}, so that the residual is what the model cannot describe. The version without refitting is under Compare.`,
     ),
     picture,
     h("div", { class: "columns", style: "--column-min: 19rem" }, against),
@@ -162,7 +162,7 @@ function residualScatter(state, channel) {
 /** @param {ExploreState} state */
 function pickedDatasets(state) {
   const rows = selectedRows(state);
-  if (!state.pick.size) return h("p", { class: "muted small" }, "Nothing is picked.");
+  if (!state.pick.size) return h("p", { class: "muted small" }, "No data set is selected.");
   const chosen = rows.dataset
     .map((_, k) => k)
     .filter((k) => state.pick.has(rows.dataset[k]))
@@ -175,10 +175,10 @@ function pickedDatasets(state) {
       h(
         "p",
         {},
-        h("strong", {}, `${chosen.length} data sets picked`),
+        h("strong", {}, `${chosen.length} data sets selected`),
         `: RMS ${number(rms)} deg/s${chosen.length > MAX_LISTED ? `; the ${MAX_LISTED} furthest off are listed` : ""}.`,
       ),
-      h("button", { class: "button tiny", type: "button", onclick: () => state.select([]) }, "Let go"),
+      h("button", { class: "button tiny", type: "button", onclick: () => state.select([]) }, "Clear selection"),
     ),
     table(
       [
@@ -194,7 +194,7 @@ function pickedDatasets(state) {
         { title: "Over floor", number: true, cell: (k) => number(rows.score[k], 2) },
       ],
       chosen.slice(0, MAX_LISTED),
-      { dense: true, label: "Picked data sets" },
+      { dense: true, label: "Selected data sets" },
     ),
   ];
 }

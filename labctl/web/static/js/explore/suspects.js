@@ -13,7 +13,7 @@ import { axisNames } from "./dataset_rows.js";
 const VERDICTS = {
   adequate: ["Nothing is missing", "good"],
   missing: ["Missing", "warn"],
-  ambiguous: ["Cannot tell which", "warn"],
+  ambiguous: ["Cause ambiguous", "warn"],
   unexplained: ["Unexplained", "warn"],
   insufficient_data: ["Too little data", "bad"],
 };
@@ -34,7 +34,7 @@ export function verdictCard(state) {
       "div",
       { class: "row" },
       chip(title, kind),
-      h("span", { class: "muted small" }, `version ${state.version} held against recording ${state.recording}`),
+      h("span", { class: "muted small" }, `version ${state.version} compared with recording ${state.recording}`),
     ),
     fitWarnings({ warnings: state.calibration.warnings?.filter((each) => each.what === "worse") }),
     h("p", { class: "verdict-statement" }, first),
@@ -46,7 +46,7 @@ export function verdictCard(state) {
         "deg/s",
         Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null,
       ],
-      ["At unseen temperatures", number(error.heldout_rms_dps), "deg/s"],
+      ["At left-out temperatures", number(error.heldout_rms_dps), "deg/s"],
       ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s"],
       noise.vs_datasheet
         ? ["Drift", number(noise.drift_dps), "deg/s", `${number(noise.vs_datasheet, 2)} times the data sheet's`]
@@ -70,7 +70,7 @@ export function suspectList(state, { onadd, explain }) {
   const drawnNow = h(
     "p",
     { class: "muted small", "aria-live": "polite" },
-    "Draw a suspect over the residual to see what it would explain.",
+    "Select a suspected effect to draw what it would explain of the residual.",
   );
   /** @param {Suspect} suspect */
   const draw = (suspect) =>
@@ -82,7 +82,7 @@ export function suspectList(state, { onadd, explain }) {
         state.setOverlay({ effect: suspect.effect, name: idText(suspect.effect), values });
         return setChildren(
           drawnNow,
-          `Diamonds in the pictures above: what ${idText(suspect.effect)} would explain of the residual.`,
+          `Diamonds in the pictures above: the part of the residual that ${idText(suspect.effect)} would explain.`,
         );
       },
       { kind: "tiny" },
@@ -104,7 +104,7 @@ export function suspectList(state, { onadd, explain }) {
               { class: "row tight" },
               h("a", { class: "suspect-name", href: `/effects/${s.effect}` }, idText(s.effect)),
               named.has(s.effect) ? chip("named", "warn") : null,
-              s.physical !== false ? null : chip("not physical here"),
+              s.physical !== false ? null : chip("not physical for this type of gyro"),
             ),
             h("div", { class: "muted small" }, s.explanation),
             h(
@@ -116,14 +116,14 @@ export function suspectList(state, { onadd, explain }) {
           ),
           evidenceItem("Evidence", evidenceMeter(s.log_bayes_factor)),
           evidenceItem(
-            "Takes off",
+            "Explains",
             h("span", { class: "number" }, percent(s.share_removed)),
             h("span", { class: "muted small" }, "of the excess"),
           ),
           evidenceItem(
             "Error with it, deg/s",
             h("span", { class: "number" }, number(s.rms_after_dps)),
-            h("span", { class: "muted small" }, `${number(s.heldout_rms_after_dps)} at unseen temperatures`),
+            h("span", { class: "muted small" }, `${number(s.heldout_rms_after_dps)} at left-out temperatures`),
           ),
           evidenceItem(
             `Coefficient, k = 2${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
@@ -136,17 +136,17 @@ export function suspectList(state, { onadd, explain }) {
   state.onchange((what) => {
     fillList();
     if (what === "overlay" && !state.overlay)
-      setChildren(drawnNow, "Draw a suspect over the residual to see what it would explain.");
+      setChildren(drawnNow, "Select a suspected effect to draw what it would explain of the residual.");
   });
   return cardWithHeader(
-    "Learn what is missing",
+    "Which effects are missing",
     null,
     speaking.length
       ? [drawnNow, list]
       : h(
           "p",
           { class: "muted" },
-          "No effect of the catalogue speaks for itself here: each would explain less than its coefficients cost.",
+          "No effect of the catalogue has enough evidence here: none explains more than its coefficients would fit by chance.",
         ),
     aliasNotice(criticism),
     experimentList(criticism),
@@ -197,8 +197,8 @@ function coefficientText(suspect, axis) {
         "div",
         { class: "muted small" },
         suspect.coefficients_from === "comparison"
-          ? "beside the judged model; no fit with it was made"
-          : "as a version with it would have",
+          ? "estimated; no fit with this effect was made"
+          : "as a version with this effect would have",
       ),
     );
 }
@@ -217,8 +217,8 @@ function aliasNotice(criticism) {
   if (!group || criticism.verdict !== "ambiguous") return null;
   return notice(
     "warn",
-    h("p", {}, h("strong", {}, "This recording cannot tell them apart: "), group.map(idText).join(", "), "."),
-    h("p", {}, "Adding one of them lowers the error whichever is true; only another experiment says which."),
+    h("p", {}, h("strong", {}, "This recording cannot distinguish them: "), group.map(idText).join(", "), "."),
+    h("p", {}, "Adding any one of them lowers the error; only another experiment shows which one is real."),
   );
 }
 
@@ -228,7 +228,7 @@ function experimentList(criticism) {
   return h(
     "div",
     { class: "stack" },
-    h("h3", {}, "The experiment that would tell"),
+    h("h3", {}, "The experiment that would decide"),
     criticism.experiments
       .slice(0, 3)
       .map((each) =>
@@ -254,11 +254,11 @@ function untestableEffects(criticism) {
   if (!criticism.not_testable.length) return null;
   /** @param {Criticism["not_testable"][number]} line */
   const why = (line) =>
-    line.why === "channel" ? `not recorded: ${line.needs.map(idText).join(", ")}` : "this schedule hides it";
+    line.why === "channel" ? `not recorded: ${line.needs.map(idText).join(", ")}` : "this schedule cannot detect it";
   return h(
     "details",
     {},
-    h("summary", {}, `What this recording cannot say anything about (${criticism.not_testable.length})`),
+    h("summary", {}, `Effects that this recording cannot test (${criticism.not_testable.length})`),
     h(
       "ul",
       { class: "two-columns" },

@@ -109,14 +109,14 @@ function unconfirmedNotice(bench, simulated_time) {
     h(
       "p",
       {},
-      `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Check it; no campaign starts before a person has.`,
+      `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Inspect it; no campaign starts before a person has done so.`,
     ),
     bench.attempts
       ? h(
           "p",
           {},
           bench.confirmed_at
-            ? `labctl confirmed the safe state at ${campaignInstant({ simulated_time }, bench.confirmed_at)}, at attempt ${bench.attempts}. Look all the same before you clear it.`
+            ? `labctl confirmed the safe state at ${campaignInstant({ simulated_time }, bench.confirmed_at)}, at attempt ${bench.attempts}. Inspect it nevertheless before you clear it.`
             : `The safe state was tried again ${bench.attempts} times, last at ${campaignInstant({ simulated_time }, bench.attempted_at)}; it is tried every 30 s.`,
         )
       : null,

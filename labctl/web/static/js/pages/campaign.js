@@ -83,9 +83,9 @@ export async function page({ params, query, signal }) {
                 h(
                   "strong",
                   {},
-                  `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (wall clock)" : ""}. `,
+                  `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (real time)" : ""}. `,
                 ),
-                `${why}. Trying again.`,
+                `${why}. The page retries every few seconds.`,
               )
             : null,
         ),
@@ -183,7 +183,7 @@ function reasonNotices(now) {
           now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null,
         )),
     ...Object.entries(now.dropped).map(([unit, why]) =>
-      notice("warn", h("strong", {}, unit), ` took no further part: ${why}`),
+      notice("warn", h("strong", {}, unit), ` was excluded from the rest of the campaign: ${why}`),
     ),
   ].filter(Boolean);
 }

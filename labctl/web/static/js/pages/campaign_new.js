@@ -47,7 +47,7 @@ export async function page({ query, signal }) {
     asked.abort();
     asked = new AbortController();
     const given = AbortSignal.any([signal, asked.signal]);
-    setChildren(found, busyIndicator("Working out what it could find; for a long plan that takes some seconds."));
+    setChildren(found, busyIndicator("Computing what it can detect; for a long plan that takes some seconds."));
     try {
       const answer = await post("/api/plans", { body: { recipe: source(), clip }, signal: given });
       setChildren(planned, planCard(answer, bench));
@@ -55,7 +55,7 @@ export async function page({ query, signal }) {
     } catch (error) {
       if (isAbort(error)) return;
       setChildren(planned, refusalCard(error));
-      setChildren(found, h("p", { class: "muted" }, "There is no plan to look at."));
+      setChildren(found, h("p", { class: "muted" }, "There is no plan to show."));
       return;
     }
     try {
@@ -81,7 +81,7 @@ export async function page({ query, signal }) {
     "label",
     { class: "row tight" },
     clipBox,
-    h("span", {}, "Leave out what the bench or the unit cannot do"),
+    h("span", {}, "Leave out points beyond the limits of the bench or the unit"),
   );
   const starting = startForm(bench, () => ({ recipe: source(), clip, hide }));
   plan();
@@ -98,13 +98,13 @@ export async function page({ query, signal }) {
             h("strong", {}, bench.name),
             bench.simulated ? chip("simulated", "accent") : null,
           )
-        : "For the simulated bench that fits the recipe best.",
+        : "For the simulated bench that suits the recipe best.",
       h("a", { class: "button primary", href: "#begin" }, "Begin …"),
     ),
     query.recipe && named.name !== query.recipe && !query.toml
       ? notice(
           "warn",
-          `No recipe ${query.recipe} comes with labctl; ${named.name} is shown. Its text can be pasted under "Your own".`,
+          `No recipe ${query.recipe} comes with labctl; ${named.name} is shown. Its text can be pasted under "Your own recipe".`,
         )
       : null,
     h(
@@ -124,11 +124,15 @@ export async function page({ query, signal }) {
         "div",
         { class: "page" },
         planned,
-        card("What it could find", found),
+        card("What it can detect", found),
         hider
           ? card(
               "Hide an effect",
-              h("p", { class: "muted" }, "The simulated unit then has it, and nothing tells: a case to practise on."),
+              h(
+                "p",
+                { class: "muted" },
+                "The simulated unit then has the effect, and no page shows it: a case to practise with.",
+              ),
               hider,
             )
           : null,
@@ -156,7 +160,7 @@ function planCard(answer, bench) {
   const simulated = !bench || bench.simulated;
   const clock = simulated ? SIMULATED : "on the bench's own clock";
   return card(
-    "What it would do",
+    "Steps",
     factList([
       ["Data sets", count(answer.datasets), "", `in ${count(answer.steps)} steps`],
       ["Expected time", duration(answer.expected_s), "", clock],
@@ -190,4 +194,5 @@ function planCard(answer, bench) {
 }
 
 /** @param {unknown} error */
-const refusalCard = (error) => card("It cannot be done so", notice("bad", h("p", { class: "lead" }, messageOf(error))));
+const refusalCard = (error) =>
+  card("This plan cannot be carried out", notice("bad", h("p", { class: "lead" }, messageOf(error))));

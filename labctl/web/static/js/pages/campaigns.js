@@ -157,7 +157,11 @@ function scheduleCard(rows, again) {
           cell: (row) => [
             startTime(row),
             row.confirmed_by
-              ? h("span", { class: "muted small secondary" }, `${row.confirmed_by} makes sure that the bench is clear`)
+              ? h(
+                  "span",
+                  { class: "muted small secondary" },
+                  `${row.confirmed_by} confirmed that the bench will be clear`,
+                )
               : null,
           ],
         },
@@ -172,7 +176,9 @@ function scheduleCard(rows, again) {
           title: "Recipe",
           cell: (row) => [
             row.recipe,
-            row.clip ? h("span", { class: "muted small secondary" }, "without what the bench cannot do") : null,
+            row.clip
+              ? h("span", { class: "muted small secondary" }, "without points beyond the limits of the bench")
+              : null,
           ],
         },
         { title: "Again", cell: (row) => (row.cron ? h("code", { class: "nowrap" }, row.cron) : "once") },
@@ -195,12 +201,12 @@ function scheduleCard(rows, again) {
                 await remove("/api/schedule/{start}", { path: { start: row.id } });
                 await again();
               },
-              { kind: "tiny", done: "Taken out of the schedule." },
+              { kind: "tiny", done: "Removed from the schedule." },
             ),
         },
       ],
       rows,
-      { label: "What begins when", first: "9rem" },
+      { label: "Scheduled starts", first: "9rem" },
     ),
   );
 }

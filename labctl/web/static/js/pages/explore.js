@@ -47,7 +47,7 @@ export async function page({ query: asked, signal }) {
       { class: "page" },
       pageHeader("Explore"),
       emptyState(
-        h("p", {}, "There is nothing to explore yet."),
+        h("p", {}, "There is nothing to explore yet: import or measure a recording first."),
         h("p", {}, h("a", { class: "button primary", href: "/start" }, "Begin")),
       ),
     );
@@ -63,7 +63,7 @@ export async function page({ query: asked, signal }) {
     { class: "page explore" },
     pageHeader(
       "Explore",
-      "Hold the model against the measurements.",
+      "Compare the model with the measurements.",
       ...selectors(units, unit, own, versions, version, recording),
     ),
   );
@@ -158,7 +158,7 @@ function firstFitCard(unit, recording) {
     h(
       "p",
       { class: "muted" },
-      `Recording ${recording} of ${unit.serial} has not been fitted. Start simple: what the model leaves will say what is missing.`,
+      `Recording ${recording} of ${unit.serial} has not been fitted. Begin with a simple model: its residual shows which effects are missing.`,
     ),
     h(
       "div",
@@ -201,7 +201,7 @@ function versionView({ unit, version, versions, recording, asked, signal }) {
     h(
       "div",
       { class: "card" },
-      busyIndicator("Holding the model against every reading; the first time takes some seconds."),
+      busyIndicator("Comparing the model with every reading; the first time takes some seconds."),
       stage,
     ),
   );

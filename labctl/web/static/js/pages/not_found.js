@@ -7,7 +7,7 @@ export function page() {
   return h(
     "div",
     { class: "page" },
-    pageHeader("No such page", `Nothing is at ${location.pathname}.`),
+    pageHeader("No such page", `There is no page ${location.pathname}.`),
     h("p", {}, h("a", { href: "/" }, "To the start")),
   );
 }

@@ -56,7 +56,7 @@ export async function page({ params, query, signal }) {
     element.append(
       notice(
         "",
-        "This recording is a published table: scale factors and offsets over temperature. It has no data sets and no readings to look at; it can be fitted.",
+        "This recording is a published table: scale factors and offsets over temperature. It has no data sets and no readings; it can be fitted.",
       ),
     );
     return element;
@@ -155,7 +155,7 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
       warm ? ["Gyro temperature", `${number(warm[0])} to ${number(warm[1])}`, "deg C"] : null,
       info.latitude_deg === null
         ? null
-        : ["Latitude", plainNumber(info.latitude_deg), "deg", "the Earth's rate is taken off"],
+        : ["Latitude", plainNumber(info.latitude_deg), "deg", "the Earth's rate is subtracted"],
     ]),
   );
   if (info.notes) element.append(h("p", { class: "muted" }, info.notes));

@@ -43,7 +43,7 @@ export async function page({ query, signal }) {
   return h(
     "div",
     { class: "page" },
-    pageHeader("Recordings", "All data sets of one unit in one campaign, or brought in as files."),
+    pageHeader("Recordings", "All data sets of one unit in one campaign, or imported as files."),
     importForm(taken),
     cardWithHeader(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list),
   );
@@ -105,7 +105,7 @@ const noRecordings = () =>
     h(
       "p",
       {},
-      "Drop one above, ",
+      "Drop a folder above, ",
       h("a", { href: "/campaigns/new" }, "run a campaign"),
       ", or ",
       h("a", { href: "/start" }, "begin with an example"),

@@ -22,37 +22,37 @@ export async function page({ signal }) {
   return h(
     "div",
     { class: "page" },
-    pageHeader("Begin", "Nothing has been measured yet. Three ways to the first calibration, one press each."),
+    pageHeader("Begin", "Nothing has been measured yet. Three ways to a first calibration, one click each."),
     h(
       "div",
       { class: "columns" },
       card(
-        "See it find a hidden effect",
+        "Find a hidden effect",
         h(
           "p",
           {},
-          "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out what is missing.",
+          "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect is missing.",
         ),
         button("Simulate a recording", openSimulated, { kind: "primary" }),
       ),
       card(
-        "Look at a real gyro",
+        "Open a real gyro",
         h(
           "p",
           {},
-          "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. Why is the fit fifteen times worse than the noise?",
+          "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. Its fit is fifteen times worse than the noise; find out why.",
         ),
         button("Open the real gyro", openExample),
       ),
       card(
-        "Bring your own data",
+        "Import your own data",
         h("p", {}, "A folder in the interchange format: recording.toml and its data file, as CSV or Parquet."),
         h("a", { class: "button", href: "/recordings" }, "Import a recording"),
       ),
       benches.length
         ? card(
             `Run a campaign on ${benches[0].name}`,
-            h("p", {}, "Choose a recipe, see what it could find, and start."),
+            h("p", {}, "Choose a recipe, see which effects it can detect, and start."),
             h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"),
           )
         : null,
@@ -95,7 +95,7 @@ function overview(units, campaigns, benches) {
     { class: "page" },
     pageHeader(
       "labctl",
-      "Hold the model against the measurements, see where it fails, learn what is missing, watch the error fall.",
+      "Compare the model with the measurements: where it fails, which effects are missing, and how the error falls when they are added.",
     ),
     h(
       "div",
@@ -110,7 +110,7 @@ function overview(units, campaigns, benches) {
                 running
                   ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.`
                   : benches[0].unconfirmed
-                    ? `${benches[0].name} was not confirmed safe: look at it.`
+                    ? `${benches[0].name} was not confirmed safe: inspect it.`
                     : `${benches[0].name} is free.`,
               ),
             )

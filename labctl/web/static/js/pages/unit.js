@@ -111,7 +111,7 @@ function inForce(unit, rows, force) {
             force.verdict_recording ? `recording ${force.verdict_recording}` : null,
           ],
       ["RMS error", number(row?.rms_dps), "deg/s"],
-      ["At unseen temperatures", number(row?.heldout_rms_dps), "deg/s"],
+      ["At left-out temperatures", number(row?.heldout_rms_dps), "deg/s"],
     ]),
     force?.override ? overridden(force) : null,
     left !== null && left < 0 ? notice("bad", "This calibration is overdue.") : null,
@@ -175,7 +175,7 @@ function versions(unit, rows, explore) {
             ),
         },
         { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
-        { title: "Unseen, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
+        { title: "Left-out temperatures, deg/s", number: true, cell: (row) => number(row.heldout_rms_dps) },
         {
           title: "",
           cell: (row) =>
@@ -209,7 +209,7 @@ function versions(unit, rows, explore) {
  */
 function ladder(serial, signal) {
   const place = h("div", { style: "min-height: 20rem" });
-  loadInto(place, "Climbing down the ladder", async () =>
+  loadInto(place, "RMS error by version", async () =>
     ladderFigure(await get("/api/units/{serial}/ladder", { path: { serial }, signal })),
   );
   return cardWithHeader("How the error fell", null, place);

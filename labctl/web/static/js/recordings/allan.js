@@ -19,7 +19,7 @@ const NOISE_FIGURES = [
 ];
 
 /**
- * Card for the longest stretch at rest, or for the selected data set.
+ * Card for the longest section at rest, or for the selected data set.
  * @param {RecordingState} state
  * @param {AbortSignal} signal
  */
@@ -33,9 +33,9 @@ export function allan(state, signal) {
       which,
       state.dataset
         ? toggleGroup(
-            "Of what",
+            "Data",
             [
-              ["rest", "longest stretch at rest"],
+              ["rest", "longest section at rest"],
               ["set", `data set ${state.dataset}`],
             ],
             own ? "set" : "rest",

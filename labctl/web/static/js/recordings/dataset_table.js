@@ -59,7 +59,7 @@ export function datasetTable(state, asked) {
       pages > 1
         ? [
             turn("« First", "First page", shown === 1 ? 0 : 1),
-            turn("‹ Back", "Page before", shown - 1),
+            turn("‹ Back", "Previous page", shown - 1),
             h("span", { class: "muted small", "aria-live": "polite" }, `${shown} of ${pages}`),
             turn("On ›", "Next page", shown + 1),
             turn("Last »", "Last page", shown === pages ? 0 : pages),

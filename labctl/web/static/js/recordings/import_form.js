@@ -118,7 +118,7 @@ function acceptedNotice(made, left) {
       `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`,
     ),
     warnings.map((warning) => h("p", {}, `${warning.severity === "certain" ? "Wrong" : "Check"}: ${warning.text}`)),
-    left.length ? h("p", { class: "small" }, `Left out of the folder: ${left.join(", ")}.`) : null,
+    left.length ? h("p", { class: "small" }, `Files not used: ${left.join(", ")}.`) : null,
     h(
       "div",
       { class: "row" },
@@ -130,7 +130,7 @@ function acceptedNotice(made, left) {
         },
         "Fit and explore",
       ),
-      h("a", { class: "button", href: `/recordings/${made.recording}` }, "Look at it"),
+      h("a", { class: "button", href: `/recordings/${made.recording}` }, "Show it"),
     ),
   );
 }
@@ -143,6 +143,6 @@ function refusedNotice(error) {
   return notice(
     "bad",
     h("p", { class: "lead" }, messageOf(error)),
-    h("p", { class: "small" }, "Nothing of it was kept."),
+    h("p", { class: "small" }, "Nothing was imported."),
   );
 }

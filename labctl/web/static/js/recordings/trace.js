@@ -36,7 +36,7 @@ export function trace(state, signal) {
   const place = h("div", { style: "min-height: 24rem" }, busyIndicator("Reading"));
   const picture = figure(
     `Recording ${state.id} trace`,
-    "Band: from the least to the greatest reading of a column; line: their mean. Drag across to look closer, press a data set to open its readings.",
+    "Band: from the smallest to the largest reading of a column; line: their mean. Drag across to zoom in, press a data set to open its readings.",
     draw,
     {
       height: "21rem",
@@ -71,7 +71,7 @@ export function trace(state, signal) {
         {
           type: "scatter",
           mode: "lines",
-          name: "least to greatest",
+          name: "minimum to maximum",
           fill: "toself",
           fillcolor: `color-mix(in srgb, ${line} 28%, transparent)`,
           line: { width: 0 },
@@ -196,8 +196,8 @@ export function trace(state, signal) {
     { class: "row tight", role: "group", "aria-label": "Window" },
     tool("◀", "Earlier", () => move(-0.5, -0.5)),
     tool("▶", "Later", () => move(0.5, 0.5)),
-    tool("+", "Look closer", () => move(0.25, -0.25)),
-    tool("−", "Look wider", () => move(-0.5, 0.5)),
+    tool("+", "Zoom in", () => move(0.25, -0.25)),
+    tool("−", "Zoom out", () => move(-0.5, 0.5)),
     tool("All", "The whole recording", () => show({ from: null, until: null })),
   );
   load();

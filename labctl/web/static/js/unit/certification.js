@@ -35,7 +35,7 @@ export function verdictChip(known) {
 export const overridden = (act) =>
   notice(
     "warn",
-    h("p", {}, h("strong", {}, "Certified against objections. "), `${act.by}: ${act.reason}`),
+    h("p", {}, h("strong", {}, "Certified despite objections. "), `${act.by}: ${act.reason}`),
     act.objections.map((each) => h("p", { class: "small" }, each.text)),
   );
 
@@ -61,7 +61,7 @@ export async function askCertification(serial, version) {
     },
     { name: "due_days", label: "Due again in days", type: "number", value: "365", required: false },
   ];
-  if (needed) fields.push({ name: "override", label: "Certify it all the same", type: "checkbox" });
+  if (needed) fields.push({ name: "override", label: "Certify it despite the objections", type: "checkbox" });
   const answers = await dialog(`Put version ${version} in force`, fields, {
     text: "Every request for this unit's calibration gets this version from now on. It is written to the audit trail.",
     body: assessed(known),
@@ -85,7 +85,7 @@ export async function askCertification(serial, version) {
  */
 export async function askRevocation(serial, version) {
   const answers = await dialog(
-    `Take version ${version} out of force`,
+    `Revoke version ${version}`,
     [
       { name: "by", label: "Who" },
       { name: "reason", label: "Why" },
@@ -118,7 +118,7 @@ function assessed(known) {
         "deg/s",
         known.error.raw_rms_dps === null ? null : `${number(known.error.raw_rms_dps)} without correction`,
       ],
-      ["At unseen temperatures", number(known.error.heldout_rms_dps), "deg/s"],
+      ["At left-out temperatures", number(known.error.heldout_rms_dps), "deg/s"],
     ]),
     known.objections.some((each) => each.what === "verdict")
       ? null
@@ -126,7 +126,7 @@ function assessed(known) {
     known.objections.length
       ? notice(
           "bad",
-          h("p", {}, h("strong", {}, "This speaks against it:")),
+          h("p", {}, h("strong", {}, "Objections:")),
           h(
             "ul",
             { class: "plain" },

@@ -12,7 +12,7 @@ import { coefficientColumns, isSingle } from "./coefficient_table.js";
 /** @type {["rms_dps" | "heldout_rms_dps" | "noise_floor_dps", string][]} */
 const ERRORS = [
   ["rms_dps", "RMS"],
-  ["heldout_rms_dps", "at unseen temperatures"],
+  ["heldout_rms_dps", "at left-out temperatures"],
   ["noise_floor_dps", "noise floor"],
 ];
 /** Coverage factor of the bars: expanded uncertainty. */
@@ -42,7 +42,7 @@ export function comparison(first, second) {
       "p",
       {},
       `Version ${first.version} `,
-      more.length ? `has ${more.map(idText).join(", ")} more` : "has nothing more",
+      more.length ? `has ${more.map(idText).join(", ")} more` : "has no further effect",
       less.length ? ` and lacks ${less.map(idText).join(", ")}` : "",
       ` than version ${second.version}.`,
     ),
@@ -189,7 +189,7 @@ function list(first, second) {
         : null,
       second
         ? {
-            title: "Differs by",
+            title: "Difference",
             number: true,
             cell: (row) =>
               row.beside && row.u !== null && row.beside.u !== null

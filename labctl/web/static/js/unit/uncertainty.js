@@ -138,7 +138,7 @@ function reasons(cells) {
       ? h(
           "p",
           { class: "small" },
-          "“same run”: coefficients and model alone, expanded; it holds only until the unit is switched off.",
+          "“same run”: uncertainty of coefficients and model only, expanded; valid only until the unit is switched off.",
         )
       : null,
   );

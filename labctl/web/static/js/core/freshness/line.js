@@ -78,7 +78,7 @@ function draw() {
   const root = document.documentElement;
   if (found === "no") delete root.dataset.stale;
   else root.dataset.stale = found === "paused" || found === "first" ? found : "yes";
-  if (stale) line.announcement.textContent = "Stale: what is shown may no longer be so.";
+  if (stale) line.announcement.textContent = "Stale: what is shown may be out of date.";
   if (found === "no" && before !== null && before !== "first") {
     line.announcement.textContent = "The service answers again.";
     window.dispatchEvent(new CustomEvent("labctl:fresh"));
@@ -110,7 +110,7 @@ export function freshnessLine() {
  * @param {Child} fresh
  * @param {Child} [stale]
  */
-export const presentWords = (fresh, stale = "Not known now: the bench or the service is not heard.") =>
+export const presentWords = (fresh, stale = "Not known now: the bench or the service does not answer.") =>
   h(
     "span",
     { class: "present" },

@@ -43,20 +43,21 @@ export function freshnessWords(found, { service_s, bench_s, trouble, clock }) {
   if (found === "first") return { stale: false, text: "Asking the service …" };
   if (found === "paused") {
     const when = clock === null ? "never" : `at ${clock}`;
-    return { stale: false, text: `Paused while this tab is hidden: the service was last heard ${when}.` };
+    return { stale: false, text: `Paused while this tab is hidden: last answer of the service ${when}.` };
   }
-  const service = service_s === null ? "The service was not heard." : `Service last heard ${ago(service_s)}.`;
+  const service =
+    service_s === null ? "The service has not answered." : `Last answer of the service ${ago(service_s)}.`;
   if (found === "yes") {
-    const of = clock === null ? "" : `; it is of ${clock}`;
-    return { stale: true, text: `${service} What is shown may no longer be so${of}.` };
+    const of = clock === null ? "" : `; it dates from ${clock}`;
+    return { stale: true, text: `${service} What is shown may be out of date${of}.` };
   }
   if (found === "trouble")
     return { stale: true, text: `The service answers, but not with what this page shows: ${trouble}` };
   const bench = bench_s === null ? "" : ago(bench_s);
   if (found === "bench") {
-    const what = "What is shown of the bench may no longer be so.";
-    return { stale: true, text: `Bench last heard ${bench}; the service answers. ${what}` };
+    const what = "What is shown of the bench may be out of date.";
+    return { stale: true, text: `Last answer of the bench ${bench}; the service answers. ${what}` };
   }
   if (service_s === null || bench_s === null) return { stale: false, text: service };
-  return { stale: false, text: `Service last heard ${ago(service_s)}, bench ${bench}.` };
+  return { stale: false, text: `Last answer of the service ${ago(service_s)}, bench ${bench}.` };
 }

@@ -18,7 +18,9 @@ export class Problem extends Error {
 /** The service did not answer. */
 export class Unreachable extends Error {
   constructor() {
-    super("The service does not answer. Nothing on this page is newer than what you see.");
+    super(
+      "The service does not answer. What is shown is the last answer; the page updates when the service answers again.",
+    );
   }
 }
 

@@ -60,7 +60,7 @@ export function atRest(comparison, state) {
   });
   return figure(
     "Error at rest",
-    `Axis ${state.axis} at rest over temperature, the Earth's rate taken off where the latitude is known; bars are two noise floors.`,
+    `Axis ${state.axis} at rest over temperature, with the Earth's rate subtracted where the latitude is known; bars are two noise floors.`,
     draw,
     { height: "22rem" },
   );

@@ -35,7 +35,7 @@ export function fullTurn(comparison, state) {
   const draw = () => {
     const colours = temperatureColours(rows.temperature_c, barPlace());
     const titles = [
-      `before: static bias off only, RMS ${number(rms(turn.before), 2)} deg`,
+      `before: only static bias subtracted, RMS ${number(rms(turn.before), 2)} deg`,
       `after the calibration, RMS ${number(rms(turn.after), 2)} deg`,
     ];
     /** @type {Axes} */
@@ -54,7 +54,7 @@ export function fullTurn(comparison, state) {
   };
   return figure(
     "Error after a full turn",
-    `How far a heading is off after one turn about axis ${state.axis}, from ${comparison.least_turn_rate_dps} deg/s on: left with the static bias at rest taken off only, right with the calibration and the static bias that it leaves, both on the same axes. Blue is cold, red is hot.`,
+    `How far a heading is off after one turn about axis ${state.axis}, from ${comparison.least_turn_rate_dps} deg/s on: left with only the static bias at rest subtracted, right with the calibration applied and its remaining static bias subtracted, both on the same axes. Blue is cold, red is hot.`,
     draw,
     { height: twoScenes() },
   );

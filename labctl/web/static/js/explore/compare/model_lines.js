@@ -87,7 +87,7 @@ export function overRate(comparison, state) {
   };
   return figure(
     "Error over rate",
-    `Dots are measured, lines the model of axis ${state.axis} at each temperature level; blue is cold, red is hot. Where dots leave their line, the model fails.${ofAll(lines)}`,
+    `Dots are measured, lines the model of axis ${state.axis} at each temperature level; blue is cold, red is hot. Where dots lie off their line, the model fails.${ofAll(lines)}`,
     draw,
     { height: "24rem" },
   );

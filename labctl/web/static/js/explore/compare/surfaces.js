@@ -29,7 +29,7 @@ export function surfaces(comparison, state) {
     ]);
     const titles = [
       `before: measured and model, RMS ${number(rms(rows.measured_error_dps), 2)} deg/s`,
-      `after: what remains, RMS ${number(rms(rows.residual_dps), 2)} deg/s`,
+      `after: residual, RMS ${number(rms(rows.residual_dps), 2)} deg/s`,
     ];
     const shared = { colorscale: SCALE, cmin: reach[0], cmax: reach[1] };
     /** @type {Axes} */
@@ -55,14 +55,14 @@ export function surfaces(comparison, state) {
         })),
         dots(rows, rows.measured_error_dps, "measured", "scene"),
         residualSurface(rows, shared),
-        dots(rows, rows.residual_dps, "what remains", "scene2"),
+        dots(rows, rows.residual_dps, "residual", "scene2"),
       ].filter((trace) => trace !== null),
       layout: { ...sceneLayout(titles, axes), showlegend: false },
     };
   };
   return figure(
     "Error surface",
-    `Axis ${state.axis} turned about itself: left the measured error as dots with the model as a surface, right what the model leaves, both on the same axes. Drag to turn.`,
+    `Axis ${state.axis} turned about itself: left the measured error as dots with the model as a surface, right the residual of the model, both on the same axes. Drag to turn.`,
     draw,
     { height: twoScenes() },
   );
@@ -109,7 +109,7 @@ function residualSurface(rows, shared) {
   const mean = (values) => (values ? values.reduce((sum, value) => sum + value, 0) / values.length : null);
   return {
     type: "surface",
-    name: "what remains",
+    name: "residual",
     scene: "scene2",
     ...shared,
     showscale: false,

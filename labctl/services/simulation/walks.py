@@ -1,0 +1,55 @@
+"""Walks through plans in the simulated world, kept as files: many questions walk through the same plans."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from typing import Any
+
+import numpy as np
+
+from instruments.bench_config import BenchFile
+from labctl.recording import Recording, RecordingInfo
+from labctl.services.cache import FileCache
+from labctl.services.simulation.plan_simulation import hidden_recording
+from procedures.planning.plan import Plan
+
+#: Readings per second at which a plan is walked through: its channels are slow.
+WALK_HZ = 1.0
+SEED = 1
+#: A file has up to a megabyte for each 10,000 s of readings.
+WALKS = FileCache("walks", ".npz", most=60)
+#: The prefix of a column of the readings and of the environment log in a file.
+READINGS, ENVIRONMENT = "readings/", "environment/"
+
+
+def walked(plan: Plan, bench: BenchFile) -> Recording:
+    """Return what the first gyro of a bench gives on a plan in the simulated world, at `WALK_HZ`. Raises BadInput."""
+    steps = hashlib.sha256(plan.model_dump_json().encode()).hexdigest()
+    question = {"kind": "walk", "plan": steps, "bench": bench.model_dump(mode="json"), "hz": WALK_HZ, "seed": SEED}
+    return WALKS.get(question, _decoded, lambda: _encoded(_walk(plan, bench)))
+
+
+def _walk(plan: Plan, bench: BenchFile) -> Recording:
+    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": WALK_HZ})
+    return hidden_recording(plan, bench, gyro, SEED, {})
+
+
+def _encoded(walk: Recording) -> bytes:
+    packed = io.BytesIO()
+    # NumPy's keyword `allow_pickle` has another type than the arrays
+    arrays: dict[str, Any] = {READINGS + name: values for name, values in walk.columns.items()}
+    arrays |= {ENVIRONMENT + name: values for name, values in (walk.environment or {}).items()}
+    info = np.frombuffer(walk.info.model_dump_json().encode(), dtype=np.uint8)
+    np.savez_compressed(packed, info=info, **arrays)
+    return packed.getvalue()
+
+
+def _decoded(content: bytes) -> Recording:
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        info = RecordingInfo.model_validate_json(arrays["info"].tobytes())
+        readings, environment = (
+            {name.removeprefix(kind): arrays[name] for name in arrays.files if name.startswith(kind)}
+            for kind in (READINGS, ENVIRONMENT)
+        )
+    return Recording(info, readings, environment or None)
