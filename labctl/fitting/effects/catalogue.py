@@ -22,7 +22,6 @@ from labctl.fitting.effects import (
     rate_table,
     response,
     scale_factor,
-    surface,
     thermal,
 )
 from labctl.fitting.effects.base import Effect, Term
@@ -33,7 +32,6 @@ from labctl.json_types.effects import EffectJson
 _OWN = (
     bias,
     scale_factor,
-    surface,
     alignment,
     nonlinearity,
     acceleration,

@@ -27,6 +27,7 @@ from procedures.execution.safe_state import stop_table
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
+from procedures.recipe.recipe import Recipe
 
 log = get_logger()
 
@@ -52,6 +53,16 @@ def operator_of(bench: Bench) -> Operator:
         if isinstance(bench.unit_handler, ManualUnitHandler)
         else UnitHandlerOperator(bench.unit_handler)
     )
+
+
+def _runnable(recipe: Recipe) -> Recipe:
+    """Return a recipe; raises BadInput for one with courses of the rate, which no driver runs."""
+    if recipe.profiles:
+        raise BadInput(
+            f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can be simulated only (`labctl simulate`): "
+            "no driver runs a table along a course of rates; leave them out"
+        )
+    return recipe
 
 
 def refuse_unconfirmed(store: Store, bench: str) -> None:
@@ -116,12 +127,7 @@ def prepare(
     """
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
-    recipe = load_recipe(recipe_source)
-    if recipe.profiles:
-        raise BadInput(
-            f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can be simulated only (`labctl simulate`): "
-            "no driver runs a table along a course of rates; leave them out"
-        )
+    recipe = _runnable(load_recipe(recipe_source))
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:

@@ -22,6 +22,7 @@ def test_what_ships() -> None:
         "gyrostar",
         "informative",
         "short",
+        "sweeps",
     }
 
 
