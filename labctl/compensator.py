@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.temperature_channel import STAND_IN_C
-from labctl.fitting.data.temperature_history import TemperatureHistory
+from labctl.fitting.data.temperature.channel import STAND_IN_C
+from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.memory import RunningMemory, course, split_memory

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.gains import LEAST_LEFT
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.data.temperature_levels import folds
+from labctl.fitting.data.temperature.levels import folds
 from labctl.fitting.numeric.arrays import Array
 
 #: What the extra `study` brings.

@@ -1,8 +1,8 @@
 """Temperature loops at rest, 2 K/min: is a hidden lag or hysteresis named, and what is left of it on a leg not seen?
 
 Cells: lags of 300, 600 and 900 s, hysteresis of 3 to 8 K, both, neither. Named right: the verdict names what is hidden,
-alone or in a group of what it cannot be told from. Leg: every leg left out in turn and predicted by the others, over
-the noise floor, before and after adding what was named first of each group.
+alone or in a group of what it cannot be distinguished from. Leg: every leg left out in turn and predicted by the
+others, over the noise floor, before and after adding what was named first of each group.
 """
 
 from __future__ import annotations

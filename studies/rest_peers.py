@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism import criticise
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.legs import legs_of
+from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.effects import CATALOGUE
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.fit import fit_preset

@@ -20,7 +20,7 @@ OPEN = frozenset({"/health", "/health/heartbeat"})
 #: Queries that are sent by POST because of what they carry: nothing changes, so a viewer may.
 ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview")
 _ASKED = re.compile("|".join(re.sub(r"{\w+}", "[^/]+", path) for path in ASKING))
-#: Where files are sent: a recording, a log, and a log to look at.
+#: Where files are sent: a recording, a log, and a log to preview.
 UPLOAD = "/api/recordings"
 UPLOADS = frozenset({UPLOAD, "/api/recordings/logs", "/api/recordings/logs/preview"})
 MIB = 1 << 20

@@ -40,7 +40,7 @@ class EffectAgreement(TypedDict):
     chi2: float
     freedom: int
     p_value: float | None
-    chi2_beside_shifts: float | None  #: beside what a shift between recordings takes up; null: none does
+    chi2_beside_shifts: float | None  #: beside what a shift between recordings explains; null: none does
     freedom_beside_shifts: int | None
     p_value_beside_shifts: float | None
     shift: str | None  #: what a difference common to all temperatures is reported as
@@ -48,7 +48,7 @@ class EffectAgreement(TypedDict):
 
 
 class HeldOutRecording(TypedDict):
-    """Errors of a fit to all other recordings on this one, applied as it is, deg/s."""
+    """Errors of a fit to all other recordings on this one, without refitting, deg/s."""
 
     recording: int
     rms_dps: float | None

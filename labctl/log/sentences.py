@@ -6,7 +6,6 @@ Of a record that is neither there is no line. With `LABCTL_LOG_LEVEL` set every 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 #: Changes of state: event -> sentence over the fields of its record.
 CHANGES: Mapping[str, str] = {
@@ -41,7 +40,7 @@ TROUBLE: Mapping[str, str] = {
 SERIOUS = frozenset({"warning", "error", "critical"})
 
 
-def sentence(fields: Mapping[str, Any]) -> str | None:
+def sentence(fields: Mapping[str, object]) -> str | None:
     """Return the sentence of a record; empty where it is not to be shown, None where only its fields tell it."""
     event, level = str(fields["event"]), str(fields["level"])
     serious = level in SERIOUS
@@ -55,5 +54,5 @@ def sentence(fields: Mapping[str, Any]) -> str | None:
     return f"{level}: {text}" if serious else text
 
 
-def _words(value: Any) -> Any:
+def _words(value: object) -> object:
     return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else value

@@ -13,14 +13,14 @@ from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, needed
 from labctl.recording.constant_rate import rate_change
 from labctl.recording.data_set_limits import refuse_large_numbers, refuse_too_many_data_sets
 from labctl.recording.info import RecordingInfo
+from labctl.recording.motions.turns import check_turns, mean_rate_dps
 from labctl.recording.recording import Column
-from labctl.recording.turns import check_turns, mean_rate_dps
 
 #: What no gyro, table or chamber has ever been at: another unit, or a slip.
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
 #: A spread is a root of squares: beyond this a square is no number, and so is what is made of it.
 LARGEST = 1e100
-#: What a recording of free motion is told.
+#: The refusal of a recording of free motion.
 NO_REFERENCE = (
     "column 'table_rate_dps' is missing, so nothing says how the unit turned: free motion alone calibrates no gyro; "
     "say motion = 'rest' for a unit at rest, 'turns' with column turn_deg for turns by known angles, or 'poses' with "

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.info import Motion
+from labctl.recording.motions.turn_means import turned_points
+from labctl.recording.motions.windows import kept_windows, usual_step_s, white_std_of_profile, window_labels
 from labctl.recording.quantisation import steps_columns
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
-from labctl.recording.turn_means import turned_points
-from labctl.recording.windows import kept_windows, usual_step_s, white_std_of_profile, window_labels
 
 #: Columns that one data set has one value of: its first reading's.
 FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg", "recording", "recording_dataset")

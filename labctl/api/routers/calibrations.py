@@ -23,8 +23,7 @@ from labctl.services.criticism.comparison import compare_version
 from labctl.services.criticism.criticise import criticise_unit, residuals_unit
 from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
-from labctl.services.criticism.trend import trend_unit
-from labctl.services.criticism.verification import verify_unit
+from labctl.services.criticism.verification.of_version import verify_unit
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
@@ -51,7 +50,6 @@ from labctl.services.schemas.criticism import (
     StageResponse,
     VerificationResponse,
 )
-from labctl.services.schemas.trend import TrendResponse
 from labctl.services.schemas.uncertainty import UncertaintyResponse
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
@@ -271,29 +269,12 @@ async def ladder(
     return await while_connected(request, service, ladder_of, serial, recording)
 
 
-@router.get("/trend", summary="A unit's calibrations over the years")
-async def trend(
-    request: Request,
-    serial: str,
-    service: ServiceDep,
-    version: Annotated[
-        int | None, Query(description="Version held against all recordings; default: the first.")
-    ] = None,
-    limit_dps: Annotated[
-        float | None, Query(gt=0, description="Limit of the bias, deg/s; default: twice the error that it states.")
-    ] = None,
-) -> TrendResponse:
-    """As found and as left by recording, drift per year with its uncertainty, and when the bias leaves the limit."""
-    return await while_connected(request, service, trend_unit, serial, version, limit_dps)
-
-
 @command_route(router, CERTIFY, "Certify a version", dependencies=[NEEDS_APPROVER])
 async def certify(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
     """Put a version in force: who, why, and when the next calibration is due. An older version again is a rollback.
 
     The verdict is stored with the certification. 409 where there are objections, unless `override` is set and the
-    reason is
-    a sentence. Needs an approver's key.
+    reason is a sentence. Needs an approver's key.
     """
     return await execute(service, CERTIFY, ToVersion(serial, version, request))
 

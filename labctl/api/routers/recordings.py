@@ -82,7 +82,7 @@ async def import_log(
     )
 
 
-@router.post("/logs/preview", summary="Look at a log")
+@router.post("/logs/preview", summary="Preview a log")
 async def preview(
     request: Request,
     file: UploadFile,

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from typing import Annotated
 
+from fastapi import APIRouter, Query, Request
+
+from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
-from labctl.services.schemas.units import UnitResponse
+from labctl.services.criticism.trend import trend_unit
+from labctl.services.schemas.units import TrendResponse, UnitResponse
 from labctl.services.units import list_units, unit
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
@@ -21,3 +25,19 @@ def units(service: ServiceDep) -> list[UnitResponse]:
 def one_unit(serial: str, service: ServiceDep) -> UnitResponse:
     """The unit, its recordings and calibrations, and which version is in force."""
     return unit(service.store, serial)
+
+
+@router.get("/units/{serial}/trend", summary="A unit's calibrations over the years", tags=["criticism"])
+async def trend(
+    request: Request,
+    serial: str,
+    service: ServiceDep,
+    version: Annotated[
+        int | None, Query(description="Version compared with all recordings; default: the first.")
+    ] = None,
+    limit_dps: Annotated[
+        float | None, Query(gt=0, description="Limit of the bias, deg/s; default: twice the error that it states.")
+    ] = None,
+) -> TrendResponse:
+    """As found and as left by recording, drift per year with its uncertainty, and when the bias leaves the limit."""
+    return await while_connected(request, service, trend_unit, serial, version, limit_dps)

@@ -49,7 +49,7 @@ def fit(
     if as_json:
         print_json(answer)
     else:
-        from labctl.cli.calibration_output import print_fit
+        from labctl.cli.printing.calibrations import print_fit
 
         print_fit(answer)
 
@@ -81,7 +81,7 @@ def certify(
     if as_json:
         print_json(answer)
     else:
-        from labctl.cli.calibration_output import print_certification
+        from labctl.cli.printing.calibrations import print_certification
 
         print_certification(answer)
 
@@ -100,7 +100,7 @@ def revoke(
     if as_json:
         print_json(answer)
     else:
-        from labctl.cli.calibration_output import print_certification
+        from labctl.cli.printing.calibrations import print_certification
 
         print_certification(answer)
 
@@ -116,7 +116,7 @@ def certifications(serial: Serial, as_json: Json = False, database: Database = N
     if as_json:
         print_json(rows)
     else:
-        from labctl.cli.calibration_output import print_certifications
+        from labctl.cli.printing.calibrations import print_certifications
 
         print_certifications(rows)
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from labctl.cli.campaign_output import print_campaign, print_plan, print_started
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json
 from labctl.cli.output import console, print_json, table
+from labctl.cli.printing.campaigns import print_campaign, print_plan, print_started
 
 if TYPE_CHECKING:
     pass

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labctl.cli.campaign_output import print_campaign, print_end
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json
 from labctl.cli.output import console, print_json
+from labctl.cli.printing.campaigns import print_campaign, print_end
 
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labctl.cli.criticism_output import (
+from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, RecordingIds, Serial, recording_numbers
+from labctl.cli.output import print_json
+from labctl.cli.printing.criticism import (
     print_criticism,
     print_improvement,
     print_ladder,
     print_verification,
 )
-from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import AcceptWarnings, Database, Json, RecordingId, RecordingIds, Serial, recording_numbers
-from labctl.cli.output import print_json
 from labctl.cli.stage_line import stage_line
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def verify(
 ) -> None:
     """Apply a version to a recording without refitting: its errors, and whether they are as small as expected."""
     from labctl.services.commands.open import open_readonly
-    from labctl.services.criticism.verification import verify_unit
+    from labctl.services.criticism.verification.of_version import verify_unit
 
     with one_clear_line(), open_readonly(database) as store:
         answer = verify_unit(store, serial, version, recording, other_unit=other_unit)

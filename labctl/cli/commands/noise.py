@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.noise_output import print_allan
 from labctl.cli.options import Database, Json, RecordingId
 from labctl.cli.output import print_json
+from labctl.cli.printing.noise import print_allan
 
 
 def allan(

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labctl.cli.campaign_output import print_start
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr, table
+from labctl.cli.printing.campaigns import print_start
 
 if TYPE_CHECKING:
     pass

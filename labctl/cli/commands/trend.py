@@ -11,14 +11,14 @@ from labctl.cli.options import Database, Json, Serial
 from labctl.cli.output import console, format_number, print_json, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.trend import AppliedVersion, TrendResponse
+    from labctl.services.schemas.units import AppliedVersion, TrendResponse
 
 
 def trend(
     serial: Serial,
     version: Annotated[
         int | None,
-        typer.Option("--version", metavar="N", help="Version held against all recordings; default: the first."),
+        typer.Option("--version", metavar="N", help="Version compared with all recordings; default: the first."),
     ] = None,
     limit_dps: Annotated[
         float | None,
@@ -40,7 +40,7 @@ def trend(
 
 
 def _print(answer: TrendResponse) -> None:
-    console.print(f"[bold]{answer.serial}[/], version {answer.version} held against every recording, deg/s RMS")
+    console.print(f"[bold]{answer.serial}[/], version {answer.version} compared with every recording, deg/s RMS")
     rows = table("", "recording", "date", "as found", "as left", f"version {answer.version}", numbers=3)
     for point in answer.points:
         rows.add_row(

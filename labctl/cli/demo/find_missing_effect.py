@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from instruments.clock import VirtualClock
-from labctl.cli.criticism_output import ladder_lines
 from labctl.cli.demo.runner import DemoRunner
+from labctl.cli.printing.criticism import ladder_lines
 from labctl.services.calibrations.revision import improve_unit
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.criticism.ladder import ladder

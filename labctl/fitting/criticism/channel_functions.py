@@ -51,7 +51,7 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
         if name not in NO_CHANNELS and values.dtype.kind in "fiu" and not name.startswith("gyro_")
     }
     channels["table_rate_dps"] = data.nodes.rate_dps(axis)
-    if data.info.motion == "turns":  # no function of the rate can be told from its mean
+    if data.info.motion == "turns":  # no function of the rate can be found from its mean
         del channels["table_rate_dps"]
     return {name: v for name, v in channels.items() if np.all(np.isfinite(v)) and np.ptp(v) > 1e-9 * (1 + abs(v[0]))}
 

@@ -20,7 +20,7 @@ from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.noise_floor import NoiseFloor
 from labctl.fitting.data.static_record import LONG_S, static_record
-from labctl.fitting.data.temperature_channel import with_temperature
+from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.fitting.effects import CATALOGUE, Effect, Term, kind_of
 from labctl.fitting.effects.response import response_of_terms
 from labctl.fitting.estimation.fit import fit_preset

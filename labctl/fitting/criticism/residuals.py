@@ -15,7 +15,7 @@ from labctl.fitting.criticism.evidence.noise_grid import factors
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.noise_floor import NoiseFloor
-from labctl.fitting.data.temperature_levels import ONE_LEVEL_SPAN_C
+from labctl.fitting.data.temperature.levels import ONE_LEVEL_SPAN_C
 from labctl.fitting.numeric.arrays import Array, over
 from labctl.json_types.criticism import FailingRange, WorstDataSet
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.data.rate_profile import RateProfile, Response
-from labctl.fitting.data.temperature_channel import with_stand_in
-from labctl.fitting.data.temperature_history import TemperatureHistory, history_of
+from labctl.fitting.data.temperature.channel import with_stand_in
+from labctl.fitting.data.temperature.history import TemperatureHistory, history_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 

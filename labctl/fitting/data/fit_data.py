@@ -16,8 +16,8 @@ from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.mean_noise import white_var_of
 from labctl.fitting.data.noise_floor import NoiseFloor, noise_floor_of
 from labctl.fitting.data.rate_profile import RateProfile, Response, rate_profile
-from labctl.fitting.data.temperature_channel import with_temperature
-from labctl.fitting.data.temperature_levels import folds, temperature_levels
+from labctl.fitting.data.temperature.channel import with_temperature
+from labctl.fitting.data.temperature.levels import folds, temperature_levels
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.recording import Recording, RecordingInfo, to_points

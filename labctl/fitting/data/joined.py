@@ -1,4 +1,4 @@
-"""Several recordings of one unit as one: columns one below the other, and the column `recording` that tells them apart.
+"""Several recordings of one unit as one: columns one below the other, and the column `recording` with their numbers.
 
 What counts up in each recording (data sets, runs, mountings) goes on counting, so that nothing of two recordings has
 one number; `t_s` runs from the start of the first, and `recording_t_s` is the time within each.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import OWN_DATASET, RECORDING, WITHIN_S
 from labctl.fitting.data.covered import Covered
-from labctl.fitting.data.temperature_channel import with_temperature
+from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.recording import Recording, RecordingInfo, to_points
 
 #: Numbers that go on counting from recording to recording.
@@ -97,7 +97,8 @@ def _require_alike(order: Sequence[int], parts: Mapping[int, Recording]) -> None
         info = parts[number].info
         if info.kind == "coefficients":
             raise BadInput(
-                f"recording {number} of {info.serial} is a table of coefficients; only readings or means go together"
+                f"recording {number} of {info.serial} is a table of coefficients; leave it out; "
+                "only readings or means are fitted together"
             )
         for name in SAME:
             if getattr(info, name) != getattr(first, name):

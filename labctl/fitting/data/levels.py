@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.temperature_levels import temperature_levels
+from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
 
 #: Rates closer than this are one: a share of the rate itself, and no less than a table can hold, deg/s.

@@ -9,9 +9,9 @@ import numpy as np
 from labctl.fitting.data.channels import body_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
+from labctl.recording.motions.turn_means import TIME
+from labctl.recording.motions.turns import USUAL_U_DEG
 from labctl.recording.quantisation import QUANTISATION
-from labctl.recording.turn_means import TIME
-from labctl.recording.turns import USUAL_U_DEG
 
 
 def white_var_of(points: Recording, axis: str) -> Array | None:

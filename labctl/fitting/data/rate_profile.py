@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Columns, dataset_starts
-from labctl.recording.windows import kept_windows, stretch_starts, window_labels
+from labctl.recording.motions.windows import kept_windows, stretch_starts, window_labels
 
 #: Times after which a response has forgotten what was before: time constants, and steps of the readings.
 FORGOTTEN_TAUS, FORGOTTEN_STEPS = 30.0, 256

@@ -17,7 +17,7 @@ from labctl.fitting.data.channels import OWN_DATASET, RECORDING, WITHIN_S, Chann
 from labctl.fitting.data.levels import level_centres, rate_levels
 from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.data.shifts import shift_columns
-from labctl.fitting.data.temperature_levels import temperature_levels
+from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
 
 #: The surface has at most this share of as many columns as there are data sets, and leaves at least so many free.
@@ -33,7 +33,7 @@ LEAST_NEW = 1e-2
 #: Delays and time constants, s, whose mixtures follow any response of a gyro: the surface of a rate that changes.
 DELAYS_S = (1e-3, -1e-3, 3e-3, 1e-2, 2e-2, 5e-2)
 TIME_CONSTANTS_S = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 1.0, 5.0)
-#: The same share for those: they are nearly alike, and what tells them apart is large beside the noise.
+#: The same share for those: they are nearly alike, and what distinguishes them is large beside the noise.
 LEAST_NEW_OF_RESPONSE = 1e-6
 #: What is logged and no cause of an error by itself, or is there in another form.
 NO_SURROUNDINGS = frozenset({
@@ -47,7 +47,7 @@ NO_SURROUNDINGS = frozenset({
 def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
     """Return orthonormal columns (m, k), the most important first; k is at most half of m, and at most m - 8.
 
-    Of turns no law can be told that is not linear in the rate; what is linear is taken in whole, whatever m is.
+    Of turns no law can be found that is not linear in the rate; what is linear is taken in whole, whatever m is.
     """
     if "turn_deg" in channels:
         warm, rate = _chebyshev(channels.temperature_c(axis), max(DEGREES)), channels.rate_dps(axis)[:, None]

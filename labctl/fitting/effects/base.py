@@ -14,7 +14,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from labctl.fitting.data.channels import Carrier, Channels
-from labctl.fitting.data.temperature_history import TemperatureHistory
+from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.models import Origin
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.temperature_history import TemperatureHistory
+from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.json_types.models import Origin
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from labctl.fitting.data.channels import Channels, body_rates
-from labctl.fitting.data.temperature_history import TemperatureHistory
+from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects.base import Column, Effect, Reference, Span, Term
 
 #: Columns that labctl computes itself.

@@ -148,7 +148,10 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
     columns = np.column_stack([design.columns, *(shift.values for shift in design.shifts)])
     rank = rank_of(columns)
     if len(y) <= rank:
-        raise NotEnoughData(f"{len(y)} data sets leave nothing beside {rank} coefficients and shifts of recordings")
+        raise NotEnoughData(
+            f"{len(y)} data sets leave nothing beside {rank} coefficients and shifts of recordings; measure more, or "
+            "leave effects out"
+        )
     taken, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
     left = y - columns @ taken
     return replace(scatter, white_var=np.full(len(y), max(float(left @ left) / (len(y) - rank), 1e-20)))

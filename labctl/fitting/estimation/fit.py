@@ -10,15 +10,15 @@ from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.noise_floor import AxisNoise
-from labctl.fitting.data.temperature_channel import is_chambers
-from labctl.fitting.data.temperature_history import TemperatureHistory
+from labctl.fitting.data.temperature.channel import is_chambers
+from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.coefficient_tables import from_coefficients
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held_out import held_out_errors
 from labctl.fitting.estimation.held_out_legs import errors_by_leg
-from labctl.fitting.estimation.joint import joint_findings
+from labctl.fitting.estimation.joint.findings import joint_findings
 from labctl.fitting.estimation.of_poses import of_poses
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult

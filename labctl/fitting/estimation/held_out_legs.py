@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import LabctlError
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.legs import legs_of
+from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.error_metrics import rms
 from labctl.fitting.estimation.requirements import require_enough_data

@@ -59,8 +59,8 @@ def next_response(before: Response, wanted: Response, model: ErrorModel, u_s: fl
     """Return the response of the next step, at most 1 s; `u_s` is the time constant's standard uncertainty before, s.
 
     Beside a delay only the square of a time constant T is seen near 0, where a change of the one is a change of the
-    other. T times u(T) is half the uncertainty of that square, so the root of it is the least T that can be told from
-    0: nearer to 0 a step does not go, and T comes out as half of that with all of it as its u.
+    other. T times u(T) is half the uncertainty of that square, so the root of it is the least T that differs visibly
+    from 0: nearer to 0 a step does not go, and T comes out as half of that with all of it as its u.
     """
     if TimeDelay.id not in model.effect_ids or Bandwidth.id not in model.effect_ids:
         return _within_reach(wanted)

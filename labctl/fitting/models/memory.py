@@ -14,7 +14,7 @@ import numpy as np
 
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
-from labctl.fitting.data.temperature_history import LoggedColumns, TemperatureHistory, lag_shares, rounded_plays
+from labctl.fitting.data.temperature.history import LoggedColumns, TemperatureHistory, lag_shares, rounded_plays
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.models.fitted_model import FittedModel, without
 from labctl.fitting.numeric.arrays import Array

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.temperature_levels import level_means
+from labctl.fitting.data.temperature.levels import level_means
 from labctl.fitting.effects import Reference, Term, parse_term
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
@@ -109,7 +109,7 @@ def _turns(data: FitData) -> tuple[ErrorModel, Rows]:
 
 
 def _rests_both_ways(data: FitData) -> bool:
-    """Whether every body axis that is used rested pointing up, and pointing down: gravity is then told from bias."""
+    """Whether every body axis that is used rested pointing up, and pointing down: gravity then differs from bias."""
     still = data.channels.table_rate_dps() == 0
     position = np.asarray(data.channels["position"]).astype(np.str_)
     used = {*data.info.axes, *np.char.lstrip(position, "-").tolist()}
@@ -123,7 +123,7 @@ POSES = "poses"
 def _poses(data: FitData) -> tuple[ErrorModel, Rows]:
     raise BadInput(
         f"{data.info.serial}: model {POSES} takes a recording with motion = 'poses'; this one says motion = "
-        f"{data.info.motion!r}"
+        f"{data.info.motion!r}; choose another model"
     )
 
 

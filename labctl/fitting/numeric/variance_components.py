@@ -47,7 +47,7 @@ class Component:
     u: float  #: half of its central 68 %
     low: float  #: 95 %, from
     high: float  #: to
-    groups: int  #: independent effects that it was estimated from, less those the fit takes up
+    groups: int  #: independent effects that it was estimated from, less those that the fit uses
     p_value: float  #: of effects as large as these from noise alone
 
 

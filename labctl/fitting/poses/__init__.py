@@ -1,1 +1,1 @@
-"""Calibration by hand: a gyro turned between rests that gravity tells apart (Tedaldi, Pretto, Menegatti, ICRA 2014)."""
+"""Calibration by hand: a gyro turned between rests in many poses (Tedaldi, Pretto, Menegatti, ICRA 2014)."""

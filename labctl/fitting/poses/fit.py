@@ -62,7 +62,9 @@ def fit_poses(recording: Recording) -> PosesFit:
 def _moves(readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, bias: Bias) -> Moves:
     """Return the moves, with what the specific force adds to the output taken off."""
     if len(rests) < 2:
-        raise NotEnoughData(f"{readings.info.serial}: one rest, and so no turn between rests")
+        raise NotEnoughData(
+            f"{readings.info.serial}: one rest, and so no turn between rests; record rests in many poses"
+        )
     force_g = corrected(readings.accel_g, accelerometer.errors, accelerometer.bias_g)
     return moves_between(readings, rests, readings.gyro_dps - force_g @ bias.per_g.T)
 

@@ -35,7 +35,7 @@ def held_out_moves(equations: Equations, covariance: NDArray[np.float64], used: 
     """Return what each of m moves is off from what coefficients fitted to the used ones, mask (m,), without it say.
 
     `covariance` (2m, 2m) is that of the residuals. The fit without a used move is that to all with two unknowns more,
-    which take up the whole of its residual, so none has to be made again.
+    which absorb the whole of its residual, so none has to be made again.
     """
     rows = np.repeat(used, 2)
     jacobian, residual = equations.jacobian[rows], equations.residual[rows]

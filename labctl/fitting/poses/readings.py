@@ -48,22 +48,25 @@ def readings_of(recording: Recording) -> PoseReadings:
     info, serial = recording.info, recording.info.serial
     if info.motion != "poses":
         raise BadInput(
-            f"{serial}: model poses takes a recording with motion = 'poses'; this one says motion = {info.motion!r}"
+            f"{serial}: model poses takes a recording with motion = 'poses'; this one says motion = {info.motion!r}; "
+            "choose another model"
         )
     if info.kind != "samples":
-        raise BadInput(f"{serial}: poses need every reading of the turns (kind = 'samples'), not {info.kind!r}")
+        raise BadInput(
+            f"{serial}: poses need every reading of the turns (kind = 'samples'), not {info.kind!r}; import them"
+        )
     absent = [axis for axis in AXES if axis not in info.axes]
     if absent:
         raise BadInput(
             f"{serial}: poses need gyros about x, y and z, since a turn by hand is about all three; the recording has "
-            f"no column gyro_{absent[0]}"
+            f"no column gyro_{absent[0]}; add it"
         )
     columns = recording.columns
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     if np.count_nonzero(valid) < LEAST_READINGS:
         raise NotEnoughData(
             f"{serial}: the recording has {np.count_nonzero(valid)} valid readings; rests and turns take at least "
-            f"{LEAST_READINGS}"
+            f"{LEAST_READINGS}; record more"
         )
     warm = temperature_of(columns)
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]

@@ -39,7 +39,7 @@ class _Strict(BaseModel):
 
 
 class FileKeys(_Strict):
-    """How a text file is to be divided; what is left out is found by looking at the file."""
+    """How a text file is to be divided; what is left out is found from the file."""
 
     separator: Literal[",", ";", "tab", "space", "|"] | None = None
     decimal: Literal[".", ","] | None = None
@@ -132,7 +132,7 @@ class ColumnMap(_Strict):
     started_at: AwareDatetime | None = None
     sample_rate_hz: float | None = Field(default=None, gt=0)
     file: FileKeys = FileKeys()
-    columns: dict[str, MappedColumn] = Field(default_factory=dict)  #: none: as proposed by looking at the file
+    columns: dict[str, MappedColumn] = Field(default_factory=dict)  #: none: as proposed from the file
     units: dict[Quantity, UnitKeys] = Field(default_factory=dict)
     constants: Part = Part()
     datasets: DataSets = DataSets()

@@ -12,7 +12,7 @@ from labctl.recording.info import Motion, RecordingInfo
 from labctl.recording.recording import Columns
 
 Array = NDArray[np.float64]
-#: Poses that gravity tells apart, from which on a gyro can be calibrated by them (imu_tk asks for 9 and more).
+#: Poses that gravity distinguishes, from which on a gyro can be calibrated by them (imu_tk asks for 9 and more).
 LEAST_POSES = 6
 
 

@@ -74,7 +74,7 @@ def rests(found: Movement, t_s: Array) -> list[tuple[int, int]]:
 
 
 def poses(found: Movement, t_s: Array, accel_g: Array) -> int:
-    """Return in how many poses that gravity tells apart the unit rested, from the specific force (n, 3)."""
+    """Return in how many poses that gravity distinguishes the unit rested, from the specific force (n, 3)."""
     directions: list[Array] = []
     for a, b in rests(found, t_s):
         mean = np.nanmean(accel_g[a:b], axis=0)

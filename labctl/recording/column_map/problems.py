@@ -1,4 +1,4 @@
-"""Everything that is wrong with a file, gathered, so that one look at it mends all."""
+"""Everything that is wrong with a file, gathered, so that all of it can be corrected at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A column map proposed by looking at a log: names, units in names, values, and steps of time."""
+"""A column map proposed from a log: names, units in names, values, and steps of time."""
 
 from __future__ import annotations
 

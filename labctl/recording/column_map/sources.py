@@ -26,7 +26,7 @@ def source(table: RawTable, named: str | int) -> RawColumn | None:
 
 
 def sources(table: RawTable, column_map: ColumnMap, problems: Problems) -> dict[str, RawColumn]:
-    """Return the file's column behind each of a recording's; what is not there, or stands twice, is a problem."""
+    """Return the file's column behind each of a recording's; what is not there, or occurs twice, is a problem."""
     found: dict[str, RawColumn] = {}
     used = defaultdict(list)
     for target, mapped in column_map.columns.items():

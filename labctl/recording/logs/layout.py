@@ -13,7 +13,7 @@ from labctl.recording.column_map.model import SEPARATORS, FileKeys
 from labctl.recording.logs.encoding import encoding_of
 from labctl.recording.raw_table import FileLayout
 
-#: Lines that are looked at.
+#: Lines that are inspected.
 LOOKED_AT = 200
 #: The longest line that readings stand in.
 LONGEST_LINE = 1 << 15

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate
 
-#: Stretches of a data set that are looked at, and readings of each.
+#: Stretches of a data set that are inspected, and readings of each.
 STRETCHES, READINGS = 500, 4
 #: An output may be late by this long, s, and this many readings early.
 LATEST_S, EARLIEST = 0.25, 10

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.info import RecordingInfo
+from labctl.recording.motions.turn_means import rates_as_turned
+from labctl.recording.motions.turns import USUAL_U_DEG
 from labctl.recording.points import dataset_starts, temperature_of
 from labctl.recording.quantisation import codes_of
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.sanity.blocks import NO_CHANGE, level_change, noise_of_reading, wander
 from labctl.recording.sanity.profile import lag_of, stretches
-from labctl.recording.turn_means import rates_as_turned
-from labctl.recording.turns import USUAL_U_DEG
 
 #: Time steps longer than this many usual ones, and than so many seconds, are a gap.
 GAP_STEPS, GAP_S = 5.0, 0.5

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.motions.turns import USUAL_U_DEG
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.summary import Summary
-from labctl.recording.turns import USUAL_U_DEG
 
 #: Share of a turn that may be off beside two more turns of its axis, beside turns of other axes, and alone.
 OFF_SAME, OFF_OTHERS, OFF_ALONE = 0.05, 0.1, 0.15

@@ -7,7 +7,7 @@ import numpy as np
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
-from labctl.fitting.data.temperature_channel import STAND_IN_C
+from labctl.fitting.data.temperature.channel import STAND_IN_C
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array

@@ -8,7 +8,7 @@ from dataclasses import asdict
 import numpy as np
 
 from labctl.calibration import Calibration, read_calibration
-from labctl.fitting.data.temperature_channel import STAND_IN_C
+from labctl.fitting.data.temperature.channel import STAND_IN_C
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.uncertainty import COVERAGE, AxisEvidence, RateUncertainty, rate_uncertainty
 from labctl.services.schemas.uncertainty import AxisUncertainty, UncertaintyGrid, UncertaintyResponse

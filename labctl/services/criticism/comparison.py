@@ -21,7 +21,7 @@ from labctl.fitting.data.levels import level_centres, rate_levels, temperature_r
 from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.answers import ComparisonJson
 from labctl.services.criticism.model_lines import lines_over
-from labctl.services.criticism.verification import applied_errors
+from labctl.services.criticism.verification.of_version import applied_errors
 from labctl.services.recordings.loading import newest_row, points_of
 from labctl.services.schemas.comparison import ComparisonColumns, ComparisonResponse
 from labctl.store import Store

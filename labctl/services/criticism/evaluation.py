@@ -17,7 +17,7 @@ from labctl.progress import report_stage
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.report_text import answer_of, with_warnings
 from labctl.services.criticism.residuals import residual_columns
-from labctl.services.criticism.verification import verify
+from labctl.services.criticism.verification.of_version import verify
 from labctl.services.effects import catalogue_with
 from labctl.services.recordings.inspection import refuse_wrong
 from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse, VerificationResponse

@@ -15,9 +15,9 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.trend_line import LEAST_POINTS, TrendLine, trend_line
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.criticism.verification import LARGEST_RATIO, applied_errors, verify
+from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, verify
 from labctl.services.criticism.versions import version_of
-from labctl.services.schemas.trend import AppliedVersion, AxisPoint, Drift, Leaving, TrendPoint, TrendResponse
+from labctl.services.schemas.units import AppliedVersion, AxisPoint, Drift, Leaving, TrendPoint, TrendResponse
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 YEAR = timedelta(days=365.25)
@@ -34,7 +34,7 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
     rows = sorted(store.calibrations.of_unit(store.units.get(serial).serial), key=lambda row: row.version)
     reference = version_of(store, serial, version if version is not None or not rows else rows[0].version)
     if limit_dps is not None and not (math.isfinite(limit_dps) and limit_dps > 0):
-        raise BadInput(f"limit {limit_dps} deg/s: must be a number above 0")
+        raise BadInput(f"limit {limit_dps} deg/s: give a number above 0")
     measured = sorted(
         (
             row

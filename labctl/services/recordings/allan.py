@@ -32,8 +32,8 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanRespon
     info = RecordingInfo.model_validate(head.info)
     if info.motion == "poses":
         raise BadInput(
-            f"recording {recording} is in poses, turned by hand between rests: for an Allan deviation import one long "
-            "rest of it with motion = 'rest'"
+            f"recording {recording} is in poses, turned by hand between rests, and has no Allan deviation; import one "
+            "long rest of it with motion = 'rest'"
         )
 
     def work() -> AllanResponse:

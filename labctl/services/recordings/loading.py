@@ -107,7 +107,7 @@ def chosen_rows(
     if recording is not None and wanted and wanted != [recording]:
         raise BadInput(f"recording {recording} and recordings {', '.join(map(str, wanted))}: say one of the two")
     if len(wanted) > MOST_TOGETHER:
-        raise BadInput(f"{len(wanted)} recordings; at most {MOST_TOGETHER} are fitted together")
+        raise BadInput(f"{len(wanted)} recordings; at most {MOST_TOGETHER} are fitted together; name fewer")
     if len(wanted) < 2:
         return (newest_row(store, serial, wanted[0] if wanted else recording, other_unit=other_unit),)
     return tuple(newest_row(store, serial, number, other_unit=other_unit) for number in wanted)

@@ -1,4 +1,4 @@
-"""Logs that are sent over HTTP: staged under their own names, looked at, imported, and gone."""
+"""Logs that are sent over HTTP: staged under their own names, inspected, imported, and gone."""
 
 from __future__ import annotations
 

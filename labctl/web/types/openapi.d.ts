@@ -108,6 +108,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/trend": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A unit's calibrations over the years
+         * @description As found and as left by recording, drift per year with its uncertainty, and when the bias leaves the limit.
+         */
+        get: operations["trend_api_units__serial__trend_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/benches": {
         parameters: {
             query?: never;
@@ -524,26 +544,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/units/{serial}/trend": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * A unit's calibrations over the years
-         * @description As found and as left by recording, drift per year with its uncertainty, and when the bias leaves the limit.
-         */
-        get: operations["trend_api_units__serial__trend_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/units/{serial}/calibrations/{version}/certify": {
         parameters: {
             query?: never;
@@ -558,8 +558,7 @@ export interface paths {
          * @description Put a version in force: who, why, and when the next calibration is due. An older version again is a rollback.
          *
          *     The verdict is stored with the certification. 409 where there are objections, unless `override` is set and the
-         *     reason is
-         *     a sentence. Needs an approver's key.
+         *     reason is a sentence. Needs an approver's key.
          */
         post: operations["certify_api_units__serial__calibrations__version__certify_post"];
         delete?: never;
@@ -903,7 +902,7 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Look at a log
+         * Preview a log
          * @description The proposed map of a log, or what it becomes by the map that is sent; its first rows, traces, and everything
          *     that is wrong. Nothing of it is kept.
          */
@@ -1322,7 +1321,7 @@ export interface components {
         };
         /**
          * AppliedVersion
-         * @description A version applied as it is to a recording.
+         * @description A version applied to a recording without refitting.
          */
         AppliedVersion: {
             /** Version */
@@ -3031,7 +3030,7 @@ export interface components {
         };
         /**
          * HeldOutRecording
-         * @description Errors of a fit to all other recordings on this one, applied as it is, deg/s.
+         * @description Errors of a fit to all other recordings on this one, without refitting, deg/s.
          */
         HeldOutRecording: {
             /** Recording */
@@ -5012,7 +5011,7 @@ export interface components {
         };
         /**
          * TrendResponse
-         * @description A version held against all recordings of its unit, in order of time.
+         * @description A version compared with all recordings of its unit, in order of time.
          */
         TrendResponse: {
             /** Serial */
@@ -5470,6 +5469,42 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["UnitResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    trend_api_units__serial__trend_get: {
+        parameters: {
+            query?: {
+                /** @description Version compared with all recordings; default: the first. */
+                version?: number | null;
+                /** @description Limit of the bias, deg/s; default: twice the error that it states. */
+                limit_dps?: number | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TrendResponse"];
                 };
             };
             /** @description Validation Error */
@@ -6170,42 +6205,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LadderResponse"];
-                };
-            };
-            /** @description Validation Error */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["HTTPValidationError"];
-                };
-            };
-        };
-    };
-    trend_api_units__serial__trend_get: {
-        parameters: {
-            query?: {
-                /** @description Version held against all recordings; default: the first. */
-                version?: number | null;
-                /** @description Limit of the bias, deg/s; default: twice the error that it states. */
-                limit_dps?: number | null;
-            };
-            header?: never;
-            path: {
-                serial: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TrendResponse"];
                 };
             };
             /** @description Validation Error */

@@ -1,4 +1,4 @@
-"""HTTP: a log is looked at, and imported by its map; whatever is sent, one problem document."""
+"""HTTP: a log is inspected, and imported by its map; whatever is sent, one problem document."""
 
 from __future__ import annotations
 

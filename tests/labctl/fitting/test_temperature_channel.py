@@ -18,8 +18,8 @@ from labctl.fitting.criticism import criticise
 from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.static_record import static_record
-from labctl.fitting.data.temperature_channel import with_temperature
-from labctl.fitting.data.temperature_history import history_of
+from labctl.fitting.data.temperature.channel import with_temperature
+from labctl.fitting.data.temperature.history import history_of
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording, RecordingInfo, to_points
 from labctl.recording.points import with_pieces

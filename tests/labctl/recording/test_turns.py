@@ -11,7 +11,7 @@ import pytest
 from labctl.errors import BadRecording
 from labctl.recording import Recording, RecordingInfo, to_points
 from labctl.recording.checks import checked
-from labctl.recording.turn_means import trapezoidal_mean
+from labctl.recording.motions.turn_means import trapezoidal_mean
 from studies.hand_turns import Unit, measured
 from tests.helpers.recordings import STARTED
 

@@ -12,7 +12,7 @@ from labctl.fitting.criticism.reduction.points import reduce_points
 from labctl.fitting.criticism.reduction.profile import reduce_profile
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
 from labctl.fitting.criticism.reduction.samples import reduce_samples
-from labctl.fitting.data.temperature_channel import with_temperature
+from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.recording import Recording
 
 __all__ = ["LEAST_INDEPENDENT_SHARE", "OUTLIER", "STEP_LINES", "ReducedRecording", "decimate", "reduce_recording"]

@@ -11,8 +11,8 @@ from labctl.fitting.criticism.reduction.decimation import FASTEST_HZ
 from labctl.fitting.criticism.reduction.rectangular import Padded
 from labctl.fitting.data.channels import OWN_DATASET, RECORDING, Channels, body_rates
 from labctl.fitting.data.earth import up_rate_dps
-from labctl.fitting.data.temperature_channel import with_stand_in
-from labctl.fitting.data.temperature_history import history_of
+from labctl.fitting.data.temperature.channel import with_stand_in
+from labctl.fitting.data.temperature.history import history_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 

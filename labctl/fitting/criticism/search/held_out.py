@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.candidates import base_rows, option_of
 from labctl.fitting.criticism.model_comparison import Comparison
-from labctl.fitting.data.temperature_levels import folds
+from labctl.fitting.data.temperature.levels import folds
 from labctl.fitting.effects import Effect, Term
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array

@@ -265,9 +265,8 @@ def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray
 def _judged(comparison: Comparison, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Comparison, Step]:
     """Return the judgement; where it is not clearly one effect, it is made again with the leaders' shapes refined."""
     step = judge(comparison, first=first)
-    exact = step.leader is not None and are_exact(step.leader)
-    clear = step.form == "missing" and not exact and not _has_rival(comparison) and not may_be_step(comparison)
-    if step.form == "adequate" or clear:
+    unclear = step.leader is None or are_exact(step.leader) or _has_rival(comparison) or may_be_step(comparison)
+    if step.form == "adequate" or (step.form == "missing" and not unclear):
         return comparison, step
     comparison = with_refined_leaders(comparison, catalogue, NOTICED)
     return comparison, judge(comparison, first=first)
@@ -298,5 +297,4 @@ def _pair(first: Comparison, initial: Comparison, catalogue: Mapping[str, Effect
     if best is None or smooth is None or best[0].log_bf + best[1].log_bf < smooth.log_bf + LEAD:
         return []
     best = _refined_findings(first, best, catalogue)
-    _, step = _compared_beside(first, best, catalogue)
-    return best if step.form == "adequate" else []
+    return best if _compared_beside(first, best, catalogue)[1].form == "adequate" else []

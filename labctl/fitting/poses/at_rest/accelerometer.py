@@ -1,7 +1,7 @@
 """Calibration of the accelerometer by gravity: in every rest the specific force has the same size.
 
 Nine parameters (Tedaldi et al. 2014, eqs. 9 and 10; Skog and Haendel 2006): bias, scale factor and misalignment, with
-the accelerometer's z axis as the body's. The direction of gravity in the body is what the gyro is held against.
+the accelerometer's z axis as the body's. The direction of gravity in the body is what the gyro is compared with.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ def find_rests(readings: PoseReadings) -> Rests:
     if len(readings) < 3 * size:
         raise NotEnoughData(
             f"{readings.info.serial}: the recording lasts {readings.t_s[-1] - readings.t_s[0]:.3g} s, too short for "
-            "rests and turns between them"
+            "rests and turns between them; record longer"
         )
     channels = np.column_stack([readings.accel_g, readings.gyro_dps])
     spread = _spread(channels, size)

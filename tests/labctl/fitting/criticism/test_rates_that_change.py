@@ -20,7 +20,7 @@ SWEEP = sweep(60.0, 0.1, 10.0, 50.0, 100.0)
 
 
 def criticised(recording: Recording, effects: list[str], *, full: bool = False) -> Criticism:
-    """Hold effects against a recording."""
+    """Compare effects with a recording."""
     model, _ = preset_for(None, effects).build(fit_data_of(recording))
     return criticise(recording, model, full=full)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from labctl.fitting.data.legs import legs_of
+from labctl.fitting.data.temperature.legs import legs_of
 
 
 def test_a_loop_has_two_legs_and_noise_none() -> None:

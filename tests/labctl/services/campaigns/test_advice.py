@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
 from labctl.api import create_app
-from labctl.cli.campaign_output import print_campaign
+from labctl.cli.printing.campaigns import print_campaign
 from labctl.services.campaigns import preparation
 from labctl.services.campaigns.advice import DID_NOTHING, DID_SAFE, DID_UNSAFE, FAILURES, LOOK, OTHER, advice_of
 from labctl.services.campaigns.bench_runner import BenchRunner

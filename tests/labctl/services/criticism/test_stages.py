@@ -80,7 +80,8 @@ def test_cancelled_at_any_stage_it_leaves_no_file_and_can_be_asked_again(store: 
 
 def test_a_cached_answer_loads_no_fit() -> None:
     code = """
-import sys, labctl.cli, labctl.services.commands.open, labctl.services.criticism.criticise, labctl.cli.criticism_output
+import sys, labctl.cli, labctl.services.commands.open, labctl.services.criticism.criticise
+import labctl.cli.printing.criticism
 heavy = {"scipy", "pyarrow", "alembic", "labctl.fitting", "instruments.bench"}
 print(*sorted(heavy & set(sys.modules)))
 """

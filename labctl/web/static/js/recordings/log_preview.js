@@ -49,7 +49,7 @@ export function logPreview(file, taken) {
 
   /** @param {MapDocument | string | null} map */
   async function look(map) {
-    setChildren(place, busyIndicator(`Looking at ${file.name}`));
+    setChildren(place, busyIndicator(`Inspecting ${file.name}`));
     try {
       show(await sendFile("/api/recordings/logs/preview", file, fields(map)));
     } catch (error) {

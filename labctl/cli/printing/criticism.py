@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import log10
 from typing import TYPE_CHECKING
 
-from labctl.cli.joint_output import print_joint
 from labctl.cli.output import console, format_number, print_warnings, table
+from labctl.cli.printing.joint import print_joint
 
 if TYPE_CHECKING:
     from labctl.json_types.criticism import ResidualMap, Suspect
@@ -21,7 +21,7 @@ SHADES = " ·░▒▓█"
 
 def print_verification(answer: VerificationResponse) -> None:
     """Print what a version leaves of a recording as it is, axis by axis."""
-    from labctl.services.criticism.verification_text import verification_sentence
+    from labctl.services.criticism.verification.text import verification_sentence
 
     console.print(verification_sentence(answer), markup=False, soft_wrap=not console.is_terminal)
     rows = table("", "axis", "RMS deg/s", "largest", "mean", numbers=3)
@@ -34,25 +34,15 @@ def print_verification(answer: VerificationResponse) -> None:
 def print_criticism(answer: CriticismResponse) -> None:
     """Print a criticism: the version without refitting, the verdict on its model refitted, the errors, a small
     map, a table."""
-    from labctl.services.criticism.verification_text import verification_sentence
-
     whole = not console.is_terminal  # a program that reads lines gets each sentence on one
-    if answer.applied is not None and not answer.applied.seen:
-        console.print(
-            verification_sentence(answer.applied),
-            style=None if answer.applied.ok else "red",
-            markup=False,
-            soft_wrap=whole,
-        )
-        console.print(f"Refitted to recording {answer.recording}:", markup=False)
+    _print_applied(answer, whole=whole)
     for line in answer.text:
         console.print(line, style="bold" if line is answer.text[0] else None, markup=False, soft_wrap=whole)
     error = answer.error
     of = ", ".join(map(str, answer.recordings or [answer.recording]))
     console.print(
         f"{answer.serial} version {answer.version}, recording {of}: residual "
-        f"{format_number(error['rms_dps'])} deg/s RMS,"
-        f" "
+        f"{format_number(error['rms_dps'])} deg/s RMS, "
         f"held-out {format_number(error['heldout_rms_dps'])}, noise floor {format_number(error['noise_floor_dps'])}",
         style="dim",
     )
@@ -82,6 +72,17 @@ def print_criticism(answer: CriticismResponse) -> None:
         fitted = {each["effect"] for each in answer.suspects if each["rms_after_dps"] is not None}
         first = next((name for name in answer.named if name in fitted), answer.named[0])
         console.print(f"next: labctl improve {answer.serial} --add {first}", style="dim", markup=False)
+
+
+def _print_applied(answer: CriticismResponse, *, whole: bool) -> None:
+    """Print what the version leaves of a recording that it was not fitted to."""
+    from labctl.services.criticism.verification.text import verification_sentence
+
+    if answer.applied is None or answer.applied.seen:
+        return
+    style = None if answer.applied.ok else "red"
+    console.print(verification_sentence(answer.applied), style=style, markup=False, soft_wrap=whole)
+    console.print(f"Refitted to recording {answer.recording}:", markup=False)
 
 
 def _not_testable(answer: CriticismResponse) -> list[str]:

@@ -1,6 +1,6 @@
 """Turns by a known angle: one turn in each data set, with its uncertainty, as a mean rate over the data set.
 
-Nothing but the mean of the rate is known, so what is not linear in the rate cannot be told from turns.
+Nothing but the mean of the rate is known, so what is not linear in the rate cannot be found from turns.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
 from labctl.recording.info import RecordingInfo
+from labctl.recording.motions.turn_means import LEAST
 from labctl.recording.points import dataset_starts
 from labctl.recording.recording import Columns
-from labctl.recording.turn_means import LEAST
 
 #: Standard uncertainty of a turn, deg, where a recording has no turn_u_deg: a hand that stops at an edge or a line.
 USUAL_U_DEG = 1.0

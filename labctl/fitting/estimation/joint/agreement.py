@@ -57,7 +57,7 @@ def agreement_of(
     """Return how well recordings agree on each effect of the unit's model, and why not where they cannot be compared.
 
     Each is weighted by the noise of the fit to all of them, `together`: one alone may take its drift for too small.
-    The chi2 of an effect that is shifted from recording to recording is given with and without what a shift takes up.
+    The chi2 of an effect that is shifted from recording to recording is given with and without what a shift explains.
     """
     fits: dict[int, Mapping[str, AxisFit]] = {}
     for number, alone in of_each_recording(data).items():

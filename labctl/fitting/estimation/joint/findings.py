@@ -10,9 +10,9 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.joined import recordings_in
 from labctl.fitting.data.shifts import KINDS, ShiftKind, shifts_of
-from labctl.fitting.estimation.agreement import agreement_of, of_each_recording
 from labctl.fitting.estimation.axis_solutions import AxisSolutions, fit_turning, residuals, solve_axes
 from labctl.fitting.estimation.error_metrics import rms
+from labctl.fitting.estimation.joint.agreement import agreement_of, of_each_recording
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import FittedModel

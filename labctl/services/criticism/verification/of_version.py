@@ -14,7 +14,7 @@ from labctl.errors import BadInput
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.recording import Recording
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.criticism.pose_verification import errors_in_poses
+from labctl.services.criticism.verification.of_poses import errors_in_poses
 from labctl.services.criticism.versions import version_of
 from labctl.services.recordings.loading import motion_of, newest_row, source_of
 from labctl.services.schemas.criticism import AxisVerification, VerificationResponse

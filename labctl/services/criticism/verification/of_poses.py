@@ -27,7 +27,7 @@ def errors_in_poses(
     if set(calibration.axes) != set(AXES):
         raise BadInput(
             f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}; a turn "
-            "by hand is about x, y and z"
+            "by hand is about x, y and z; name a recording of another motion"
         )
     compensator = Compensator(calibration)
     readings = readings_of(recording)
@@ -51,7 +51,7 @@ def _temperature(calibration: Calibration, readings: PoseReadings) -> Array:
     if np.isfinite(calibration.temperature_c[1]):
         raise BadInput(
             f"{calibration.serial} version {calibration.version} depends on the temperature; the recording has no "
-            "column temperature_c"
+            "column temperature_c; add it"
         )
     return np.full(len(readings), ANY_C)
 
@@ -61,5 +61,5 @@ def _channels(compensator: Compensator, recording: Recording) -> dict[str, Array
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     absent = [name for name in compensator.needs if name not in columns]
     if absent:
-        raise BadInput(f"the model needs channel {absent[0]!r}, which the recording does not have")
+        raise BadInput(f"the model needs channel {absent[0]!r}, which the recording does not have; add it")
     return {name: np.asarray(columns[name], dtype=np.float64)[valid] for name in compensator.needs}

@@ -1,0 +1,1 @@
+"""Verification: a version applied to a recording without refitting."""
