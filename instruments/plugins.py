@@ -70,7 +70,7 @@ def summary(error: BaseException) -> str:
 
 def failure(plugin: Plugin, what: str, error: BaseException) -> str:
     """Return one line about an error that a plug-in raised while it did `what`."""
-    remedy = "install labctl again" if plugin.is_own else f"repair or uninstall  {plugin.distribution}"
+    remedy = "install labctl again" if plugin.is_own else f"repair or uninstall {plugin.distribution}"
     return f"{plugin}: cannot {what}: {summary(error)}; {remedy}"
 
 

@@ -23,20 +23,20 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @pytest.fixture(scope="session")
-def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of this run, the same in all of its workers."""
     own = tmp_path_factory.getbasetemp()
     return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
 
 
 @pytest.fixture(autouse=True)
-def cache(shared: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+def cache(run_folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Each test its own kept answers: nothing is taken from the user's cache, and nothing goes there.
 
     Walks through plans are kept for all tests: their files are named by all that they depend on.
     """
     folder = tmp_path_factory.mktemp("cache", numbered=True)
-    walks = shared / "walks"
+    walks = run_folder / "walks"
     for place in (walks, folder / "labctl"):
         place.mkdir(mode=0o700, exist_ok=True)
     (folder / "labctl" / "walks").symlink_to(walks, target_is_directory=True)

@@ -18,7 +18,7 @@ API = "/api/"
 #: Answered without a key: a load balancer asks the first, every open page the second.
 OPEN = frozenset({"/health", "/health/heartbeat"})
 #: Queries that are sent by POST because of what they carry: nothing changes, so a viewer may.
-ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview")
+ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview", "/api/recordings/logs/preview")
 _ASKED = re.compile("|".join(re.sub(r"{\w+}", "[^/]+", path) for path in ASKING))
 #: Where files are sent: a recording, a log, and a log to preview.
 UPLOAD = "/api/recordings"

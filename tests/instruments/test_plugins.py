@@ -75,7 +75,7 @@ def test_one_that_cannot_be_loaded_gives_one_line_and_takes_nothing_else_down(
     line = str(caught.value)
     assert "entry point 'bad' (acme_bad:VALUE) of acme-bad 0.3 in group labctl.widgets" in line
     assert error in line
-    assert line.endswith("; mend or uninstall acme-bad")
+    assert line.endswith("; repair or uninstall acme-bad")
     assert "\n" not in line
     for _ in range(2):
         assert group.all() == {"good": 7}

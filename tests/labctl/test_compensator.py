@@ -85,7 +85,7 @@ def test_the_file_survives_the_way_to_disk(any_calibration: Calibration, tmp_pat
     ("spoil", "said"),
     [
         (lambda text: text.replace('"version":1', '"version":7'), "was edited or damaged"),
-        (lambda text: text[: len(text) // 2], "interrupted"),
+        (lambda text: text[: len(text) // 2], "truncated"),
         (lambda text: text.replace("labctl-calibration/1", "labctl-calibration/9"), "this labctl reads"),
         (lambda _: "[]", "schema None"),
     ],

@@ -68,7 +68,7 @@ def nested_tables(text: str) -> str:
         (lambda text: text.replace('"version":1', '"version":1e999'), "not JSON"),
         (lambda text: text.replace('"version":1', f'"version":{"1" * 5000}'), "4300 digits"),
         (lambda text: text.replace('"version":1', '"version":"\\ud800"'), "not JSON"),
-        (lambda text: text + " " * (65 << 20), "larger than 67108864 bytes"),
+        (lambda text: text + " " * (65 << 20), "larger than the limit of 67108864 bytes"),
         (
             lambda text: text.replace('"labctl-calibration/1"', json.dumps("x" * 10_000)),
             "schema 'x{79}, this labctl reads",

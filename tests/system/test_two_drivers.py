@@ -22,7 +22,7 @@ def test_the_second_is_refused_and_takes_over_when_the_first_is_killed(simulator
     first = simulator.drive(FIRST_DPS, "lab.sqlite")
     simulator.wait_for("!1m1")
     first.send_signal(signal.SIGSTOP)  # it hangs, while its table turns: nothing that it could do ends this by itself
-    held = f"bench single-axis-sim is held by process {first.pid} on "
+    held = f"bench single-axis-sim is in use by process {first.pid} on "
     assert held in simulator.refused("lab.sqlite")
     # another database knows nothing of that lease, but the ports are taken
     said = simulator.refused("other.sqlite")

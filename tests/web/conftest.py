@@ -22,9 +22,9 @@ ARGUMENTS = (
 
 
 @pytest.fixture(autouse=True)
-def cache(shared: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def cache(run_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """All pages share their kept answers: the same criticism is worked out once, as it is for a person."""
-    kept = shared / "pages"
+    kept = run_folder / "pages"
     kept.mkdir(mode=0o700, exist_ok=True)
     monkeypatch.setenv("XDG_CACHE_HOME", str(kept))
     return kept

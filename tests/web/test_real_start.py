@@ -69,6 +69,6 @@ def test_a_start_that_needs_a_person_at_night_is_warned_of_and_a_better_one_prop
     asked.get_by_role("button", name="I confirm it for that time").click()
     page.wait_for_url("**/campaigns")
     entry = page.get_by_role("region", name="Schedule").first
-    expect(entry).to_contain_text("Ann makes sure that the bench is clear")
+    expect(entry).to_contain_text("Ann confirmed that the bench will be clear")
     expect(entry).to_contain_text("needs a person at")
     assert service.get("/api/schedule")[0]["confirmed_by"] == "Ann"

@@ -32,7 +32,7 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
 
     learn = page.get_by_role("region", name="Which effects are missing")
     learn.get_by_role("button", name="Draw").first.click()
-    expect(learn).to_contain_text("what scale factor asymmetry would explain")
+    expect(learn).to_contain_text("the part of the residual that scale factor asymmetry would explain")
     learn.get_by_role("button", name="Add", exact=True).first.click()
     adding = page.get_by_role("region", name="Add it")
     expect(adding).to_contain_text("Left after the fit")

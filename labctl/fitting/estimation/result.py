@@ -68,7 +68,6 @@ class FitResult:
         }
         if self.poses is not None:
             found["poses"] = self.poses
-        return found
         if self.joint is not None:
             found["joint"] = self.joint
         return found

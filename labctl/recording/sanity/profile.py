@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate
 
 #: Stretches of a data set that are inspected, and readings of each.
 STRETCHES, READINGS = 500, 4
@@ -32,6 +31,7 @@ def lag_of(rate_dps: NDArray[np.float64], output: NDArray[np.float64], step_s: f
         return 0
     latest = int(min(LATEST_S / max(step_s, 1e-9), n // 4))
     lags = np.arange(-min(EARLIEST, n // 4), latest + 1)
-    agree = np.abs(correlate(values, rate, mode="full", method="fft")[n - 1 + lags])
+    spectrum = np.fft.rfft(values, 2 * n) * np.fft.rfft(rate, 2 * n).conj()
+    agree = np.abs(np.fft.irfft(spectrum, 2 * n)[lags])  # by lag: a negative one counts from the end
     good = lags[agree >= NEARLY * agree.max()]
     return int(good[np.argmin(np.abs(good))])

@@ -129,7 +129,7 @@ def _residuals(change: _Change) -> ResidualColumns:
     found = replace(
         criticise(change.measured.readings, model, CATALOGUE, points=change.points, full=False), base=change.after
     )
-    return residual_columns(found.data, found.residuals, change.points, change.after)
+    return residual_columns(found.data, found.residuals, change.points, change.measured.row.id, change.after)
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:

@@ -22,7 +22,7 @@ T = TypeVar("T")
 #: How many durations the estimate for `Retry-After` is made from, and what is taken for one before the first, s.
 REMEMBERED, FIRST_GUESS_S = 16, 5.0
 LONGEST_RETRY_S = 300
-WAITING = "waiting for {n} earlier computations"
+WAITING = "waiting for earlier computations: {n}"
 ENDS = "the service is stopping; try again when it runs again"
 
 

@@ -40,7 +40,7 @@ def evaluate(
         what = f"criticism of version {calibration.version} on {measured.named}"
         refuse_wrong(warnings, what, accepted=False, insist=f"; without refitting, {error}")
         raise
-    columns = residual_columns(found.data, found.residuals, measured.points, found.base)
+    columns = residual_columns(found.data, found.residuals, measured.points, measured.row.id, found.base)
     serial, version = calibration.serial, calibration.version
     experiments = _experiments(store, measured.row.campaign, found)
     criticism = answer_of(serial, version, measured.recordings, found, experiments)
@@ -68,7 +68,7 @@ def _experiments(store: Store, campaign: int | None, found: Criticism) -> list[E
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:
     """Return the version without refitting on the recording, of several the newest; None where it cannot be applied."""
     try:
-        return verify(store, calibration, Measurements(store, (measured.row,)))
+        return verify(store, calibration, measured.newest)
     except LabctlError:
         return None
 

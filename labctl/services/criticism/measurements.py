@@ -18,7 +18,7 @@ from labctl.recording import Recording
 from labctl.recording.output_steps import per_reading, quantisation_of
 from labctl.services.recordings.coverage import covered_of
 from labctl.services.recordings.inspection import inspect_stored
-from labctl.services.recordings.loading import is_profile, points_of, readings_question, source_of
+from labctl.services.recordings.loading import is_profile, motion_of, points_of, readings_question, source_of
 from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 
@@ -56,9 +56,15 @@ class Measurements:
         return joined_recording(self.of_each)
 
     @property
+    def newest(self) -> Measurements:
+        """The newest of several recordings; itself where there is one."""
+        return self if len(self.rows) == 1 else Measurements(self.store, (self.row,))
+
+    @property
     def source(self) -> Recording:
         """What a fit takes: the means, or of one recording in poses its readings. Raises BadInput."""
-        return source_of(self.store, self.row) if len(self.rows) == 1 else self.points
+        is_by_hand = len(self.rows) == 1 and motion_of(self.row) == "poses"
+        return source_of(self.store, self.row) if is_by_hand else self.points
 
     @cached_property
     def inspections(self) -> Mapping[int, RecordingInspection]:

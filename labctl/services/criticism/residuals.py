@@ -17,16 +17,17 @@ from labctl.services.schemas.criticism import ResidualColumns
 
 
 def residual_columns(
-    data: ReducedRecording, left: Mapping[str, Residuals], points: Recording, base: FitResult | None = None
-) -> ResidualColumns:
-    """Return the residuals of a criticism as columns, axis by axis.
+    data: ReducedRecording, left: Mapping[str, Residuals], points: Recording, recording: int,
+    base: FitResult | None = None,
+) -> ResidualColumns:  # fmt: skip
+    """Return the residuals of a criticism as columns, axis by axis; `recording` is the number of a single recording.
 
     Where there was too little for a verdict (`left` is empty) they are those of `base`, a fit to the points.
     """
     if not left:
-        return _of_fit(points, base) if base is not None else ResidualColumns()
+        return _of_fit(points, recording, base) if base is not None else ResidualColumns()
     nodes, first = data.nodes, np.arange(len(data)) * (len(data.nodes) // len(data))
-    shared = _shared(nodes.take(first), data.dataset, points) | {
+    shared = _shared(nodes.take(first), data.dataset, points, recording) | {
         "table_rate_dps": data.at_sets(nodes.table_rate_dps()).tolist(),
         "t_s": data.at_sets(np.asarray(nodes["t_s"], dtype=np.float64)).tolist() if "t_s" in nodes else None,
     }
@@ -39,12 +40,12 @@ def residual_columns(
     return _joined(found)
 
 
-def _of_fit(points: Recording, base: FitResult) -> ResidualColumns:
+def _of_fit(points: Recording, recording: int, base: FitResult) -> ResidualColumns:
     context = fit_data_of(points)
     floor = base.error.noise_floor_dps
     channels = context.channels
     dataset = np.asarray(channels["dataset"], dtype=np.int64)
-    shared = _shared(channels, dataset, points) | {
+    shared = _shared(channels, dataset, points, recording) | {
         "table_rate_dps": channels.table_rate_dps().tolist(),
         "t_s": np.asarray(channels["t_s"]).tolist() if "t_s" in channels else None,
     }
@@ -57,7 +58,7 @@ def _of_fit(points: Recording, base: FitResult) -> ResidualColumns:
     return _joined(found)
 
 
-def _shared(sets: Channels, dataset: np.ndarray, points: Recording) -> dict[str, Any]:
+def _shared(sets: Channels, dataset: np.ndarray, points: Recording, recording: int) -> dict[str, Any]:
     """Return what the rows of all axes have in common; `sets` has one row per data set."""
     known: dict[int, int] = {}
     if "n" in points.columns:
@@ -67,7 +68,7 @@ def _shared(sets: Channels, dataset: np.ndarray, points: Recording) -> dict[str,
     of = np.rint(np.asarray(sets[RECORDING], dtype=np.float64)).astype(int).tolist() if RECORDING in sets else []
     own = np.rint(np.asarray(sets[OWN_DATASET], dtype=np.float64)).astype(int) if of else dataset
     return {
-        **({"recording": of} if of else {}),
+        "recording": of or [recording] * len(dataset),
         "dataset": own.tolist(),
         "position": [str(there) for there in sets["position"]],
         "run": np.rint(sets["run"]).astype(int).tolist() if "run" in sets else [1] * len(dataset),

@@ -111,7 +111,7 @@ class StageResponse(ResponseModel):
 class ResidualColumns(ResponseModel):
     """One row per data set and axis, as lists of equal length. A data set far longer than the others is in pieces."""
 
-    recording: list[int] = Field(default_factory=list, description="Of several recordings; empty for a single one.")
+    recording: list[int] = Field(default_factory=list, description="Number of the recording.")
     dataset: list[int] = Field(default_factory=list)
     axis: list[str] = Field(default_factory=list)
     position: list[str] = Field(default_factory=list)

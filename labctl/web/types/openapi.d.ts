@@ -4290,7 +4290,7 @@ export interface components {
         ResidualColumns: {
             /**
              * Recording
-             * @description Of several recordings; empty for a single one.
+             * @description Number of the recording.
              */
             recording: number[];
             /** Dataset */

@@ -39,7 +39,7 @@ REACHING = {"src", "href", "srcset", "action", "data", "poster", "ping", "backgr
 @lru_cache(maxsize=1)
 def answer() -> dict[str, Any]:
     found = held(single_axis(1, scale_factor_asymmetry=4e-4), full=True)
-    shown = answer_of("FOG-0001", 3, 7, found, []).model_dump(mode="json")
+    shown = answer_of("FOG-0001", 3, [7], found, []).model_dump(mode="json")
     static = static_record(with_record_at_rest(30, 2e-3))
     assert static is not None
     return {**shown, "noise": {**shown["noise"], "static": static.to_json()}}

@@ -153,7 +153,7 @@ def test_which_verdicts_speak_against_a_version(
     lab: Lab, monkeypatch: pytest.MonkeyPatch, verdict: str, share_removed: float, refused: bool
 ) -> None:
     lab.run("fit", FOG, "--effects", "bias,scale_factor")
-    monkeypatch.setattr(assessment, "criticise_unit", lambda *_: criticism(verdict, share_removed))
+    monkeypatch.setattr(assessment, "criticise_unit", lambda *_, **__: criticism(verdict, share_removed))
     with open_store(str(lab.database), write=False) as store:
         known = assess(store, FOG, 1)
     assert (known.verdict, known.override_needed) == (verdict, refused)
@@ -163,7 +163,7 @@ def test_which_verdicts_speak_against_a_version(
 
 def test_a_version_whose_fit_was_worse_than_none_is_refused(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     lab.run("fit", FOG, "--effects", "bias,scale_factor")
-    monkeypatch.setattr(assessment, "criticise_unit", lambda *_: criticism("adequate", 0.0))
+    monkeypatch.setattr(assessment, "criticise_unit", lambda *_, **__: criticism("adequate", 0.0))
     with open_store(str(lab.database), write=True) as store:
         row = store.calibrations.get(FOG, 1)
         worse = {**row.answer["error"], "raw_rms_dps": 104.9, "rms_dps": 109.4}

@@ -33,6 +33,7 @@ from labctl.store import Store, migrate, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.certifying import OVERRIDE, OVERRIDE_OPTIONS, REASON
 from tests.helpers.paths import EXAMPLES
+from tests.helpers.written_logs import at_rest, csv_text
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
@@ -206,6 +207,10 @@ def upload(client: TestClient) -> Any:
     return client.post("/api/recordings", files=files)
 
 
+def upload_log(client: TestClient) -> Any:
+    return client.post("/api/recordings/logs", files={"file": ("chamber.csv", csv_text(at_rest()).encode())})
+
+
 def cancel(client: TestClient) -> Any:
     later = client.post("/api/campaigns", json={"recipe": "short", "at": "2199-01-01T00:00Z"})
     return client.delete(f"/api/schedule/{later.json()['id']}")
@@ -226,6 +231,7 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
         "campaign confirm", lambda c: c.post("/api/campaigns/1/confirm", json={"prompt": "1-mount", "by": "A"}),
     ),
     "/api/recordings": ("import", upload),
+    "/api/recordings/logs": ("import", upload_log),
     "/api/recordings/simulated": (
         "simulate", lambda c: c.post("/api/recordings/simulated", json={"recipe": "short", "serial": "SIM"}),
     ),

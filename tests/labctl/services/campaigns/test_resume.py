@@ -144,7 +144,10 @@ def test_what_is_not_confirmed_safe_stays_until_a_person_clears_it(tmp_path: Pat
     assert (status.exit_code, "no answer" in json.loads(status.stdout)[0]["unconfirmed"]) == (1, True)
     assert labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").exit_code == 0
     assert labctl(location, "bench", "status").exit_code == 0
-    assert "the safe state is confirmed" in labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").stderr
+    assert (
+        "its safe state is confirmed already"
+        in labctl(location, "bench", "clear", "single-axis-sim", "--by", "Ada").stderr
+    )
     assert json.loads(labctl(location, "campaign", "resume", "1", "--by", "Ada", "--json").stdout)["state"] == "done"
     with open_store(location, write=False) as store:
         assert store.audit.first_broken() is None

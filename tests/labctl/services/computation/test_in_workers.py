@@ -142,7 +142,7 @@ def test_the_queue_is_bounded_and_in_order(workers: InWorkers, tmp_path: Path) -
     with pytest.raises(TooBusy, match="1 computations run and 2 wait") as busy:
         workers.submit(work.who_asks, "fourth")
     assert busy.value.retry_after_s >= 1
-    assert stages == ["waiting for 1 before it"]
+    assert stages == ["waiting for earlier computations: 1"]
     second.leave()
     fourth = workers.submit(work.who_asks, "fourth", progress=lambda stage: begun.append(f"4 {stage}"))
     first.leave()
@@ -150,7 +150,7 @@ def test_the_queue_is_bounded_and_in_order(workers: InWorkers, tmp_path: Path) -
     assert third.future.result(WAIT_S)[0] == "third"
     assert fourth.future.result(WAIT_S)[0] == "fourth"
     assert begun.index("second") < begun.index("4 first")
-    assert stages == ["waiting for 1 before it"]
+    assert stages == ["waiting for earlier computations: 1"]
 
 
 def test_closing_ends_what_runs_and_refuses_what_waits(store: Store, tmp_path: Path) -> None:
@@ -161,9 +161,9 @@ def test_closing_ends_what_runs_and_refuses_what_waits(store: Store, tmp_path: P
     workers.close()
     held.wait_for_end()
     for each in pending:
-        with pytest.raises(ComputationEnded, match="the service ends"):
+        with pytest.raises(ComputationEnded, match="the service is stopping"):
             each.future.result(WAIT_S)
-    with pytest.raises(ComputationEnded, match="the service ends"):
+    with pytest.raises(ComputationEnded, match="the service is stopping"):
         workers.submit(work.serials)
 
 

@@ -81,7 +81,7 @@ def test_what_no_importer_knows_is_left_to_labctls_own(tmp_path: Path, name: str
 @pytest.mark.parametrize(
     ("read", "error"),
     [
-        (failing, "some.log: entry point 'bad' .* cannot read it: KeyError: 'row'; mend or uninstall acme-plugins"),
+        (failing, "some.log: entry point 'bad' .* cannot read it: KeyError: 'row'; repair or uninstall acme-plugins"),
         (lambda *_: None, "cannot read it: TypeError: None is not a labctl.recording.recording.Recording"),
         (lambda *_: made(gyro_z=[1.0]), "columns of different or no length .*dataset: 2, .*gyro_z: 1"),
         (lambda *_: made(gyro_z=[1.0, float("nan")]), "some.log: column 'gyro_z', row 2: nan where a number is needed"),
@@ -89,7 +89,7 @@ def test_what_no_importer_knows_is_left_to_labctls_own(tmp_path: Path, name: str
             lambda *_: made(temperature_c=[25.0, -300.0]),
             "some.log: column 'temperature_c', row 2: -300 is not possible",
         ),
-        (lambda *_: made(dataset=np.array([1, 1])), "some.log: column 'dataset', row 2: number 1 returns"),
+        (lambda *_: made(dataset=np.array([1, 1])), "some.log: column 'dataset', row 2: number 1 is repeated"),
     ],
 )
 def test_what_an_importer_gives_is_held_to_the_rules(

@@ -156,6 +156,8 @@ const ALL = {
   }),
   rate_hysteresis: single("previous", (x) => 0.8 * x),
   start_transient: single("inside", (t) => -Math.exp(-t / 0.15)),
+  time_delay: single("inside", (t) => 0.5 * (Math.sin(6 * (t - 0.12)) - Math.sin(6 * t))),
+  bandwidth: single("inside", (t) => 0.4 * (0.8 * Math.sin(6 * t - 0.6) - Math.sin(6 * t))),
   supply_sensitivity: single("supply", (x) => 0.8 * x),
 };
 
