@@ -177,7 +177,7 @@ def test_a_campaign_that_waits_keeps_its_bench_and_lets_it_go_when_it_is_lost(
         if seen.count("waiting") == 20:
             assert lab.hold.held
             other = BenchHold(lab.store, BENCH.name, lab.clock)
-            with pytest.raises(Exception, match="is held by process"):
+            with pytest.raises(Exception, match="is in use by process"):
                 other.take()
             lab.lose()
 
