@@ -49,7 +49,7 @@ def rate_range_dps(recording: Recording) -> tuple[float, float]:
     return -full, full
 
 
-def rising(recording: Recording, nodes: Array, axis: str, least: int) -> Array:
+def rising(recording: Recording, nodes: Array, axis: str, least: int) -> NDArray[np.intp]:
     """Return the order in which temperatures rise. Raises NotEnoughData for too few, or one that is repeated."""
     order = np.argsort(nodes)
     if len(nodes) < least or np.any(np.diff(nodes[order]) <= 0):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.fitting.effects import Reference, Term
 from labctl.fitting.estimation.published.common import (
@@ -19,6 +20,7 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.temperature import Constant, LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import OutputUnit, Recording
+from labctl.recording.info import Axis
 
 TERMS = (Term("bias"), Term("scale_factor"), Term("misalignment"))
 #: Temperatures that yang2018 interpolates between, and the one that single_temperature takes, deg C.
@@ -33,15 +35,15 @@ def from_matrices(recording: Recording, model: str) -> FitResult:
     if not several:
         order = order[[int(np.argmin(np.abs(given_c[order] - TRADITIONAL_C)))]]
     nodes, valid_c = given_c[order], (float(given_c.min()), float(given_c.max()))
-    fits = {axis: _axis(recording, axis, order) for axis in axes}
+    fits: dict[str, AxisFit] = {axis: _axis(recording, axis, order) for axis in axes}
     table = LagrangeTable(tuple(nodes.tolist()), POINTS) if several else Constant()
     terms = TERMS if len(axes) > 1 else TERMS[:2]
     law = ErrorModel(model, terms, "rate", table, Reference(TRADITIONAL_C))
-    raw = {axis: fit.values[0] for axis, fit in fits.items()}
+    raw: dict[str, Array] = {axis: fit.values[0] for axis, fit in fits.items()}
     return FitResult(FittedModel(law, fits), error_figures(raw, nodes), valid_c, rate_range_dps(recording))
 
 
-def _axis(recording: Recording, axis: str, rows: Array) -> AxisFit:
+def _axis(recording: Recording, axis: Axis, rows: NDArray[np.intp]) -> AxisFit:
     """Return the row of K and the element of B that belong to one output, without K's unit diagonal."""
     output = recording.info.output.get(axis, OutputUnit())
     others = tuple(other for other in recording.info.axes if other != axis)

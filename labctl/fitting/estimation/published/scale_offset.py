@@ -19,6 +19,7 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import OutputUnit, Recording
+from labctl.recording.info import Axis
 
 TERMS = (Term("bias"), Term("scale_factor"))
 
@@ -34,7 +35,7 @@ def from_scale_offset(recording: Recording, model: str) -> FitResult:
     return FitResult(FittedModel(law, axes), error_figures(raw, nodes), valid_c, rate_range_dps(recording))
 
 
-def _axis(recording: Recording, axis: str) -> tuple[Array, AxisFit]:
+def _axis(recording: Recording, axis: Axis) -> tuple[Array, AxisFit]:
     columns = recording.columns
     here = np.asarray(columns["axis"]) == axis if "axis" in columns else np.ones(len(recording), dtype=bool)
     order = rising(recording, numbers(recording, "temperature_c", here), axis, 2)

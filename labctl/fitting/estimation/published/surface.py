@@ -36,12 +36,12 @@ def from_surface(recording: Recording, model: str) -> FitResult:
         _common(recording, name, rows) for name in ("reference_c", "temperature_low_c", "temperature_high_c")
     )
     cells = form_of(recording.columns).coefficients(recording.info, recording.columns)
-    fits = {axis: _axis(recording, cells, row) for axis, row in zip(axes, rows, strict=True)}
+    fits: dict[str, AxisFit] = {axis: _axis(recording, cells, row) for axis, row in zip(axes, rows, strict=True)}
     order = len(cells) // (TEMPERATURE_POWER + 1) - 1
     law = ErrorModel(model, (Term(EFFECT, order),), "output", reference=Reference(reference_c))
     centred = np.linspace(low_c, high_c, SHOWN) - reference_c
     at_rest = centred[:, None] ** np.arange(TEMPERATURE_POWER + 1)
-    raw = {axis: at_rest @ fit.values[: TEMPERATURE_POWER + 1, 0] for axis, fit in fits.items()}
+    raw: dict[str, Array] = {axis: at_rest @ fit.values[: TEMPERATURE_POWER + 1, 0] for axis, fit in fits.items()}
     error = ErrorFigures(rms(raw), 0.0, None, None, "none")
     return FitResult(FittedModel(law, fits), error, (low_c, high_c), rate_range_dps(recording))
 
