@@ -82,8 +82,8 @@ def test_uncertainties_are_taken_in_output_units(tmp_path: Path) -> None:
         [[20, -0.02, 2.5, 1e-5, 0.002], [40, -0.0202, 2.6, 2e-5, 0.004]],
     )
     z = fit(read_recording(folder), "weiss1995").fitted.axes["z"]
-    np.testing.assert_allclose(z.values, [[0.0, -5.0], [0.0, 0.01]], atol=1e-12)
-    np.testing.assert_allclose(z.u, [[0.1, 0.2], [5e-4, 1e-3]], atol=1e-12)
+    assert z.values == pytest.approx(np.array([[0.0, -5.0], [0.0, 0.01]]))
+    assert z.u == pytest.approx(np.array([[0.1, 0.2], [5e-4, 1e-3]]))
 
 
 @pytest.mark.parametrize(("i", "j"), [(0, 0), (1, 0), (3, 0), (0, 2), (2, 1)])
@@ -153,4 +153,4 @@ def test_from_the_table_to_the_file_that_a_robot_loads(tmp_path: Path) -> None:
     compensator = Compensator.from_file(tmp_path / "c.json")
     rate = np.array([[10.0, -20.0, 30.0]])
     found = compensator.compensate(rate @ K.T + B, np.array([25.0]))
-    np.testing.assert_allclose(found.rate_dps, rate, atol=1e-6)
+    assert found.rate_dps == pytest.approx(rate, abs=1e-6)
