@@ -2,11 +2,15 @@
 
 Their formulas are written here from their public descriptions, without labctl:
 
-- PX4 (`Tools/process_sensor_caldata.py`): the gyro's samples, a least-squares cubic in temperature minus the middle of
-  its range, which its firmware takes off the output.
+- PX4 (`Tools/process_sensor_caldata.py`): the gyro's samples through a running median of 31, their means in 2000 bins of
+  equal width in temperature, a least-squares cubic through the means in temperature minus the middle of the range, which
+  its firmware takes off the output.
 - ArduPilot (`Tools/scripts/tempcal_IMU.py`): samples and temperatures in a moving average of 2 s, a least-squares cubic
   (as many coefficients as its firmware has, INS_TCALn_GYR1 to 3) in temperature minus 35 deg C; its constant is the
   offset that the firmware learns at rest, here that of the fit, which is to its favour.
+
+Both formulas give what the programs' own functions give on the same samples, to 1e-12 deg/s (PX4-Autopilot at 00f5c31,
+ArduPilot's MethodicConfigurator at 436a9dd, which carries the script).
 
 Each is fitted to one leg and tested on the other, both ways, in means of a minute, as labctl's figure is: with its
 parabola, and with what its criticism names. The second table is a real warm-up (one leg: no other to be tested on), for
@@ -21,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import medfilt
 
 from labctl.fitting.criticism import criticise
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -38,7 +43,9 @@ from studies.rest_units import RATE_HZ, unit_at_rest
 Array = NDArray[np.float64]
 Law = Callable[[Array], Array]
 CAMPAIGNS = int(os.environ.get("LABCTL_REST_CAMPAIGNS", "100"))
-REFERENCE_C, AVERAGED_S = 35.0, 2.0
+REFERENCE_C, AVERAGED_S = 35.0, 2
+#: PX4's running median, in samples, and its bins in temperature.
+MEDIAN_OF, BINS = 31, 2000
 #: The thermometer of the MPU-6050: deg C = word / 340 + 36.53.
 WORDS_PER_K, ZERO_C = 340.0, 36.53
 #: Printed by the author of the warm-up: square, linear and constant term in the word of the thermometer, of each axis.
@@ -52,13 +59,18 @@ PRINTED = {
 def px4(warm: Array, rate: Array) -> Law:
     """Return PX4's correction of samples (n,) at temperatures (n,): a cubic about the middle of the range."""
     middle = (float(warm.max()) + float(warm.min())) / 2
-    coefficients = np.polyfit(warm - middle, rate, 3)
+    above = warm - float(warm.min())
+    bins = np.minimum((above * (BINS / above.max())).astype(np.int64), BINS - 1)
+    count = np.bincount(bins, minlength=BINS)
+    sums = (np.bincount(bins, weights=values, minlength=BINS) for values in (warm, medfilt(rate, MEDIAN_OF)))
+    mean_c, mean = (values[count > 0] / count[count > 0] for values in sums)
+    coefficients = np.polyfit(mean_c - middle, mean, 3)
     return lambda there: np.polyval(coefficients, there - middle)
 
 
-def ardupilot(warm: Array, rate: Array) -> Law:
+def ardupilot(warm: Array, rate: Array, rate_hz: float = RATE_HZ) -> Law:
     """Return ArduPilot's correction: a cubic about 35 deg C through moving averages of 2 s."""
-    width = max(int(AVERAGED_S * RATE_HZ), 1)
+    width = max(int(rate_hz) * AVERAGED_S, 1)
     kernel = np.full(width, 1.0 / width)
     mean_c, mean = (np.convolve(values, kernel, mode="valid") for values in (warm, rate))
     coefficients = np.polyfit(mean_c - REFERENCE_C, mean, 3)
