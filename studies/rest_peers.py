@@ -2,9 +2,9 @@
 
 Their formulas are written here from their public descriptions, without labctl:
 
-- PX4 (`Tools/process_sensor_caldata.py`): the gyro's samples through a running median of 31, their means in 2000 bins of
-  equal width in temperature, a least-squares cubic through the means in temperature minus the middle of the range, which
-  its firmware takes off the output.
+- PX4 (`Tools/process_sensor_caldata.py`): the gyro's samples through a running median of 31, their means in 2000 bins
+  of equal width in temperature, a least-squares cubic through the means in temperature minus the middle of the range,
+  which its firmware takes off the output.
 - ArduPilot (`Tools/scripts/tempcal_IMU.py`): samples and temperatures in a moving average of 2 s, a least-squares cubic
   (as many coefficients as its firmware has, INS_TCALn_GYR1 to 3) in temperature minus 35 deg C; its constant is the
   offset that the firmware learns at rest, here that of the fit, which is to its favour.
@@ -59,8 +59,8 @@ PRINTED = {
 def px4(warm: Array, rate: Array) -> Law:
     """Return PX4's correction of samples (n,) at temperatures (n,): a cubic about the middle of the range."""
     middle = (float(warm.max()) + float(warm.min())) / 2
-    above = warm - float(warm.min())
-    bins = np.minimum((above * (BINS / above.max())).astype(np.int64), BINS - 1)
+    above = (warm - middle) - float((warm - middle).min())
+    bins = np.minimum((above / (above.max() / BINS)).astype(np.int64), BINS - 1)
     count = np.bincount(bins, minlength=BINS)
     sums = (np.bincount(bins, weights=values, minlength=BINS) for values in (warm, medfilt(rate, MEDIAN_OF)))
     mean_c, mean = (values[count > 0] / count[count > 0] for values in sums)

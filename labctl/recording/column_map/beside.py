@@ -15,8 +15,8 @@ from labctl.recording.column_map.sources import source
 from labctl.recording.raw_table import RawColumn, RawTable
 
 Array = NDArray[np.float64]
-#: A gap of a further file that values are interpolated across, in its usual steps of time.
-MOST_STEPS = 10.0
+#: How far the nearest reading of a further file may be from a reading of the log, in its usual steps of time.
+MOST_STEPS = 5.0
 #: A column without a name in its file.
 _NAMELESS = "column "
 
@@ -83,16 +83,15 @@ def _refuse_apart(table: RawTable, at: Array, other: RawTable, theirs: Array) ->
             other, f"its times, or those of {table.path.name}, are not all numbers that rise; correct or sort them"
         )
     most = MOST_STEPS * float(np.median(steps))
-    after = np.clip(np.searchsorted(theirs, at), 1, len(theirs) - 1)
-    outside = np.maximum(theirs[0] - at, at - theirs[-1])
-    apart = (outside > most) | ((outside <= 0) & (steps[after - 1] > most))
+    nearest = theirs[np.searchsorted((theirs[:-1] + theirs[1:]) / 2, at)]
+    apart = np.abs(nearest - at) > most
     if apart.any():
         row = int(np.argmax(apart))
         raise _refused(
             other,
             f"no reading near time {at[row]:.9g} of {table.path.name} (row {row + 1}; {int(apart.sum())} rows so): its "
             f"times go from {theirs[0]:.9g} to {theirs[-1]:.9g}, in steps of {np.median(steps):.3g}; at most "
-            f"{MOST_STEPS:.0f} steps may be missing. Both files need one clock and one unit of time",
+            f"{MOST_STEPS:.0f} steps may lie between. Both files need one clock and one unit of time",
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studies.real.independent.files import AXES, Array, Found, Value, columns_of, numbers
 
@@ -12,18 +13,24 @@ BASE_C, WORDS_PER_K, WORD_BITS = 25.0, 256.0, 16
 CENTRE_C, GAP_MS = 20.0, 10_000.0
 
 
+def readings() -> tuple[Array, Array, NDArray[np.int64]]:
+    """Return the temperatures (n,) deg C, the outputs (n, 3) deg/s and the burst of each reading, (n,) from 0."""
+    columns = columns_of("pan-cooldown.parquet")
+    time_ms, word = (np.asarray(columns[name], dtype=np.float64) for name in ("time (ms)", "temp"))
+    word = np.where(word >= 2 ** (WORD_BITS - 1), word - 2**WORD_BITS, word)
+    rates = np.degrees(numbers(columns, "gyrox rad/s", "gyroy rad/s", "gyroz rad/s"))
+    burst = np.concatenate([[0], np.cumsum(np.diff(time_ms) > GAP_MS)])
+    return BASE_C + word / WORDS_PER_K, rates, burst
+
+
 def bursts() -> tuple[Array, Array]:
     """Return the mean temperature (25,) deg C and the median outputs (25, 3) deg/s of each burst.
 
     The median is not moved by the few spikes that the authors took out by hand.
     """
-    columns = columns_of("pan-cooldown.parquet")
-    time_ms, word = (np.asarray(columns[name], dtype=np.float64) for name in ("time (ms)", "temp"))
-    word = np.where(word >= 2 ** (WORD_BITS - 1), word - 2**WORD_BITS, word)
-    rates = np.degrees(numbers(columns, "gyrox rad/s", "gyroy rad/s", "gyroz rad/s"))
-    edges = np.flatnonzero(np.diff(time_ms) > GAP_MS) + 1
-    warm = np.array([part.mean() for part in np.split(BASE_C + word / WORDS_PER_K, edges)])
-    return warm, np.array([np.median(part, axis=0) for part in np.split(rates, edges)])
+    warm, rates, burst = readings()
+    each = [burst == number for number in range(int(burst.max()) + 1)]
+    return np.array([warm[part].mean() for part in each]), np.array([np.median(rates[part], axis=0) for part in each])
 
 
 def analysis() -> Found:

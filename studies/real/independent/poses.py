@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -58,36 +59,63 @@ def at_rest(session: Session, parts: list[slice], up: Array) -> tuple[Array, Arr
     return means, solved[0], solved[1:].T
 
 
-def fitted(session: Session) -> tuple[Array, Array, Array, float]:
-    """Return E of output = bias + (1 + E) rate, its uncertainty, the bias, and what gravity is off by, deg.
+@dataclass(frozen=True)
+class Move:
+    """From one rest to the next: gravity before and after (3,), rates without bias between readings (n, 3) deg/s."""
+
+    before: Array
+    after: Array
+    rates: Array
+    dt_s: Array
+
+    def off(self, matrix: Array) -> Array:
+        """Return what gravity after the move is off by, (3,), if output = bias + (1 + matrix) rate."""
+        inverse = np.linalg.inv(np.eye(3) + matrix)
+        return np.asarray(self.after - turned(self.rates @ inverse.T, self.dt_s).T @ self.before)
+
+
+def moves_of(session: Session, constant_bias: Array | None = None) -> tuple[list[Move], Array]:
+    """Return the moves of a session and its bias.
 
     The bias during a move goes from that of the rest before to that of the rest after, and changes by the specific
-    force that is measured meanwhile. The uncertainty is that of least squares by the scatter of the moves.
+    force that is measured meanwhile; or it is a constant, (3,) deg/s.
     """
     parts = rests(session)
     up, matrix, offset = gravity(session, parts)
     means, bias, change = at_rest(session, parts, up)
     steady = means - up @ change.T
     force = (session.force - offset) @ matrix.T
-    tasks = []
+    found = []
     for number, part in moves(parts, session):
         t_s = session.t_s[part]
         share = ((t_s - t_s[0]) / (t_s[-1] - t_s[0]))[:, None]
-        drift = (1 - share) * steady[number] + share * steady[number + 1]
-        rates = session.rates[part] - drift - force[part] @ change.T
-        tasks.append((up[number], up[number + 1], (rates[1:] + rates[:-1]) / 2, np.diff(t_s)))
+        drift = (1 - share) * steady[number] + share * steady[number + 1] + force[part] @ change.T
+        rates = session.rates[part] - (drift if constant_bias is None else constant_bias)
+        found.append(Move(up[number], up[number + 1], (rates[1:] + rates[:-1]) / 2, np.diff(t_s)))
+    return found, bias
 
-    def left(parameters: Array, part: slice = slice(None)) -> Array:
-        inverse = np.linalg.inv(np.eye(3) + parameters.reshape(3, 3))
-        return np.concatenate([
-            after - turned(rates @ inverse.T, dt_s).T @ before for before, after, rates, dt_s in tasks[part]
-        ])  # fmt: skip
+
+def off_by_deg(found: list[Move], matrix: Array) -> float:
+    """Return the root mean square of a component (of two) of what gravity is off by after a move, deg."""
+    left = np.concatenate([move.off(matrix) for move in found])
+    return float(np.degrees(np.sqrt(left @ left / (2 * len(found)))))
+
+
+def fitted(session: Session) -> tuple[Array, Array, Array, float]:
+    """Return E of output = bias + (1 + E) rate, its uncertainty, the bias, and what gravity is off by, deg.
+
+    The uncertainty is that of least squares by the scatter of the moves.
+    """
+    found, bias = moves_of(session)
+
+    def left(parameters: Array) -> Array:
+        return np.concatenate([move.off(parameters.reshape(3, 3)) for move in found])
 
     solved = least_squares(left, np.zeros(9), x_scale=1e-2, xtol=1e-10)
-    free = 2 * len(tasks) - 9  # a direction has two components
+    free = 2 * len(found) - 9  # a direction has two components
     covariance = float(solved.fun @ solved.fun) / free * np.linalg.inv(solved.jac.T @ solved.jac)
-    off = np.degrees(np.sqrt(float(solved.fun @ solved.fun) / (2 * len(tasks))))
-    return solved.x.reshape(3, 3), np.sqrt(np.diag(covariance)).reshape(3, 3), bias, float(off)
+    matrix = solved.x.reshape(3, 3)
+    return matrix, np.sqrt(np.diag(covariance)).reshape(3, 3), bias, off_by_deg(found, matrix)
 
 
 def analysis(session: Session) -> Found:

@@ -1,0 +1,9 @@
+"""`python -m studies.real.write`: write the page of real gyros anew."""
+
+from __future__ import annotations
+
+from studies.real.page import PAGE, page
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    print(PAGE)
