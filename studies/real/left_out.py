@@ -17,6 +17,8 @@ from studies.real.independent.files import AXES, Array, root_mean_square
 from studies.rest_peers import Law, ardupilot, px4
 
 PARTS = 8
+#: Temperatures of means by two ways that are the same, K.
+SAME_K = 1e-3
 Readings = tuple[Array, Array, NDArray[np.int64]]
 
 
@@ -67,18 +69,19 @@ def points_of(name: str) -> Recording:
         return read_recording(Path(out))
 
 
-def by_labctl(points: Recording) -> LeftOut:
-    """Return the same of labctl's parabola, on means that it made itself."""
+def by_labctl(points: Recording, means: tuple[Array, Array]) -> LeftOut:
+    """Return the same of labctl's parabola: fitted to means that labctl made itself, tested on those of the peers."""
     warm = np.asarray(points.columns["temperature_c"], dtype=np.float64)
-    part, errors = parts_of(warm), {}
+    part, errors = parts_of(means[0]), {}
     for left_out in range(PARTS):
-        tested = part == left_out
-        model = fit(_rows(points, ~tested), "bias_temperature").fitted
-        centred = warm[tested] - model.model.reference.temperature_c
+        there = means[0][part == left_out]
+        model = fit(
+            _rows(points, (warm < there.min() - SAME_K) | (warm > there.max() + SAME_K)), "bias_temperature"
+        ).fitted
+        centred = there - model.model.reference.temperature_c
         design = np.column_stack([np.ones(len(centred)), centred, centred**2])
-        errors[left_out] = np.concatenate(
-            [points.gyro_dps(axis)[tested] - design @ model.axes[axis].values[:, 0] for axis in points.info.axes]
-        )
+        laws = [design @ model.axes[axis].values[:, 0] for axis in points.info.axes]
+        errors[left_out] = np.concatenate([means[1][part == left_out, k] - law for k, law in enumerate(laws)])
     return LeftOut.of(errors)
 
 

@@ -31,8 +31,9 @@ NOTES = """\
   neither labctl's nor the other's: with the rests that labctl finds, the independent analysis of mpu9150-2 has
   7.5 +- 1.6 in the place of the element that disagrees (labctl 7.9 +- 2.4, published 8.4), and one more rest of
   1.7 s changes an element of mpu9150-1 by 2 in 1e-3.
-- At rest labctl's U is two to six times that of independent means: it takes slow wandering for drift that lasts
-  for minutes. The warm-up's and the cool-down's noise do not tell which is right.
+- At rest labctl's U is 1.5 to 6 times that of the independent analysis: it takes slow wandering for drift that
+  lasts for minutes, the other takes stretches of 2 min, or bursts, for independent. These data do not tell
+  which is right.
 - Where the autopilots' cubic has less error than labctl's parabola, the bias is no parabola by more than the
   criticism finds significant: `labctl fit PAN-2020 --effects bias,bias_temperature:3` leaves 0.0069 deg/s in
   the place of 0.0073.
@@ -41,8 +42,8 @@ NOTES = """\
 THERMAL = """\
 The autopilots' formulas fit cubics to the samples (the same numbers as the programs' own functions, to 1e-12
 deg/s). Each eighth of the temperatures is left out in turn; the error is that of means over 17 s, or of bursts,
-each method's own. The coldest eighth of the warm-up spans 11 K, and a cubic that has not seen it strays.
-Simulated loops with a lag or a hysteresis, leg by leg, are in [fitting](fitting.md)."""
+all methods on the same ones. The coldest eighth of the warm-up spans 11 K, and a cubic that has not seen it
+strays. Simulated loops with a lag or a hysteresis, leg by leg, are in [fitting](fitting.md)."""
 
 
 def tables() -> str:

@@ -51,11 +51,12 @@ def lines(found: Mapping[str, Compared]) -> Iterator[Peer]:
 def _at_rest() -> Iterator[Peer]:
     t_s, warm, rates = warm_up.readings()
     window = np.unique((t_s // warm_up.MEAN_S).astype(np.int64), return_inverse=True)[1]
-    peers = by_peers((warm, rates, window), warm_up.means(t_s, warm, rates), FREEIMU_HZ)
-    windows = read_recording(PUBLISHED.parent / "freeimu-warmup")  # labctl's, of 17 s too
-    yield from _thermal("freeimu-warmup", peers, by_labctl(windows))
-    peers = by_peers(cool_down.readings(), cool_down.bursts(), PAN_HZ)
-    yield from _thermal("pan-cooldown", peers, by_labctl(points_of("pan-cooldown")))
+    means = warm_up.means(t_s, warm, rates)
+    ours = by_labctl(read_recording(PUBLISHED.parent / "freeimu-warmup"), means)
+    yield from _thermal("freeimu-warmup", by_peers((warm, rates, window), means, FREEIMU_HZ), ours)
+    bursts = cool_down.bursts()
+    ours = by_labctl(points_of("pan-cooldown"), bursts)
+    yield from _thermal("pan-cooldown", by_peers(cool_down.readings(), bursts, PAN_HZ), ours)
 
 
 def _thermal(name: str, peers: Mapping[str, LeftOut], ours: LeftOut) -> Iterator[Peer]:

@@ -21,7 +21,7 @@ from studies.rest_peers import ardupilot, px4
 from tests.helpers.paths import EXAMPLES, ROOT
 
 INDEPENDENT = ROOT / "studies" / "real" / "independent"
-SMALL = ("pan-cooldown", "imucal-annotated", "imucal-session", "osu-rate-table", "mpu9150-1")
+SMALL = ("pan-cooldown", "imucal-annotated", "mpu9150-1", "osu-rate-table")
 
 
 def test_independent_analyses_import_numpy_scipy_and_each_other_only() -> None:
@@ -50,13 +50,15 @@ def test_an_independent_analysis_runs_without_labctl() -> None:
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Row]]:
     folder = tmp_path_factory.mktemp("real")
-    return {each.name: compared(each, folder).rows for each in RECORDINGS if each.name in SMALL}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Commands, "verdict", lambda *_: "")  # a criticism takes longer than all else
+        return {each.name: compared(each, folder).rows for each in RECORDINGS if each.name in SMALL}
 
 
 def test_labctl_and_the_independent_analyses_agree(small: dict[str, list[Row]]) -> None:
     assert set(small) == set(SMALL)
     counts = {name: sum(not row.is_error for row in rows) for name, rows in small.items()}
-    assert counts == dict(zip(SMALL, (6, 12, 12, 4, 12), strict=True))
+    assert counts == dict(zip(SMALL, (6, 12, 12, 4), strict=True))
     for name, rows in small.items():
         assert all(row.agreement in {"yes", "same", "labctl better"} for row in rows), name
 
