@@ -17,8 +17,8 @@ from labctl.recording.column_map import (
     propose,
     recording_of,
 )
-from labctl.recording.column_map.beside import joined
 from labctl.recording.importer import TableImporter, TableOptionsT
+from labctl.recording.logs.beside import joined
 from labctl.recording.raw_table import RawTable
 
 

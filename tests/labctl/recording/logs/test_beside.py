@@ -9,7 +9,7 @@ import pytest
 
 from labctl.errors import BadFile, BadInput, BadRecording
 from labctl.recording.column_map import parse_map
-from labctl.recording.column_map.beside import joined
+from labctl.recording.logs.beside import joined
 from labctl.recording.logs.text import TextOptions, read_text
 from labctl.recording.raw_table import RawTable
 from labctl.services.recordings.importers import as_interchange
