@@ -18,7 +18,7 @@ HEAD = """\
 
 Every public recording that labctl may carry, what labctl says of it, and an independent analysis beside it. The
 tables are printed by `python -m studies real`; `python -m studies.real.write` writes this page. The files are
-in `examples/published`, where [README.md](../../examples/published/README.md) names authors and licences.
+in `examples/published`, where README.md names authors and licences.
 labctl is asked on its command line, as in [from a file to a
 calibration](../how-to/from-a-file-to-a-calibration.md). The independent analyses, `studies/real/independent`,
 import numpy and scipy only and have formulas of their own.
@@ -53,9 +53,9 @@ def tables() -> str:
     return "\n\n".join([*_summary(found), *_verdicts(found), *_peers(peers), *_worse(found, peers), *_details(found)])
 
 
-def page() -> str:
-    """Return the page, with the versions that it was made with."""
-    return f"{HEAD}\n\n{tables()}\n\n## Made with\n\n{_versions()}\n"
+def page(made_on: str) -> str:
+    """Return the page, with the date and the versions that it was made with."""
+    return f"{HEAD}\n\n{tables()}\n\n## Made with\n\n`python -m studies.real.write` on {made_on}: {_versions()}\n"
 
 
 def _versions() -> str:
