@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +36,8 @@ from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.presets import Preset, changed, preset_for
 from labctl.recording import Recording, to_points
+from studies.real.independent.files import columns_of
+from studies.real.published import FREEIMU_WORDS
 from studies.rest_loops import cells
 from studies.rest_units import RATE_HZ, unit_at_rest
 
@@ -48,12 +49,6 @@ REFERENCE_C, AVERAGED_S = 35.0, 2
 MEDIAN_OF, BINS = 31, 2000
 #: The thermometer of the MPU-6050: deg C = word / 340 + 36.53.
 WORDS_PER_K, ZERO_C = 340.0, 36.53
-#: Printed by the author of the warm-up: square, linear and constant term in the word of the thermometer, of each axis.
-PRINTED = {
-    "x": (-4.387634e-08, -5.878346e-04, 6.699801),
-    "y": (-1.779335e-08, 1.172002e-03, 8.341212),
-    "z": (4.216745e-09, -6.897733e-05, -21.71155),
-}
 
 
 def px4(warm: Array, rate: Array) -> Law:
@@ -107,7 +102,7 @@ def _left(data: FitData, preset: Preset, seen: NDArray[np.bool_], tested: NDArra
     model, _ = preset.build(part)
     whole = solve_axes(data, preset.build(data)[0])
     solved = solve_axes(part, model, whole.solutions)
-    return residuals(FittedModel(model, solved.fits), data.take(tested), solved.turning)["z"]
+    return residuals(FittedModel(model, solved.fits), data.take(tested), solved.nuisance)["z"]
 
 
 def lines() -> Iterator[str]:
@@ -121,7 +116,7 @@ def lines() -> Iterator[str]:
         yield f"   {cell:18} {shown}; improved over the better peer {ratio:.3f}"
 
 
-def printed_parabolas(path: Path) -> dict[str, tuple[Array, Array]]:
+def printed_parabolas() -> dict[str, tuple[Array, Array]]:
     """Return axis -> labctl's coefficients of the published warm-up in its author's units, and those printed.
 
     labctl's design and solver on every reading, unweighted as the author's: square, linear, constant term in words.
@@ -129,29 +124,28 @@ def printed_parabolas(path: Path) -> dict[str, tuple[Array, Array]]:
     from labctl.fitting.numeric.drift_noise import Drift, Scatter
     from labctl.fitting.numeric.least_squares import solve
 
-    table = np.genfromtxt(path, delimiter=",", skip_header=1)
-    word = table[:, 9]
+    columns = columns_of("freeimu-warmup.parquet")
+    word = np.asarray(columns["dTemp"], dtype=np.float64)
     n = len(word)
     scatter = Scatter(np.arange(float(n)), np.ones(n, dtype=np.int64), np.zeros(n), np.ones(n))
     found = {}
     warm = word / WORDS_PER_K + ZERO_C
     centre = float(np.round((warm.min() + warm.max()) / 2))
     design = np.column_stack([np.ones(n), warm - centre, (warm - centre) ** 2])
-    for k, axis in enumerate("xyz"):
-        b, b1, b2 = solve(design, table[:, 3 + k], scatter, Drift(0.0, 1.0)).values
+    for axis in "xyz":
+        b, b1, b2 = solve(design, np.asarray(columns[f"G{axis}"], dtype=np.float64), scatter, Drift(0.0, 1.0)).values
         offset = ZERO_C - centre
         ours = (b2 / WORDS_PER_K**2, (b1 + 2 * b2 * offset) / WORDS_PER_K, b + b1 * offset + b2 * offset**2)
-        found[axis] = np.array(ours), np.array(PRINTED[axis])
+        found[axis] = np.array(ours), np.array(FREEIMU_WORDS[axis])
     return found
 
 
 def run() -> str:
-    """Return the tables; that of the published warm-up where LABCTL_FREEIMU names its file."""
+    """Return the tables: simulated loops, and the published warm-up."""
     found = list(lines())
-    if path := os.environ.get("LABCTL_FREEIMU"):
-        for axis, (ours, theirs) in printed_parabolas(Path(path)).items():
-            worst = float(np.max(np.abs(ours / theirs - 1)))
-            found.append(f"   warm-up, axis {axis}: labctl {ours}, printed {theirs}, apart by {worst:.1e} at most")
+    for axis, (ours, theirs) in printed_parabolas().items():
+        worst = float(np.max(np.abs(ours / theirs - 1)))
+        found.append(f"   warm-up, axis {axis}: labctl {ours}, printed {theirs}, apart by {worst:.1e} at most")
     return "\n".join(found)
 
 

@@ -17,7 +17,8 @@ from studies.real.independent import files, hand_turns, poses, rate_table, rests
 from studies.real.independent.files import Value, clustered
 from studies.real.page import NOTES, PAGE
 from studies.real.recordings import RECORDINGS
-from studies.rest_peers import ardupilot, px4
+from studies.rest_peers import across_legs, ardupilot, printed_parabolas, px4
+from studies.rest_units import Hidden, unit_at_rest
 from tests.helpers.paths import EXAMPLES, ROOT
 
 INDEPENDENT = ROOT / "studies" / "real" / "independent"
@@ -151,6 +152,17 @@ def test_autopilots_formulas_find_a_cubic() -> None:
     assert px4(warm, spoilt)(grid) == pytest.approx(truth, abs=1e-4)  # its median takes a spike of ten samples out
     assert ardupilot(warm, rate, 2.0)(grid) == pytest.approx(truth, abs=1e-6)
     assert np.abs(ardupilot(warm, spoilt, 2.0)(grid) - truth).max() > 1e-3
+
+
+def test_labctls_solver_gives_the_printed_parabolas_of_the_warm_up() -> None:
+    for ours, theirs in printed_parabolas().values():
+        assert ours == pytest.approx(theirs, rel=1e-6)
+
+
+def test_peers_are_compared_leg_by_leg_on_a_simulated_loop() -> None:
+    found = across_legs(unit_at_rest(0, Hidden()))
+    assert set(found) == {"PX4", "ArduPilot", "labctl, parabola", "labctl, improved"}
+    assert all(0 < rms < 0.002 for rms in found.values())
 
 
 def test_every_published_file_is_named_with_its_licence() -> None:
