@@ -21,6 +21,7 @@ STUDIES = (
     "process_pairs",
     "faults",
     "attacks",
+    "endurance",
     "log_size",
 )
 
