@@ -119,8 +119,10 @@ def test_the_text_as_published_gives_the_same(name: str, lab: Lab, tmp_path: Pat
 
 
 def write_sweep(path: Path) -> None:
-    rates = np.concatenate([ramp(5, 0, 100, 100), ramp(5, 100, -100, 100), sweep(15, 0.2, 5.0, 60, 100)])
-    columns = profile_recording(rates, delay_s=0.005, scale=0.01, bias_dps=0.3).columns
+    rates = np.concatenate(
+        [ramp(5, 0, 100, 50), ramp(8, 100, -100, 50), ramp(5, -100, 0, 50), sweep(12, 0.2, 5.0, 60, 50)]
+    )
+    columns = profile_recording(rates, 50.0, delay_s=0.005, scale=0.01, bias_dps=0.3).columns
     names = {"t_s": "time (s)", "gyro_z": "gyro_z (deg/s)", "table_rate_dps": "table rate (deg/s)",
              "temperature_c": "temperature (degC)"}  # fmt: skip
     rows = np.column_stack([np.asarray(columns[name], dtype=np.float64) for name in names])
