@@ -9,7 +9,7 @@ Their formulas are written here from their public descriptions, without labctl:
   (as many coefficients as its firmware has, INS_TCALn_GYR1 to 3) in temperature minus 35 deg C; its constant is the
   offset that the firmware learns at rest, here that of the fit, which is to its favour.
 
-Both formulas give what the programs' own functions give on the same samples, to 1e-12 deg/s (PX4-Autopilot at 00f5c31,
+Both formulas give what the programs' own functions give on the same samples, to 1e-11 deg/s (PX4-Autopilot at 00f5c31,
 ArduPilot's MethodicConfigurator at 436a9dd, which carries the script).
 
 Each is fitted to one leg and tested on the other, both ways, in means of a minute, as labctl's figure is: with its

@@ -40,7 +40,7 @@ NOTES = """\
 - In poses no criticism is possible, and of sessions with one turn about each axis neither a criticism nor a
   held-out error."""
 THERMAL = """\
-The autopilots' formulas fit cubics to the samples (the same numbers as the programs' own functions, to 1e-12
+The autopilots' formulas fit cubics to the samples (the same numbers as the programs' own functions, to 1e-11
 deg/s). Each eighth of the temperatures is left out in turn; the error is that of means over 17 s, or of bursts,
 all methods on the same ones. The coldest eighth of the warm-up spans 11 K, and a cubic that has not seen it
 strays. Simulated loops with a lag or a hysteresis, leg by leg, are in [fitting](fitting.md)."""
