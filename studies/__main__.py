@@ -14,6 +14,7 @@ STUDIES = (
     "criticism",
     "rest_loops",
     "rest_peers",
+    "real",
     "profiles",
     "crash_recovery",
     "process_kill",

@@ -2,11 +2,15 @@
 
 Their formulas are written here from their public descriptions, without labctl:
 
-- PX4 (`Tools/process_sensor_caldata.py`): the gyro's samples, a least-squares cubic in temperature minus the middle of
-  its range, which its firmware takes off the output.
+- PX4 (`Tools/process_sensor_caldata.py`): the gyro's samples through a running median of 31, their means in 2000 bins
+  of equal width in temperature, a least-squares cubic through the means in temperature minus the middle of the range,
+  which its firmware takes off the output.
 - ArduPilot (`Tools/scripts/tempcal_IMU.py`): samples and temperatures in a moving average of 2 s, a least-squares cubic
   (as many coefficients as its firmware has, INS_TCALn_GYR1 to 3) in temperature minus 35 deg C; its constant is the
   offset that the firmware learns at rest, here that of the fit, which is to its favour.
+
+Both formulas give what the programs' own functions give on the same samples, to 1e-11 deg/s (PX4-Autopilot at 00f5c31,
+ArduPilot's MethodicConfigurator at 436a9dd, which carries the script).
 
 Each is fitted to one leg and tested on the other, both ways, in means of a minute, as labctl's figure is: with its
 parabola, and with what its criticism names. The second table is a real warm-up (one leg: no other to be tested on), for
@@ -17,10 +21,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import medfilt
 
 from labctl.fitting.criticism import criticise
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -32,33 +36,36 @@ from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.presets import Preset, changed, preset_for
 from labctl.recording import Recording, to_points
+from studies.real.independent.files import columns_of
+from studies.real.published import FREEIMU_WORDS
 from studies.rest_loops import cells
 from studies.rest_units import RATE_HZ, unit_at_rest
 
 Array = NDArray[np.float64]
 Law = Callable[[Array], Array]
 CAMPAIGNS = int(os.environ.get("LABCTL_REST_CAMPAIGNS", "100"))
-REFERENCE_C, AVERAGED_S = 35.0, 2.0
+REFERENCE_C, AVERAGED_S = 35.0, 2
+#: PX4's running median, in samples, and its bins in temperature.
+MEDIAN_OF, BINS = 31, 2000
 #: The thermometer of the MPU-6050: deg C = word / 340 + 36.53.
 WORDS_PER_K, ZERO_C = 340.0, 36.53
-#: Printed by the author of the warm-up: square, linear and constant term in the word of the thermometer, of each axis.
-PRINTED = {
-    "x": (-4.387634e-08, -5.878346e-04, 6.699801),
-    "y": (-1.779335e-08, 1.172002e-03, 8.341212),
-    "z": (4.216745e-09, -6.897733e-05, -21.71155),
-}
 
 
 def px4(warm: Array, rate: Array) -> Law:
     """Return PX4's correction of samples (n,) at temperatures (n,): a cubic about the middle of the range."""
     middle = (float(warm.max()) + float(warm.min())) / 2
-    coefficients = np.polyfit(warm - middle, rate, 3)
+    above = (warm - middle) - float((warm - middle).min())
+    bins = np.minimum((above / (above.max() / BINS)).astype(np.int64), BINS - 1)
+    count = np.bincount(bins, minlength=BINS)
+    sums = (np.bincount(bins, weights=values, minlength=BINS) for values in (warm, medfilt(rate, MEDIAN_OF)))
+    mean_c, mean = (values[count > 0] / count[count > 0] for values in sums)
+    coefficients = np.polyfit(mean_c - middle, mean, 3)
     return lambda there: np.polyval(coefficients, there - middle)
 
 
-def ardupilot(warm: Array, rate: Array) -> Law:
+def ardupilot(warm: Array, rate: Array, rate_hz: float = RATE_HZ) -> Law:
     """Return ArduPilot's correction: a cubic about 35 deg C through moving averages of 2 s."""
-    width = max(int(AVERAGED_S * RATE_HZ), 1)
+    width = max(int(rate_hz) * AVERAGED_S, 1)
     kernel = np.full(width, 1.0 / width)
     mean_c, mean = (np.convolve(values, kernel, mode="valid") for values in (warm, rate))
     coefficients = np.polyfit(mean_c - REFERENCE_C, mean, 3)
@@ -95,7 +102,7 @@ def _left(data: FitData, preset: Preset, seen: NDArray[np.bool_], tested: NDArra
     model, _ = preset.build(part)
     whole = solve_axes(data, preset.build(data)[0])
     solved = solve_axes(part, model, whole.solutions)
-    return residuals(FittedModel(model, solved.fits), data.take(tested), solved.turning)["z"]
+    return residuals(FittedModel(model, solved.fits), data.take(tested), solved.nuisance)["z"]
 
 
 def lines() -> Iterator[str]:
@@ -109,7 +116,7 @@ def lines() -> Iterator[str]:
         yield f"   {cell:18} {shown}; improved over the better peer {ratio:.3f}"
 
 
-def printed_parabolas(path: Path) -> dict[str, tuple[Array, Array]]:
+def printed_parabolas() -> dict[str, tuple[Array, Array]]:
     """Return axis -> labctl's coefficients of the published warm-up in its author's units, and those printed.
 
     labctl's design and solver on every reading, unweighted as the author's: square, linear, constant term in words.
@@ -117,29 +124,28 @@ def printed_parabolas(path: Path) -> dict[str, tuple[Array, Array]]:
     from labctl.fitting.numeric.drift_noise import Drift, Scatter
     from labctl.fitting.numeric.least_squares import solve
 
-    table = np.genfromtxt(path, delimiter=",", skip_header=1)
-    word = table[:, 9]
+    columns = columns_of("freeimu-warmup.parquet")
+    word = np.asarray(columns["dTemp"], dtype=np.float64)
     n = len(word)
     scatter = Scatter(np.arange(float(n)), np.ones(n, dtype=np.int64), np.zeros(n), np.ones(n))
     found = {}
     warm = word / WORDS_PER_K + ZERO_C
     centre = float(np.round((warm.min() + warm.max()) / 2))
     design = np.column_stack([np.ones(n), warm - centre, (warm - centre) ** 2])
-    for k, axis in enumerate("xyz"):
-        b, b1, b2 = solve(design, table[:, 3 + k], scatter, Drift(0.0, 1.0)).values
+    for axis in "xyz":
+        b, b1, b2 = solve(design, np.asarray(columns[f"G{axis}"], dtype=np.float64), scatter, Drift(0.0, 1.0)).values
         offset = ZERO_C - centre
         ours = (b2 / WORDS_PER_K**2, (b1 + 2 * b2 * offset) / WORDS_PER_K, b + b1 * offset + b2 * offset**2)
-        found[axis] = np.array(ours), np.array(PRINTED[axis])
+        found[axis] = np.array(ours), np.array(FREEIMU_WORDS[axis])
     return found
 
 
 def run() -> str:
-    """Return the tables; that of the published warm-up where LABCTL_FREEIMU names its file."""
+    """Return the tables: simulated loops, and the published warm-up."""
     found = list(lines())
-    if path := os.environ.get("LABCTL_FREEIMU"):
-        for axis, (ours, theirs) in printed_parabolas(Path(path)).items():
-            worst = float(np.max(np.abs(ours / theirs - 1)))
-            found.append(f"   warm-up, axis {axis}: labctl {ours}, printed {theirs}, apart by {worst:.1e} at most")
+    for axis, (ours, theirs) in printed_parabolas().items():
+        worst = float(np.max(np.abs(ours / theirs - 1)))
+        found.append(f"   warm-up, axis {axis}: labctl {ours}, printed {theirs}, apart by {worst:.1e} at most")
     return "\n".join(found)
 
 

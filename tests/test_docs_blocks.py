@@ -22,7 +22,10 @@ LOOKS_LIKE_A_COMMAND = re.compile(
     r"^\s*(?:\$ |labctl |make |pip |curl |python |\.venv/bin/|systemctl |from \w+ import )", re.MULTILINE
 )
 #: Pages whose files and commands another test builds and runs, in packages of their own.
-ELSEWHERE = {"docs/how-to/extending.md": "tests/system/test_extending.py"}
+ELSEWHERE = {
+    "docs/how-to/extending.md": "tests/system/test_extending.py",
+    "docs/how-to/from-a-file-to-a-calibration.md": "tests/system/test_published_files.py",
+}
 MOST_SKIPPED = 8
 LEAST_REASON_WORDS = 5
 

@@ -35,6 +35,12 @@ MapFile = Annotated[
     Path | None,
     typer.Option("--map", metavar="FILE", help="What the columns of a log are, as TOML; default: proposed and asked."),
 ]
+Beside = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--beside", metavar="FILE", help="File with further columns of the same run, joined by time; may be repeated."
+    ),
+]
 AcceptMap = Annotated[bool, typer.Option("--accept-map", help="Import by the proposed map without a question.")]
 WriteMap = Annotated[
     Path | None,
@@ -51,6 +57,7 @@ def import_(
     importer: ImporterName = None,
     option: ImporterOptions = None,
     column_map: MapFile = None,
+    beside: Beside = None,
     accept_map: AcceptMap = False,
     write_map: WriteMap = None,
     template: TemplateKind = None,
@@ -70,7 +77,9 @@ def import_(
         accept = Acceptance(
             named(path), given=column_map is not None, accepted=accept_map, out=write_map, quiet=as_json
         )
-        with as_interchange(accept.path, importer, option or [], read_given(column_map), accept.ask) as folder:
+        with as_interchange(
+            accept.path, importer, option or [], read_given(column_map), accept.ask, beside or []
+        ) as folder:
             answer = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
     if as_json:
         print_json(answer)

@@ -151,6 +151,8 @@ def _fill_constants(column_map: ColumnMap, division: Division, columns: dict[str
             if name not in columns:
                 columns[name] = np.full(n, "", dtype="<U2") if isinstance(value, str) else np.full(n, np.nan)
             columns[name][rows] = value
+    if "turn_deg" in columns and "turn_u_deg" in columns:  # of a rest it is not used
+        columns["turn_u_deg"][(columns["turn_deg"] == 0) & ~np.isfinite(columns["turn_u_deg"])] = 0.0
 
 
 def _refuse_force(columns: dict[str, Any], moved: Movement, problems: Problems) -> None:

@@ -18,7 +18,8 @@ from labctl.recording.column_map import ColumnMap, FileKeys
 from labctl.recording.importer import Importer, TableImporter
 from labctl.recording.logs.layout import layout_of
 from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_large, refuse_other
-from labctl.services.recordings.logs import Accept, MappedFile, mapped_file
+from labctl.recording.raw_table import RawTable
+from labctl.services.recordings.logs import Accept, MappedFile, given_layout, mapped_file
 from labctl.services.recordings.staging import staging_folder
 
 
@@ -38,21 +39,25 @@ def as_interchange(
     options: Sequence[str] = (),
     column_map: ColumnMap | None = None,
     accept: Accept | None = None,
+    beside: Sequence[Path] = (),
 ) -> Iterator[Path]:
     """Give the folder of a recording in the interchange format: the path itself, or one made of what `path` holds.
 
     `name` is an importer's; without it the importer that is surest. `options` are KEY=VALUE. `column_map` says what the
     columns of a log are; without it one is proposed. `accept` is shown what a log would become, and raises where that
-    is not wanted. Raises BadInput for an importer or option that there is not, BadRecording for what cannot be read.
+    is not wanted. `beside` are files with further columns of the same run. Raises BadInput for an importer or option
+    that there is not, BadRecording for what cannot be read.
     """
     given = parsed_options(options)
     chosen = name or surest(path)
     if chosen == INTERCHANGE and not given:
         if column_map is not None:
             raise _no_map(chosen)
+        if beside:
+            raise _nothing_beside(chosen)
         yield path
         return
-    recording = read_with(chosen, path, given, column_map, accept)
+    recording = read_with(chosen, path, given, column_map, accept, beside)
     with staging_folder() as made:
         folder = made / "recording"
         write_recording(recording, folder)
@@ -103,6 +108,7 @@ def read_with(
     options: Mapping[str, str],
     column_map: ColumnMap | None = None,
     accept: Accept | None = None,
+    beside: Sequence[Path] = (),
 ) -> Recording:
     """Return what an importer reads, checked by the rules of the interchange format; raises BadInput, BadRecording."""
     importer, given = _importer_and_options(name, options)
@@ -111,10 +117,12 @@ def read_with(
         raise BadRecording(f"{path}: not found; name the file to import")
     if isinstance(importer, Importer) and column_map is not None:
         raise _no_map(name)
+    if isinstance(importer, Importer) and beside:
+        raise _nothing_beside(name)
     made: MappedFile | None = None
     try:
         if isinstance(importer, TableImporter):
-            made = mapped_file(name, importer, path, given, column_map)
+            made = mapped_file(name, importer, path, given, column_map, [_table(each, column_map) for each in beside])
         else:
             found = instance_of(Recording)(importer.read(path, given))
     except (LabctlError, MemoryError):
@@ -136,6 +144,23 @@ def log_with_map(path: Path, name: str | None, options: Mapping[str, str], colum
     if not isinstance(importer, TableImporter):
         raise BadInput(f"{path}: importer {chosen} determines the columns itself; import it with `labctl import`")
     return mapped_file(chosen, importer, path, given, column_map)
+
+
+def _table(path: Path, column_map: ColumnMap | None) -> RawTable:
+    """Return the table of a file with further columns; raises BadInput, BadRecording."""
+    if not path.exists():
+        raise BadRecording(f"{path}: not found; name the file to import beside the other")
+    name = surest(path)
+    importer, given = _importer_and_options(name, {})
+    if not isinstance(importer, TableImporter):
+        raise _nothing_beside(name)
+    return importer.table(path, given_layout(given, column_map))
+
+
+def _nothing_beside(name: str) -> BadInput:
+    return BadInput(
+        f"--beside: importer {name} reads one file by itself; leave --beside out, or import logs with columns"
+    )
 
 
 def _no_map(name: str) -> BadInput:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from labctl.recording.column_map import (
     recording_of,
 )
 from labctl.recording.importer import TableImporter, TableOptionsT
+from labctl.recording.logs.beside import joined
 from labctl.recording.raw_table import RawTable
 
 
@@ -47,12 +48,14 @@ Accept = Callable[[MappedFile], None]
 
 
 def mapped_file(
-    name: str, importer: TableImporter[TableOptionsT], path: Path, options: TableOptionsT, column_map: ColumnMap | None
-) -> MappedFile:
-    """Return what a log becomes by a map, or by the one that is proposed; raises BadRecording for what is no log."""
-    if column_map is not None and "file" in type(options).model_fields:
-        options = options.model_copy(update={"file": column_map.file})
-    table = importer.table(path, options)
+    name: str, importer: TableImporter[TableOptionsT], path: Path, options: TableOptionsT, column_map: ColumnMap | None,
+    beside: Sequence[RawTable] = (),
+) -> MappedFile:  # fmt: skip
+    """Return what a log becomes by a map, or by the one that is proposed; raises BadRecording for what is no log.
+
+    `beside` are the tables of further files of the same run.
+    """
+    table = joined(importer.table(path, given_layout(options, column_map)), beside, column_map)
     proposal = propose(table) if column_map is None else completed(table, column_map)
     chosen = proposal.column_map
     if options.serial is not None:
@@ -63,3 +66,10 @@ def mapped_file(
     except BadFile as error:
         return replace(made, problems=error.problems)
     return replace(made, log=log)
+
+
+def given_layout(options: TableOptionsT, column_map: ColumnMap | None) -> TableOptionsT:
+    """Return options with what a map says about the layout of a text, where the importer reads texts."""
+    if column_map is None or "file" not in type(options).model_fields:
+        return options
+    return options.model_copy(update={"file": column_map.file})

@@ -224,6 +224,16 @@ def test_unused_columns_are_named(tmp_path: Path) -> None:
     assert recording_of(found, propose(found).column_map).unused == ["Press", "Ix"]
 
 
+def test_a_rest_needs_no_uncertainty_of_its_angle(tmp_path: Path) -> None:
+    content = "\n".join(["p,gyro_z (deg/s)", *["still,0.1"] * 40, *["turn,90.1"] * 40]) + "\n"
+    toml = (
+        'sample_rate_hz = 10\n[datasets]\nby = "column"\ncolumn = "p"\n[parts.still]\nturn_deg = 0\nposition = "z"\n'
+        '[parts.turn]\nturn_deg = 360\nturn_u_deg = 2\nposition = "z"\n'
+    )
+    columns = mapped(tmp_path, content, toml).columns
+    assert np.asarray(columns["turn_u_deg"]).tolist() == [0.0] * 40 + [2.0] * 40
+
+
 def test_an_accelerometer_tells_its_unit_by_gravity(tmp_path: Path) -> None:
     rows = np.column_stack([at_rest()[:, :4], np.tile([6, 92, 16548], (400, 1))])
     header = "time (s),gyro_x (deg/s),gyro_y (deg/s),gyro_z (deg/s),Ax,Ay,Az"
