@@ -37,6 +37,11 @@ class Registers:
         self._word_order: WordOrder = word_order
         self._write_function: WriteFunction = write_function
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was survived on the line and should be mended, one text each."""
+        return self._link.remarks
+
     def get(self, register: Register) -> float:
         """Get the value of a register, in its unit or counts.
 
