@@ -27,7 +27,7 @@ def explain_tcp(received: bytes, sent: bytes, address: int) -> str:
         return f"protocol number {protocol} came, Modbus TCP has 0; check host and tcp_port in the bench file"
     if received[:2] != sent[:2]:
         number, asked = (int.from_bytes(each[:2], "big") for each in (received, sent))
-        return f"the reply to request {number} came, not to request {asked}; look for a second master of this link"
+        return f"the reply to request {number} came, not to request {asked}; find the second master of this link"
     if received[TCP_PREFIX_BYTES] != address:
         return _other_unit(received[TCP_PREFIX_BYTES], address)
     return _bytes(received, LINE)
@@ -39,7 +39,7 @@ def _is_frame(data: bytes) -> bool:
 
 def _other_unit(found: int, address: int) -> str:
     return (
-        f"unit {found} answered instead of unit {address}; set address in the bench file, or look for a second device"
+        f"unit {found} answered instead of unit {address}; set address in the bench file, or find the second device"
     )
 
 

@@ -126,7 +126,8 @@ class ModbusLink:
             raise LinkError(self.device, text) from error
         except (ModbusException, *UNDECODABLE) as error:
             if self._received:
-                raise MalformedReply(self.device, f"cannot {what}, {self._explain()}") from error
+                advice = self._explain()
+                raise MalformedReply(self.device, f"cannot {what}, {advice}") from error
             raise NoReply(self.device, f"no answer to {what}; {CHECK} {self.address}") from error
         finally:
             self._earliest_request_s = self._clock.now_s() + self._pause_s
@@ -165,7 +166,7 @@ class ModbusLink:
             self._line.doubt(asked_s)
 
     def _explain(self) -> str:
-        """Return what the bytes since the last request are, as they are no reply."""
+        """Return what the bytes since the last request are, as they are no reply, and what to do."""
         if self._is_serial:
             return explain_rtu(self._received, self.address)
         return explain_tcp(self._received, self._sent, self.address)

@@ -74,7 +74,7 @@ class RtuLine:
                 raise MalformedReply(
                     self._device,
                     f"the line was never silent for {SILENCE_FACTOR * self._latency_s:.2g} s in {LONGEST_DRAIN_S:g} s "
-                    "without a request; look for a second master or a device that sends by itself on this line",
+                    "without a request; find the second master, or the device that sends by itself, on this line",
                 )
             self._clock.sleep(min(POLL_S, silent_until_s - now_s))
         self._doubtful_since_s = None
