@@ -38,9 +38,7 @@ def _is_frame(data: bytes) -> bool:
 
 
 def _other_unit(found: int, address: int) -> str:
-    return (
-        f"unit {found} answered instead of unit {address}; set address in the bench file, or find the second device"
-    )
+    return f"unit {found} answered instead of unit {address}; set address in the bench file, or find the second device"
 
 
 def _bytes(received: bytes, advice: str) -> str:

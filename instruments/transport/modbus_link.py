@@ -50,10 +50,10 @@ class RefusedRegister(RequestRejected):
 class ModbusLink:
     """One Modbus instrument behind a client: one request at a time, bounded retries, every failure an InstrumentError.
 
-    After a failure the link is closed, and opened again for the next try. A late reply is told from the answer to a new
-    request by its transaction number, which goes on counting (TCP); on RTU, which has none, the next request waits
-    until the line was silent for longer than the longest latency. A later reply than that can still be taken for an
-    answer of the same length. For one thread; `pause_s` is the least time between two requests, s.
+    After a failure the link is closed, and opened again for the next try. A late reply is distinguished from the answer
+    to a new request by its transaction number, which goes on counting (TCP); on RTU, which has none, the next request
+    waits until the line was silent for longer than the longest latency. A later reply than that can still be taken for
+    an answer of the same length. For one thread; `pause_s` is the least time between two requests, s.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class ModbusLink:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was survived on the line and should be mended."""
+        """What was survived on the line and needs a repair."""
         return tuple(self._line.remarks)
 
     def exchange(self, what: str, ask: Request, fits: Check) -> ModbusPDU:
