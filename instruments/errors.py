@@ -20,11 +20,16 @@ def copy_of(kind: type[Exception], args: tuple[object, ...], attributes: dict[st
     return error
 
 
+def one_line(text: object) -> str:
+    """Return a text of another library, or of a device, without line breaks and control characters."""
+    return " ".join("".join(each if each.isprintable() else " " for each in str(text)).split())
+
+
 class InstrumentError(Exception):
-    """A failure of one device; `device` is its name in the bench file."""
+    """A failure of one device; `device` is its name in the bench file. The text is always one line."""
 
     def __init__(self, device: str, message: str) -> None:
-        super().__init__(f"{device}: {message}")
+        super().__init__(one_line(f"{device}: {message}"))
         self.device = device
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -8,15 +8,17 @@ of the step clock: it is exact against the controller's own clock, and it is nev
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 
 from instruments.clock import Clock, sleep_until
+from instruments.drivers import arrick_c4_checks as checks
 from instruments.drivers.arrick_c4_link import LATE_LETTERS, C4Link
 from instruments.drivers.driver import TableDriver
 from instruments.errors import LimitError, MalformedReply, NoReply, RequestRejected, WrongInstrument
-from instruments.interfaces.table import Spin, TableLimits
+from instruments.interfaces.table import HomeCheck, Spin, StepClock, TableLimits, Wait
 from instruments.protocols import arrick_c4_lines as lines
-from instruments.protocols.arrick_c4_moves import SPARE_S, Move, plan_move
+from instruments.protocols.arrick_c4_moves import SPARE_S, Move, TimedRun, finite_move, plan_move
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
 from instruments.transport.factory import Ports
 
@@ -47,13 +49,22 @@ class ArrickC4:
         self.name = "table"
         self.settings = settings
         self._step_deg = 360.0 / settings.steps_per_turn
-        self.limits = TableLimits(settings.max_rate_dps, settings.acceleration_dps2, self._step_deg)
+        self.limits = TableLimits(
+            settings.max_rate_dps,
+            settings.acceleration_dps2,
+            self._step_deg,
+            clock_run_s=settings.clock_run_s,
+            checks_home=settings.check_home,
+        )
+        self._true = settings  #: with the step clock as it was measured
         self._clock = clock
         self._link = C4Link(self.name, settings, ports, clock, self._forget_programming)
         self._divisor: int | None = None
         self._ramp_set = False
         self._steps = 0.0
         self._active: ActiveMove | None = None
+        self._counted = False  #: whether `_steps` is where the table is
+        self._homing: checks.Homing | None = None
 
     def identify(self) -> str:
         """Get what the controller says it is (`!1fp`, a text that begins with C4).
@@ -77,7 +88,7 @@ class ArrickC4:
             )
         if rate_dps == 0:
             return 0.0
-        move = plan_move(self.settings, rate_dps, 1.0)
+        move = plan_move(self._true, rate_dps, 1.0)
         return math.copysign(move.step_hz * self._step_deg, rate_dps)
 
     def home(self) -> None:
@@ -86,9 +97,10 @@ class ArrickC4:
         Raises RequestRejected, NoReply, LinkError.
         """
         self._discard_late_replies()
+        self._link.initialise()
         self._command(lines.HOME)
         self._link.expect(lines.FINISHED, "home", HOME_S)
-        self._steps, self._active = 0.0, None
+        self._steps, self._active, self._counted = 0.0, None, True
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
         """Control the table to a constant rate, deg/s, for at least `steady_s` seconds; returns when it is steady.
@@ -99,14 +111,9 @@ class ArrickC4:
         if rate_dps == 0:
             now_s = self._clock.now_s()
             return Spin(0.0, 0.0, now_s, now_s + steady_s + SPARE_S, self._steps * self._step_deg, self._step_deg)
-        move = plan_move(self.settings, rate_dps, steady_s)
-        self._discard_late_replies()
-        self._program(move)
-        self._command(lines.move(move.steps * self.settings.direction))
-        self._link.expect(lines.ACCEPTED, "accept a move")
-        start_s = self._clock.now_s()
+        move = plan_move(self._true, rate_dps, steady_s)
+        start_s = self._begin(move)
         from_deg = (self._steps + math.copysign(move.ramp_steps, move.steps)) * self._step_deg
-        self._active = ActiveMove(move, start_s)
         steady_from_s = start_s + move.ramp_s
         sleep_until(self._clock, steady_from_s)
         return Spin(rate_dps, achieved_dps, steady_from_s, steady_from_s + move.steady_s, from_deg, self._step_deg)
@@ -133,24 +140,62 @@ class ArrickC4:
         self._steps += move.steps
 
     def stop(self) -> None:
-        """Control the table to rest (`!1a`). Until the next homing the angle is computed, not counted.
+        """Control the table to rest (`!1a`) and wait until it stands. Until the next homing the angle is computed.
 
-        Raises NoReply, LinkError.
+        A new process does not know what an earlier one left: it ends the line that may be half sent, and aborts
+        without asking first. Raises NoReply, LinkError.
         """
-        if self._active is None:
-            if self.is_moving():  # an earlier process may have left it turning: this link need not be open yet
-                self._abort()
+        active, self._active = self._active, None
+        if active is None:
+            if not self._counted:
+                self._link.send("")
+                self._abort_and_wait()
+            elif self.is_moving():
+                self._counted = False
+                self._abort_and_wait()
             return
-        active, move = self._active, self._active.move
-        self._active = None
-        self._abort()
-        deadline_s = self._clock.now_s() + move.ramp_s + END_TOLERANCE_S
-        while self.is_moving():
-            if self._clock.now_s() > deadline_s:
-                raise NoReply(self.name, "the table still turns after an abort; switch its power off by hand")
-            self._clock.sleep(POLL_S)
+        self._counted = False
+        self._abort_and_wait()
+        move = active.move
         turned = active.steady_elapsed_s(self._clock.now_s()) * move.step_hz
         self._steps += math.copysign(turned, move.steps)
+
+    def measure_clock(self, rate_dps: float, short_s: float, wait: Wait) -> StepClock:
+        """Measure the true step rate by two runs at `rate_dps`, deg/s, steady for `short_s` and `clock_run_s` longer.
+
+        Every later rate is by the measured clock. Raises WrongInstrument, RequestRejected, NoReply, LinkError.
+        """
+        self._true = self.settings
+        short_run, long_run = (
+            self._timed_run(plan_move(self.settings, rate_dps, steady_s), wait)
+            for steady_s in (short_s, short_s + self.settings.clock_run_s)
+        )
+        nominal_hz = plan_move(self.settings, rate_dps, short_s).step_hz
+        found = checks.measured_clock(self.name, self.settings, nominal_hz, (short_run, long_run))
+        clock_hz = self.settings.step_clock_hz * found.ratio
+        self._true = self.settings.model_copy(update={"step_clock_hz": clock_hz})
+        return found
+
+    def check_home(self, wait: Wait) -> HomeCheck | None:
+        """Measure whether home is where it was left: back by counted steps, then home. None: the place is not known.
+
+        The first check learns how long the homing takes. Raises RequestRejected, NoReply, LinkError.
+        """
+        if not self._counted:
+            self.home()
+            return None
+        turn = self.settings.steps_per_turn
+        self._turn_by(round(self._steps / turn) * turn - round(self._steps), wait)
+        took_s = self._timed_home()
+        if self._homing is None:
+            from_home_s = self._timed_home()
+            away = turn // checks.LEARNING_TURN
+            self._turn_by(away, wait)
+            step_s = (self._timed_home() - from_home_s) / away
+            if step_s <= 0:  # the homing does not begin where the table is
+                return None
+            self._homing = checks.Homing(from_home_s, step_s)
+        return self._homing.missed(took_s, self.settings)
 
     def is_moving(self) -> bool:
         """Get whether the table moves (`!1rs`, `0` when idle); raises NoReply, LinkError."""
@@ -168,6 +213,41 @@ class ArrickC4:
     def close(self) -> None:
         """Control the link: close it; safe to call twice."""
         self._link.close()
+
+    def _begin(self, move: Move) -> float:
+        """Begin a move; returns when the controller accepted it, clock time."""
+        self._discard_late_replies()
+        self._link.initialise()
+        self._program(move)
+        self._command(lines.move(move.steps * self.settings.direction))
+        self._link.expect(lines.ACCEPTED, "accept a move")
+        start_s = self._clock.now_s()
+        self._active = ActiveMove(move, start_s)
+        return start_s
+
+    def _timed_run(self, move: Move, wait: Wait) -> TimedRun:
+        """Return a whole move with its true duration."""
+        start_s = self._begin(move)
+
+        def await_end(within_s: float) -> None:
+            self._link.expect(lines.FINISHED, "finish a move", within_s)
+
+        found = checks.timed(self._clock, move, await_end, wait, start_s)
+        self._active = None
+        self._steps += move.steps
+        return found
+
+    def _turn_by(self, steps: int, wait: Wait) -> None:
+        """Turn by whole steps, slowly."""
+        if steps:
+            rate_dps = math.copysign(min(checks.SLOW_DPS, self.limits.max_rate_dps), steps)
+            self._timed_run(finite_move(self._true, rate_dps, steps), wait)
+
+    def _timed_home(self) -> float:
+        """Home; returns how long it took, s."""
+        begun_s = self._clock.now_s()
+        self.home()
+        return self._clock.now_s() - begun_s
 
     def _program(self, move: Move) -> None:
         """Set ramp and speed by the templates of the bench file; each is written on change only."""
@@ -188,12 +268,21 @@ class ArrickC4:
             self._divisor = move.divisor
 
     def _forget_programming(self) -> None:
-        """Ramp and speed are sent again over a new link: the controller may have lost its power."""
-        self._divisor, self._ramp_set = None, False
+        """All is sent again over a new link: the controller may have lost its power, and its place."""
+        self._divisor, self._ramp_set, self._counted = None, False, False
 
-    def _abort(self) -> None:
+    def _abort_and_wait(self) -> None:
+        """Abort, and wait until the table stands; the slowest ramp is that from the highest rate."""
+        self._link.discard_input()
         self._command(lines.ABORT)
-        self._link.read_letter()
+        with suppress(NoReply):  # the state shows whether it was understood
+            self._link.read_letter()
+        ramp_s = self.settings.max_rate_dps / self.settings.acceleration_dps2
+        deadline_s = self._clock.now_s() + ramp_s + END_TOLERANCE_S
+        while self.is_moving():
+            if self._clock.now_s() > deadline_s:
+                raise NoReply(self.name, "the table still turns after an abort; switch its power off by hand")
+            self._clock.sleep(POLL_S)
 
     def _command(self, body: str) -> None:
         self._link.send(lines.command(body))

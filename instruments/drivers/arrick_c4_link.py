@@ -28,6 +28,7 @@ class C4Link:
         self._ports, self._clock = ports, clock
         self._opened = opened
         self._port: SerialPort | None = None
+        self._initialised = False
 
     @property
     def is_open(self) -> bool:
@@ -41,6 +42,7 @@ class C4Link:
             self._port = self._ports.serial(
                 settings.port, device=self._device, baudrate=settings.baudrate, timeout_s=REPLY_S
             )
+            self._initialised = False
             self._opened()
         return self._port
 
@@ -82,9 +84,30 @@ class C4Link:
         except BROKEN as error:
             self._fail(error)
 
-    def read_line(self) -> str:
-        """Return the next line of text; raises NoReply or LinkError."""
-        text = self.read_letter(skip=LATE_LETTERS)
+    def initialise(self) -> None:
+        """Send the commands of the bench file that come before any motion; once for each opening of the link.
+
+        Raises RequestRejected for another reply than expected, NoReply or LinkError.
+        """
+        self.open()
+        if self._initialised:
+            return
+        for command in self._settings.init_commands:
+            self.send(command.send)
+            if command.expect is None:
+                self._clock.sleep(REPLY_S)  # it may answer nevertheless, which is no reply to what follows
+                self.discard_input()
+            elif (found := self.read_line(skip="")) != command.expect:
+                raise RequestRejected(
+                    self._device,
+                    f"answered {found!r} to {command.send} where init_commands expects {command.expect!r}; "
+                    "correct the bench file by the controller's manual",
+                )
+        self._initialised = True
+
+    def read_line(self, skip: str = LATE_LETTERS) -> str:
+        """Return the next line of text, from its first letter that is none of `skip`; raises NoReply or LinkError."""
+        text = self.read_letter(skip=skip)
         port = self.open()
         while (found := bytes(port.read(1))) and found not in LINE_END:
             text += found.decode("latin-1")

@@ -90,7 +90,7 @@ class Watlow(ABC):
         back, and what a register access raises.
         """
         rounded = self._checked(temperature_c)
-        self._refuse_while_a_profile_runs()
+        self._refuse_without_effect()
         self._switch_on()
         self._has_controlled = True
         return self._write_and_verify(rounded)
@@ -103,7 +103,7 @@ class Watlow(ABC):
         rounded = self._checked(self.safe_c)
         if self._has_controlled and self._profile_runs():
             self._end_profile()
-        self._refuse_while_a_profile_runs()
+        self._refuse_without_effect()
         return self._write_and_verify(rounded)
 
     def read(self) -> ChamberState:
@@ -129,13 +129,15 @@ class Watlow(ABC):
             )
         return rounded
 
-    def _refuse_while_a_profile_runs(self) -> None:
+    def _hindrance(self) -> str:
+        """Return why a set point would have no effect, and what to do; an empty text where it has one."""
         if self._profile_runs():
-            raise RequestRejected(
-                self.name,
-                "a profile runs or is held on the controller, a set point would have no effect; "
-                "end it at the front panel",
-            )
+            return "a profile runs or is held on the controller, a set point would have no effect; end it at its panel"
+        return ""
+
+    def _refuse_without_effect(self) -> None:
+        if hint := self._hindrance():
+            raise RequestRejected(self.name, f"{hint}")
 
     def _write_and_verify(self, rounded_c: float) -> float:
         if abs(self._read_setpoint() - rounded_c) > TINY_C:

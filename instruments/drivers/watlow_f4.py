@@ -7,11 +7,12 @@ from instruments.drivers.driver import ChamberDriver
 from instruments.drivers.watlow import REPLY_S, Watlow
 from instruments.errors import RequestRejected
 from instruments.protocols import watlow_f4_registers as f4
+from instruments.protocols.modbus_codes import ILLEGAL_ADDRESS
 from instruments.protocols.modbus_registers import Register
 from instruments.protocols.watlow_settings import WatlowSettings
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Registers
-from instruments.transport.modbus_link import Client
+from instruments.transport.modbus_link import Client, RefusedRegister
 
 
 class WatlowF4(Watlow):
@@ -28,6 +29,7 @@ class WatlowF4(Watlow):
         )
         super().__init__(settings, registers, clock)
         self._counts_per_c: float | None = None
+        self._alarm_words: list[int] = []
 
     def identify(self) -> str:
         """Get model and resolution.
@@ -45,7 +47,7 @@ class WatlowF4(Watlow):
         for number in self.settings.alarm_inputs:
             if get(f4.INPUT_FUNCTION.nth(number, f4.INPUT_SETUP_STRIDE)) == f4.FUNCTION_WAIT_FOR:
                 raise self._wrong(f"digital input {number} is a profile's wait-for input, not an alarm (alarm_inputs)")
-        return f"Watlow F4, steps of {self._resolution_c():g} deg C"
+        return "; ".join([f"Watlow F4, steps of {self._resolution_c():g} deg C", *self._registers.remarks])
 
     def _read_scale(self) -> float:
         """Return the counts per kelvin: ten to the number of implied decimals. Asks the controller once."""
@@ -62,8 +64,28 @@ class WatlowF4(Watlow):
     def _controller_limits(self) -> tuple[float, float]:
         return self._celsius(f4.SETPOINT_LOW), self._celsius(f4.SETPOINT_HIGH)
 
+    def _mode(self) -> int:
+        return int(self._registers.get_block(f4.MODE, f4.MODE_COUNTS)[0])
+
     def _profile_runs(self) -> bool:
-        return self._registers.get_int(f4.MODE) in {f4.MODE_PROFILE_RUNNING, f4.MODE_PROFILE_HELD}
+        mode = self._mode()
+        return mode in {f4.MODE_PROFILE_RUNNING, f4.MODE_PROFILE_HELD} and not self._is_manual(mode)
+
+    def _hindrance(self) -> str:
+        if self._is_manual(self._mode()):
+            return "the controller is in manual mode, a set point would have no effect; set it to auto at its panel"
+        return super()._hindrance()
+
+    def _is_manual(self, mode: int) -> bool:
+        """Return whether a mode is the manual one of an F4P, which has no profile that could run."""
+        if mode != f4.MODE_MANUAL_F4P:
+            return False
+        try:
+            return self._registers.get_int(f4.CURRENT_PROFILE) not in f4.PROFILES
+        except RefusedRegister as refused:
+            if refused.code != ILLEGAL_ADDRESS:
+                raise
+            return True
 
     def _end_profile(self) -> None:
         self._registers.put(f4.TERMINATE, f4.TERMINATE_PROFILE)
@@ -86,11 +108,19 @@ class WatlowF4(Watlow):
         return self._celsius(f4.SETPOINT)
 
     def _read_air(self) -> float:
-        return self._celsius(f4.AIR)
+        counts, self._alarm_words = self._registers.get_block(f4.AIR, f4.AIR_COUNTS)
+        return counts / self._read_scale()
 
     def _alarms(self) -> tuple[str, ...]:
-        """Return the active alarm inputs; no public source lists alarm registers of the F4."""
-        return tuple(f"digital input {number}" for number in self.settings.alarm_inputs if self._is_active(number))
+        """Return the active alarm inputs, and the alarms and input error that came with the air temperature."""
+        found = [f"digital input {number}" for number in self.settings.alarm_inputs if self._is_active(number)]
+        words = dict(enumerate(self._alarm_words)) if self.settings.alarm_registers else {}
+        if (code := words.get(f4.INPUT_ERROR, 0)) in f4.INPUT_ERRORS:
+            found.append(f"error {code} of input 1")
+        for alarm, offset in f4.ALARM_OFFSETS.items():
+            if state := f4.ALARM_STATES.get(words.get(offset, 0)):
+                found.append(f"alarm {alarm} {state}")
+        return tuple(found)
 
     def _is_active(self, number: int) -> bool:
         state = self._registers.get_int(f4.INPUT_STATE.nth(number, f4.INPUT_STRIDE))

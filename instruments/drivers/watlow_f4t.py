@@ -1,4 +1,4 @@
-"""Chamber controller Watlow F4T over Modbus TCP: control loop 1, 32-bit floats in two registers."""
+"""Chamber controller Watlow F4T over Modbus TCP: control loop 1 or cascade 1, 32-bit floats in two registers."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ import math
 from instruments.clock import Clock
 from instruments.drivers.driver import ChamberDriver
 from instruments.drivers.watlow import REPLY_S, Watlow
-from instruments.errors import RequestRejected
+from instruments.errors import MalformedReply, RequestRejected
 from instruments.protocols import watlow_f4t_registers as f4t
-from instruments.protocols.modbus_codes import ILLEGAL_ADDRESS
+from instruments.protocols.modbus_codes import DEVICE_FAILURE, ILLEGAL_ADDRESS
+from instruments.protocols.modbus_registers import Register
 from instruments.protocols.watlow_settings import WatlowSettings
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Registers
 from instruments.transport.modbus_link import Client, RefusedRegister
 
-#: Period of alarm requests, s: five more requests per poll otherwise; the air temperature is read at every poll.
+#: Period of alarm requests, s: up to 30 more requests per poll otherwise; the air temperature is read at every poll.
 ALARMS_EVERY_S = 30.0
 
 
 class WatlowF4T(Watlow):
-    """Driver of a chamber on a Watlow F4T."""
+    """Driver of a chamber on a Watlow F4T. What it has besides control loop 1 follows from its part number."""
 
     def __init__(self, settings: WatlowSettings, ports: Ports, clock: Clock) -> None:
         def link() -> Client:
@@ -30,15 +31,17 @@ class WatlowF4T(Watlow):
         super().__init__(settings, registers, clock)
         self._alarms_due_s = -math.inf
         self._last_alarms: tuple[str, ...] = ()
+        self._known_part: str | None = None
+        self._limit_modules: tuple[int, ...] | None = None
 
     def identify(self) -> str:
         """Get the part number.
 
-        Raises WrongInstrument for another controller, a device status other than ok, and units other than Celsius; also
-        what a register read raises.
+        Raises WrongInstrument for another controller, a device status other than ok, and units other than Celsius,
+        MalformedReply for floats in another word order; also what a register read raises.
         """
-        letters = self._registers.words(f4t.PART_NUMBER, f4t.PART_NUMBER_LETTERS)
-        part = "".join(chr(letter) for letter in letters if 32 < letter < 127)
+        self._known_part = None
+        part = self._part_number()
         if not part.startswith("F4T"):
             raise self._wrong(f"part number {part!r} is not an F4T's")
         if (status := self._registers.get_int(f4t.STATUS)) != f4t.STATUS_OK:
@@ -47,39 +50,64 @@ class WatlowF4T(Watlow):
             raise self._wrong(
                 f"units on Ethernet are {units} instead of {f4t.UNITS_CELSIUS} (Celsius), set them at its panel"
             )
+        self._controller_limits()
         return f"Watlow {part}"
 
+    def _part_number(self) -> str:
+        if self._known_part is None:
+            letters = self._registers.words(f4t.PART_NUMBER, f4t.PART_NUMBER_LETTERS)
+            self._known_part = "".join(chr(letter) for letter in letters if 32 < letter < 127)
+        return self._known_part
+
+    def _loop(self) -> f4t.ControlLoop:
+        wanted = self.settings.cascade
+        cascade = f4t.has_cascade(self._part_number()) if wanted is None else wanted
+        return f4t.CASCADE if cascade else f4t.LOOP
+
     def _controller_limits(self) -> tuple[float, float]:
-        return self._registers.get(f4t.SETPOINT_LOW), self._registers.get(f4t.SETPOINT_HIGH)
+        loop = self._loop()
+        low, high = self._registers.get(loop.low), self._registers.get(loop.high)
+        if not low < high:
+            other = "big" if self.settings.word_order == "little" else "little"
+            raise MalformedReply(
+                self.name,
+                f"its set point limits read {low:g} to {high:g} deg C, and the lower one must be below the other; "
+                f"set word_order = '{other}' in the bench file, or correct the limits at its panel",
+            )
+        return low, high
 
     def _resolution_c(self) -> float:
         return f4t.RESOLUTION_C
 
     def _profile_runs(self) -> bool:
-        try:
-            return self._registers.get_int(f4t.PROFILE_STATE) in f4t.PROFILE_ACTIVE
-        except RefusedRegister as refused:
-            if refused.code != ILLEGAL_ADDRESS:
-                raise
-            return False  # profiles are an option of the part number
+        # profiles are an option of the part number
+        return self._read_if_there(f4t.PROFILE_STATE) in f4t.PROFILE_ACTIVE
 
     def _end_profile(self) -> None:
         self._registers.put(f4t.PROFILE_ACTION, f4t.PROFILE_TERMINATE)
 
     def _switch_on(self) -> None:
-        if (mode := self._registers.get_int(f4t.CONTROL_MODE)) != f4t.MODE_AUTO:
+        loop = self._loop()
+        if (mode := self._registers.get_int(loop.mode)) != f4t.MODE_AUTO:
+            what = "cascade loop 1" if loop is f4t.CASCADE else "control loop 1"
             raise RequestRejected(
-                self.name, f"control loop 1 is in mode {f4t.MODES.get(mode, mode)}, not auto; switch it on at its panel"
+                self.name, f"{what} is in mode {f4t.MODES.get(mode, mode)}, not auto; switch it on at its panel"
+            )
+        if not self._runs():
+            module, output = self.settings.run_output or (0, 0)
+            raise RequestRejected(
+                self.name,
+                f"the chamber does not run (output {output} of module {module} is off); switch it on at its panel",
             )
 
     def _write_setpoint(self, temperature_c: float) -> None:
-        self._registers.put(f4t.SETPOINT, temperature_c)
+        self._registers.put(self._loop().setpoint, temperature_c)
 
     def _read_setpoint(self) -> float:
-        return round(self._registers.get(f4t.SETPOINT), 4)  # a float32 holds 85.1 as 85.0999985
+        return round(self._registers.get(self._loop().setpoint), 4)  # a float32 holds 85.1 as 85.0999985
 
     def _read_air(self) -> float:
-        return self._registers.get(f4t.AIR)
+        return self._registers.get(self._loop().air)
 
     def _alarms(self) -> tuple[str, ...]:
         if self._clock.now_s() >= self._alarms_due_s:
@@ -88,13 +116,49 @@ class WatlowF4T(Watlow):
         return self._last_alarms
 
     def _read_alarms(self) -> tuple[str, ...]:
-        found = [f"alarm {number}" for number in range(1, f4t.ALARMS + 1) if not self._is_quiet(number)]
-        if self._registers.get_int(f4t.CONTROL_MODE) != f4t.MODE_AUTO:
+        alarms = f4t.alarms_of(self._part_number())
+        found = [f"alarm {number}" for number in range(1, alarms + 1) if not self._is_quiet(number)]
+        found += [f"limit module {number}" for number in self._present_limit_modules() if self._has_tripped(number)]
+        if self._registers.get_int(self._loop().mode) != f4t.MODE_AUTO:
             found.append("control is not in auto")
+        if not self._runs():
+            found.append("the chamber does not run")
         return tuple(found)
 
     def _is_quiet(self, number: int) -> bool:
         return self._registers.get_int(f4t.ALARM.nth(number, f4t.ALARM_STRIDE)) in f4t.ALARM_QUIET
+
+    def _present_limit_modules(self) -> tuple[int, ...]:
+        """Return the slots with a limit module; the controller is asked once."""
+        if self._limit_modules is None:
+            slots = range(1, f4t.LIMIT_MODULES + 1)
+            states = {n: self._read_if_there(f4t.LIMIT_STATE.nth(n, f4t.LIMIT_STRIDE)) for n in slots}
+            self._limit_modules = tuple(n for n, state in states.items() if state is not None)
+        return self._limit_modules
+
+    def _has_tripped(self, module: int) -> bool:
+        state, status, error = (
+            self._registers.get_int(register.nth(module, f4t.LIMIT_STRIDE))
+            for register in (f4t.LIMIT_STATE, f4t.LIMIT_STATUS, f4t.LIMIT_ERROR)
+        )
+        return state == f4t.ERROR or status == f4t.FAIL or error != f4t.NONE
+
+    def _runs(self) -> bool:
+        """Return whether the output that shows it is on; True where the bench file names none."""
+        if self.settings.run_output is None:
+            return True
+        module, output = self.settings.run_output
+        register = f4t.OUTPUT.nth(module, f4t.MODULE_STRIDE).nth(output, f4t.OUTPUT_STRIDE)
+        return self._registers.get_int(register) == f4t.ON
+
+    def _read_if_there(self, register: Register) -> int | None:
+        """Return the value of a register; None where the controller lacks it."""
+        try:
+            return self._registers.get_int(register)
+        except RefusedRegister as refused:
+            if refused.code not in {ILLEGAL_ADDRESS, DEVICE_FAILURE}:
+                raise
+            return None
 
 
 DRIVER = ChamberDriver(WatlowSettings, WatlowF4T)

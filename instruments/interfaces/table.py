@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,44 @@ class TableLimits:
     max_rate_dps: float
     max_acceleration_dps2: float
     step_deg: float  #: table angle of one motor step; 0 for a table without steps
+    clock_run_s: float = (
+        0.0  #: by how much the longer of two runs is longer that measure the step clock; 0: not measured
+    )
+    checks_home: bool = False  #: whether missed steps are looked for at the home switch
+
+
+@dataclass(frozen=True)
+class StepClock:
+    """The true step rate of a table, by two runs of equal speed and ramp."""
+
+    ratio: float  #: true step rate over the nominal one
+    u_ppm: float  #: standard uncertainty of the ratio
+    nominal_hz: float  #: clock frequency of the bench file
+    nominal_u_ppm: float  #: and its standard uncertainty
+
+    @property
+    def deviation_ppm(self) -> float:
+        """Deviation of the true step rate from the nominal one."""
+        return 1e6 * (self.ratio - 1)
+
+    @property
+    def limit_ppm(self) -> float:
+        """Largest deviation that the two uncertainties explain, at three standard deviations."""
+        return float(3 * np.hypot(self.u_ppm, self.nominal_u_ppm))
+
+
+@dataclass(frozen=True)
+class HomeCheck:
+    """Where the table was when it should have been at home."""
+
+    missed_steps: float  #: by the duration of the homing
+    limit_steps: float
+    step_deg: float
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether steps were missed."""
+        return self.missed_steps > self.limit_steps
 
 
 @dataclass(frozen=True)
@@ -95,4 +134,21 @@ class RateTable(Protocol):
 
     def close(self) -> None:
         """Control the link: close it. This does not stop the table."""
+        ...
+
+
+#: Lets seconds pass; may raise what ends the campaign.
+Wait = Callable[[float], None]
+
+
+@runtime_checkable
+class OpenLoopTable(Protocol):
+    """What a table without an encoder can find out about its own steps. Its limits say whether a plan asks for it."""
+
+    def measure_clock(self, rate_dps: float, short_s: float, wait: Wait) -> StepClock:
+        """Measure the true step rate by two runs at `rate_dps`; every later rate is by it. `wait` passes the time."""
+        ...
+
+    def check_home(self, wait: Wait) -> HomeCheck | None:
+        """Measure whether home is where it was left, and home; None where the position is not known."""
         ...

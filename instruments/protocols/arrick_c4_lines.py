@@ -14,6 +14,10 @@ IDENTIFY, STATE, ABORT, HOME = "fp", "rs", "a", "h1"
 #: Text that the reply to IDENTIFY begins with.
 IDENTITY_PREFIX = "C4"
 ACCEPTED, FINISHED, IDLE = "a", "o", "0"
+#: Homes both motors: one `o` for each.
+HOME_BOTH = "h12"
+#: Body of a parameter command, as `wh1,r,200`: acknowledged by a line.
+PARAMETER = re.compile(r"w[a-z].*")
 #: Body of a move command: direction `f` or `r`, then the number of half steps.
 MOVE = re.compile(r"m1([fr])(\d+)n")
 

@@ -6,13 +6,20 @@ from typing import Literal
 
 from pydantic import Field
 
-from instruments.bench_config import TableSettings
+from instruments.bench_config import Strict, TableSettings
 
 
 class StepperSettings(TableSettings):
     """Step clock of a table whose rates are whole divisors of it."""
 
     step_clock_hz: float = Field(default=2_000_000.0, gt=0)  #: the step rate is this frequency over a whole divisor
+
+
+class InitCommand(Strict):
+    """A command that is sent once after the link is opened, before the table moves."""
+
+    send: str = Field(min_length=1, max_length=79)  #: with its prefix, as `!1we11`
+    expect: str | None = None  #: the line of the reply; without it, what comes within a second is dropped
 
 
 class ArrickC4Settings(StepperSettings):
@@ -27,3 +34,12 @@ class ArrickC4Settings(StepperSettings):
     speed_template: str | None = None
     ramp_template: str | None = None
     terminator: str = "\r"
+    #: Motors energised, limits removed and the like: once per opening of the link, before the table moves.
+    init_commands: tuple[InitCommand, ...] = ()
+    #: By how much the longer of the two runs is longer that measure the step clock, s; 0: the clock is not measured.
+    clock_run_s: float = Field(default=60.0, ge=0, le=3600)
+    reply_u_s: float = Field(
+        default=0.001, gt=0
+    )  #: standard uncertainty of when a reply arrives, without what is common
+    check_home: bool = True  #: look for missed steps at the home switch before and after each temperature
+    home_limit_steps: float = Field(default=2.0, gt=0)  #: more missed steps end the campaign

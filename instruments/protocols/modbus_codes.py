@@ -8,7 +8,10 @@ READ_HOLDING: Final = 3
 READ_INPUT: Final = 4
 WRITE_SINGLE: Final = 6
 WRITE_MULTIPLE: Final = 16
+READ_FUNCTIONS: Final = frozenset({READ_HOLDING, READ_INPUT})
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, DEVICE_FAILURE, ACKNOWLEDGED, BUSY = 1, 2, 3, 4, 5, 6
+MEMORY_PARITY, GATEWAY_PATH, GATEWAY_TARGET = 8, 10, 11
+#: Modbus Application Protocol V1.1b3, section 7.
 EXCEPTIONS = {
     ILLEGAL_FUNCTION: "it does not know the function",
     ILLEGAL_ADDRESS: "it has no such register, or the register cannot be written",
@@ -16,6 +19,9 @@ EXCEPTIONS = {
     DEVICE_FAILURE: "it failed inside",
     ACKNOWLEDGED: "it needs more time",
     BUSY: "it is busy",
+    MEMORY_PARITY: "memory parity error; switch it off and on, and have it repaired if that stays",
+    GATEWAY_PATH: "gateway path unavailable; check the gateway's serial port settings",
+    GATEWAY_TARGET: "gateway target device failed to respond; check address, power and cable behind the gateway",
 }
 #: Bytes of a Modbus TCP frame up to and including its length field.
 TCP_PREFIX_BYTES = 6

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -17,4 +17,9 @@ class WatlowSettings(ChamberSettings):
     word_order: Literal["little", "big"] = "little"  #: of 32-bit floats (watlow-f4t): low word first by default
     write_function: Literal[6, 16] = 6  #: tried first (watlow-f4); the other one follows an "illegal function"
     alarm_inputs: tuple[Literal[1, 2, 3, 4], ...] = ()  #: digital inputs that carry alarms, if wired (watlow-f4)
+    alarm_registers: bool = True  #: 101, 102 and 106 are input error and alarms (watlow-f4), where they exist
+    #: Control by the cascade loop (watlow-f4t); by default where the part number has one.
+    cascade: bool | None = None
+    #: Module and output, from 1, that is on while the chamber runs, if wired (watlow-f4t).
+    run_output: tuple[Annotated[int, Field(ge=1, le=6)], Annotated[int, Field(ge=1, le=6)]] | None = None
     enable_event: int | None = Field(default=None, ge=1, le=8)  #: event output that switches the chamber, if wired

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 from pymodbus.pdu import ModbusPDU
 
 from instruments.clock import Clock
 from instruments.errors import LimitError, MalformedReply
-from instruments.protocols.modbus_codes import ILLEGAL_FUNCTION, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE
+from instruments.protocols.modbus_codes import (
+    ILLEGAL_ADDRESS,
+    ILLEGAL_FUNCTION,
+    ILLEGAL_VALUE,
+    READ_HOLDING,
+    WRITE_MULTIPLE,
+    WRITE_SINGLE,
+)
 from instruments.protocols.modbus_registers import Register, WordOrder
 from instruments.transport.modbus_link import Client, ModbusLink, RefusedRegister
 
@@ -36,20 +43,38 @@ class Registers:
         self._link = ModbusLink(device, address, clock, open_client, pause_s=pause_s)
         self._word_order: WordOrder = word_order
         self._write_function: WriteFunction = write_function
+        self._absent: set[tuple[Register, int]] = set()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was survived on the line and needs a repair, one text each."""
+        return self._link.remarks
 
     def get(self, register: Register) -> float:
         """Get the value of a register, in its unit or counts.
 
         Raises MalformedReply for a value that the register cannot hold, and what `words` raises.
         """
-        value = register.decode(self.words(register), self._word_order)
-        if not register.holds(value):
-            raise MalformedReply(
-                self._link.device,
-                f"{register} reads {value:g} {register.unit}, possible are {register.low:g} to {register.high:g}; "
-                "check the sensor, the word order and that the bench file names the right driver",
-            )
-        return value
+        return self._value(register, self.words(register))
+
+    def get_block(self, register: Register, counts: Sequence[int]) -> tuple[float, list[int]]:
+        """Get the value of a register and the words from it on, by the first of `counts` that the instrument has.
+
+        A reply of another length than asked for never fits, so that on a line without numbered replies a late one to
+        another request is refused. Raises as `get` does.
+        """
+        for count in counts:
+            if (register, count) in self._absent:
+                continue
+            try:
+                words = self.words(register, count)
+            except RefusedRegister as refused:
+                if refused.code not in {ILLEGAL_ADDRESS, ILLEGAL_VALUE} or count == counts[-1]:
+                    raise
+                self._absent.add((register, count))
+            else:
+                return self._value(register, words[: register.words]), words
+        return self.get(register), []
 
     def get_int(self, register: Register) -> int:
         """Get the value of a 16-bit register; raises as `get` does."""
@@ -96,6 +121,20 @@ class Registers:
     def close(self) -> None:
         """Control the link: close it; safe to call twice. The next request opens it again."""
         self._link.close()
+
+    def _value(self, register: Register, words: list[int]) -> float:
+        value = register.decode(words, self._word_order)
+        if register.is_plausible(value):
+            return value
+        other: WordOrder = "big" if self._word_order == "little" else "little"
+        if register.kind == "float32" and register.is_plausible(exchanged := register.decode(words, other)):
+            advice = f"with its words exchanged it is {exchanged:g}: set word_order = '{other}' in the bench file"
+        else:
+            advice = "check the sensor, the word order and that the bench file names the right driver"
+        raise MalformedReply(
+            self._link.device,
+            f"{register} reads {value:g} {register.unit}, possible are {register.low:g} to {register.high:g}; {advice}",
+        )
 
     def _check_writable(self, register: Register, value: float) -> None:
         if register.access == "r":

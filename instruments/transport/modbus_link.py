@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import struct
 from collections.abc import Callable
+from typing import cast
 
 from pymodbus import ModbusException
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
@@ -15,9 +16,11 @@ from pymodbus.exceptions import ConnectionException
 from pymodbus.pdu import ModbusPDU
 
 from instruments.clock import Clock, sleep_until
-from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected
+from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected, one_line
 from instruments.protocols.modbus_codes import ACKNOWLEDGED, BUSY, EXCEPTIONS, ends_at_a_frame_end
-from instruments.transport.serial import BROKEN
+from instruments.transport.modbus_diagnosis import explain_rtu, explain_tcp
+from instruments.transport.rtu_line import RtuLine
+from instruments.transport.serial import BROKEN, SerialPort
 
 #: Failures are raised, not logged; without a handler pymodbus would write them to standard error.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
@@ -27,7 +30,7 @@ Client = ModbusTcpClient | ModbusSerialClient
 Request = Callable[[Client], ModbusPDU]
 Check = Callable[[ModbusPDU], bool]
 DISCONNECTED: tuple[type[Exception], ...] = (ConnectionException, *BROKEN)
-#: Pauses before each further try, s. A late reply of the failed try arrives meanwhile and is dropped.
+#: Pauses before each further try, s; on a serial line the wait for silence takes their place.
 RETRY_PAUSES_S = (0.1, 1.0)
 TRIES = 1 + len(RETRY_PAUSES_S)
 #: Exceptions that pymodbus's decoders do not catch when bytes are malformed.
@@ -47,9 +50,10 @@ class RefusedRegister(RequestRejected):
 class ModbusLink:
     """One Modbus instrument behind a client: one request at a time, bounded retries, every failure an InstrumentError.
 
-    After a failure the link is closed, and opened again for the next try. Transaction numbers go on counting (TCP) and
-    unread bytes are dropped before each request (RTU), so a late reply is never taken for the answer to a new request.
-    For one thread; `pause_s` is the least time between two requests, s.
+    After a failure the link is closed, and opened again for the next try. A late reply is distinguished from the answer
+    to a new request by its transaction number, which goes on counting (TCP); on RTU, which has none, the next request
+    waits until the line was silent for longer than the longest latency. A later reply than that can still be taken for
+    an answer of the same length. For one thread; `pause_s` is the least time between two requests, s.
     """
 
     def __init__(
@@ -61,7 +65,13 @@ class ModbusLink:
         self._pause_s = pause_s
         self._client: Client | None = None
         self._earliest_request_s = 0.0
-        self._received = b""
+        self._sent = self._received = b""
+        self._line = RtuLine(device, clock)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was survived on the line and needs a repair."""
+        return tuple(self._line.remarks)
 
     def exchange(self, what: str, ask: Request, fits: Check) -> ModbusPDU:
         """Return the reply to a request, tried up to three times.
@@ -75,16 +85,21 @@ class ModbusLink:
         for attempt, pause_s in enumerate((0.0, *RETRY_PAUSES_S), start=1):
             if failure is not None:
                 log.warning("link.retry", extra={"device": self.device, "attempt": attempt, "reason": str(failure)})
-            self._clock.sleep(pause_s)
+            if not self._line.is_doubtful:
+                self._clock.sleep(pause_s)
             try:
-                return self._exchange_once(what, ask, fits)
+                reply = self._exchange_once(what, ask, fits)
             except RefusedRegister as refused:
                 if refused.code not in {ACKNOWLEDGED, BUSY}:
                     raise
                 failure = refused
             except LinkError as error:
                 failure = error
-                self.close()
+                self._give_up(error)
+            else:
+                if failure is not None:
+                    self._doubt(start_s)  # one of several equal requests was answered, perhaps the first
+                return reply
         assert failure is not None
         if isinstance(failure, RefusedRegister):
             raise failure
@@ -100,19 +115,19 @@ class ModbusLink:
     def _exchange_once(self, what: str, ask: Request, fits: Check) -> ModbusPDU:
         """Return the reply to one try; raises NoReply, MalformedReply, LinkError or RefusedRegister."""
         sleep_until(self._clock, self._earliest_request_s)
-        self._received = b""
+        self._sent = self._received = b""
         try:
             client = self._connected()
             reply = ask(client)
         except DISCONNECTED as error:
-            text = f"cannot {what}, the link is gone ({error}); check cable and power"
+            # pymodbus's own text is the client's address in memory
+            detail = "" if isinstance(error, ConnectionException) else f" ({one_line(error)})"
+            text = f"cannot {what}, the link is gone{detail}; check cable and power"
             raise LinkError(self.device, text) from error
         except (ModbusException, *UNDECODABLE) as error:
             if self._received:
-                text = (
-                    f"cannot {what}, {len(self._received)} bytes came that are no reply; check line settings and cable"
-                )
-                raise MalformedReply(self.device, text) from error
+                advice = self._explain()
+                raise MalformedReply(self.device, f"cannot {what}, {advice}") from error
             raise NoReply(self.device, f"no answer to {what}; {CHECK} {self.address}") from error
         finally:
             self._earliest_request_s = self._clock.now_s() + self._pause_s
@@ -125,15 +140,42 @@ class ModbusLink:
         return reply
 
     def _connected(self) -> Client:
-        if self._client is None:
-            self._client = self._open_client()
+        client = self._client
+        if client is None:
+            client = self._client = self._open_client()
             # pymodbus's own hook; its other way in is the constructor
-            self._client.transaction.trace_packet = self._record_received
-        elif not self._client.connect():
+            client.transaction.trace_packet = self._trace
+        elif not client.connect():
             raise LinkError(self.device, "the link cannot be opened again; check cable and power")
-        return self._client
+        if self._line.is_doubtful and client.socket is not None:
+            self._line.await_silence(cast("SerialPort", client.socket))
+        return client
 
-    def _record_received(self, sending: bool, data: bytes) -> bytes:
-        """Keep the bytes since the last request: they distinguish silence from malformed bytes."""
-        self._received = b"" if sending else data
-        return data
+    @property
+    def _is_serial(self) -> bool:
+        return isinstance(self._client, ModbusSerialClient)
+
+    def _give_up(self, error: LinkError) -> None:
+        """Close the link after a failed try; a port that was gone has lost what was still to come."""
+        if isinstance(error, NoReply | MalformedReply):
+            self._doubt()
+        self.close()
+
+    def _doubt(self, asked_s: float | None = None) -> None:
+        if self._is_serial:
+            self._line.doubt(asked_s)
+
+    def _explain(self) -> str:
+        """Return what the bytes since the last request are, as they are no reply, and what to do."""
+        if self._is_serial:
+            return explain_rtu(self._received, self.address)
+        return explain_tcp(self._received, self._sent, self.address)
+
+    def _trace(self, sending: bool, data: bytes) -> bytes:
+        """Keep what was sent and what came since: it distinguishes silence from malformed bytes."""
+        if sending:
+            self._sent, self._received = data, b""
+            self._line.send(data)
+            return data
+        self._received = self._line.clean(data) if self._is_serial else data
+        return self._received

@@ -95,7 +95,10 @@ class Journal(Protocol):
         ...
 
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
-        """Record that no more readings follow; statistics are derived and blocks compacted here."""
+        """Record that no more readings follow; statistics are derived and blocks compacted here.
+
+        Called with PARTIAL for a complete data set, it is withdrawn: kept, marked, not fitted.
+        """
         ...
 
     def environment(self, sample: EnvironmentSample) -> None:

@@ -40,6 +40,21 @@ class Home(StepBase):
     kind: Literal["home"] = "home"
 
 
+class MeasureClock(StepBase):
+    """The true step rate of a table without an encoder is measured: two runs of equal speed and ramp."""
+
+    kind: Literal["measure_clock"] = "measure_clock"
+    rate_dps: float
+    short_s: float  #: steady part of the shorter run
+
+
+class CheckHome(StepBase):
+    """The table goes to where home was, and home is looked for there: a difference is missed steps."""
+
+    kind: Literal["check_home"] = "check_home"
+    temperature_c: float
+
+
 class Mount(StepBase):
     """A person turns the unit so that body axis `position` points along the table axis, up."""
 
@@ -98,7 +113,7 @@ class SafeState(StepBase):
 
 
 Step = Annotated[
-    PowerOn | PowerOff | Home | Mount | MoveChamber | Soak | Acquire | Rest | SafeState,
+    PowerOn | PowerOff | Home | MeasureClock | CheckHome | Mount | MoveChamber | Soak | Acquire | Rest | SafeState,
     Field(discriminator="kind"),
 ]
 

@@ -92,6 +92,7 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
             raise
     context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
+    context.unchecked.append(number)
     taken = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
     return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **taken}
 

@@ -41,6 +41,7 @@ class ExecutionContext:
     paused_s: float = 0.0  #: how long the campaign was paused so far
     soaked: Soak | None = None  #: the soak that still holds: its temperature has not been left since
     owed_soak: Soak | None = None  #: the soak to be done again before the next data set
+    unchecked: list[int] = field(default_factory=list)  #: data sets since home was last found where it was left
     _prompts: int = field(default=0, repr=False)
 
     def poll(self, *, read_latest: bool = True) -> None:

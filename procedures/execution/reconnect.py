@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply
 from procedures.contracts.journal import Event
-from procedures.contracts.steps import Acquire, Home, MoveChamber, Rest, Soak, Step
+from procedures.contracts.steps import Acquire, Home, MeasureClock, MoveChamber, Rest, Soak, Step
 from procedures.execution.context import POLL_S, ExecutionContext, raise_violation
 from procedures.execution.waiting import pass_time
 
 PAUSES_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 STANDSTILL_S = 60.0
 #: Steps that can be begun again without asking a person anew.
-REPEATABLE = (Home, MoveChamber, Soak, Acquire, Rest)
+REPEATABLE = (Home, MeasureClock, MoveChamber, Soak, Acquire, Rest)
 
 
 def is_reconnectable(context: ExecutionContext, step: Step, error: LinkError) -> bool:

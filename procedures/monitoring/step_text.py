@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from procedures.contracts.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerOn, Rest, Soak, Step
+from procedures.contracts.steps import (
+    Acquire,
+    CheckHome,
+    Home,
+    MeasureClock,
+    Mount,
+    MoveChamber,
+    PowerOff,
+    PowerOn,
+    Rest,
+    Soak,
+    Step,
+)
 
 
 def describe_step(step: Step, datasets: int) -> str:
@@ -22,6 +34,10 @@ def describe_step(step: Step, datasets: int) -> str:
             text = f"switch the units {'on' if isinstance(step, PowerOn) else 'off'}, session {step.run}"
         case Home():
             text = "home the table"
+        case MeasureClock():
+            text = f"measure the step clock of the table at {step.rate_dps:g} deg/s"
+        case CheckHome():
+            text = f"look for missed steps at {step.temperature_c:g} deg C"
         case Rest():
             text = f"rest for {step.duration_s:g} s"
     return text

@@ -12,7 +12,9 @@ from pydantic import BaseModel, ConfigDict
 from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import (
     Acquire,
+    CheckHome,
     Home,
+    MeasureClock,
     Mount,
     MoveChamber,
     PowerOff,
@@ -72,20 +74,23 @@ class Plan(BaseModel):
         """
         if index >= len(self.steps) or isinstance(self.steps[index], SafeState):
             return ()
-        if isinstance(self.steps[index], Home | MoveChamber):
-            return (Home(),)
         before = self.steps[:index]
+        home: tuple[Step, ...] = (Home(), *(step for step in before if isinstance(step, MeasureClock)))
+        if isinstance(self.steps[index], Home | MeasureClock):
+            return (Home(),)
+        if isinstance(self.steps[index], MoveChamber):
+            return home
         move = next((step for step in reversed(before) if isinstance(step, MoveChamber)), None)
         soak = None
         if not isinstance(self.steps[index], Acquire | Rest):
-            return (Home(), *((move,) if move else ()))
+            return (*home, *((move,) if move else ()))
         for step in reversed(before):
             if isinstance(step, Mount | MoveChamber | PowerOn | PowerOff):
                 break
             if isinstance(step, Soak):
                 soak = step
                 break
-        return (Home(), *(each for each in (move, soak) if each is not None))
+        return (*home, *(each for each in (move, soak) if each is not None))
 
     def mounted_at(self, index: int) -> str | None:
         """Return the position in which the units are before step `index`; None when they have not been turned yet."""
@@ -104,7 +109,7 @@ class Plan(BaseModel):
         ]
         end = max(of_it, default=index)
         later = next((step for step in self.steps[end + 1 :] if isinstance(step, PowerOn | Acquire)), None)
-        kinds: tuple[type, ...] = (Acquire, Soak, MoveChamber, Rest)
+        kinds: tuple[type, ...] = (Acquire, CheckHome, Soak, MoveChamber, Rest)
         kinds = kinds if isinstance(later, Acquire) else (*kinds, PowerOn, PowerOff)
         return tuple(n for n in range(index + 1, end + 1) if isinstance(self.steps[n], kinds))
 

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import math
 
-from procedures.contracts.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerOn, SafeState, Soak, Step
+from procedures.contracts.steps import (
+    Acquire,
+    CheckHome,
+    Home,
+    MeasureClock,
+    Mount,
+    MoveChamber,
+    PowerOff,
+    PowerOn,
+    SafeState,
+    Soak,
+    Step,
+)
 from procedures.planning.limits import BenchLimits
 from procedures.planning.point_order import Level, MountingBlock, order_points
 from procedures.recipe.recipe import Recipe
@@ -13,6 +25,8 @@ from procedures.recipe.recipe import Recipe
 ROOM_C = 25.0
 CHAMBER_SETTLING_S = 300.0  #: from the end of the ramp until the air is in the band
 HOMING_S = 30.0
+CHECK_S = 10.0  #: back to home by counted steps, and the homing
+CLOCK_SHORT_S = 10.0  #: steady part of the shorter run that measures the step clock
 MOUNTING_S = 600.0  #: a person walks up, turns the units and confirms
 
 
@@ -38,14 +52,31 @@ class _StepWriter:
 
     def write(self) -> None:
         self.steps.append(Home(expected_s=HOMING_S))
+        self.measure_clock()
         for block in order_points(self.recipe):
             self.mount(block)
             for level in block.levels:
                 self.move_chamber(level.temperature_c)
                 self.soak(level.temperature_c)
+                self.check_home(level)
                 self.acquire(level)
+                self.check_home(level)
         self.power_cycles()
         self.steps.append(SafeState())
+
+    def measure_clock(self) -> None:
+        """Measure the step clock at the largest rate of the recipe, where the table does that."""
+        rate_dps = max((abs(rate) for rate in self.recipe.rates_dps), default=0.0)
+        longer_s = self.limits.table.clock_run_s
+        if longer_s and rate_dps:
+            ramps_s = 4 * rate_dps / self.limits.table.max_acceleration_dps2
+            expected_s = 2 * CLOCK_SHORT_S + longer_s + ramps_s
+            self.steps.append(MeasureClock(rate_dps=rate_dps, short_s=CLOCK_SHORT_S, expected_s=expected_s))
+
+    def check_home(self, level: Level) -> None:
+        """Look for missed steps, where the table does that and turns at this level."""
+        if self.limits.table.checks_home and any(level.rates_dps):
+            self.steps.append(CheckHome(temperature_c=level.temperature_c, expected_s=CHECK_S))
 
     def mount(self, block: MountingBlock) -> None:
         """Turn the units: chamber to where it can be opened, off if the recipe says so, turn, on."""

@@ -77,9 +77,12 @@ class WatchedPorts(Ports):
 class Rig:
     """One instrument of a shipped bench: driver, ports, its simulated self, its faults and its wire."""
 
-    def __init__(self, bench: str, url: str, chamber: dict[str, Any], options: dict[str, Any]) -> None:
+    def __init__(
+        self, bench: str, url: str, chamber: dict[str, Any], options: dict[str, Any], simulated: dict[str, Any]
+    ) -> None:
         record = read_bench(bench).model_dump()
         record["chamber"] |= chamber
+        record["simulation"]["chamber"] |= simulated
         record["gyros"][0]["options"] = {**record["gyros"][0].get("options", {}), **options}
         self.bench = resolve(BenchFile.model_validate(record))
         self.clock = VirtualClock()
@@ -129,9 +132,11 @@ def make_rig() -> Iterator[Callable[..., Any]]:
     """Make rigs by name, with what the bench file says changed; their links are closed at the end."""
     made: list[Rig] = []
 
-    def make(kind: str, *, options: dict[str, Any] | None = None, **chamber: Any) -> Rig:
+    def make(
+        kind: str, *, options: dict[str, Any] | None = None, simulated: dict[str, Any] | None = None, **chamber: Any
+    ) -> Rig:
         rig, bench, url = PLACES[kind]
-        made.append(rig(bench, url, chamber, options or {}))
+        made.append(rig(bench, url, chamber, options or {}, simulated or {}))
         return made[-1]
 
     yield make

@@ -67,8 +67,11 @@ def test_once_a_bench_is_open_no_driver_and_no_simulator_is_imported() -> None:
 def test_only_the_drivers_that_a_bench_names_are_imported() -> None:
     assert loaded_by("example-real", "instruments.drivers") == [
         "instruments.drivers",
-        *(f"instruments.drivers.{name}" for name in ("arrick_c4", "arrick_c4_link", "driver", "kvh", "registry")),
-        *(f"instruments.drivers.{name}" for name in ("resolution", "unit_handlers", "watlow", "watlow_f4")),
+        *(f"instruments.drivers.{name}" for name in ("arrick_c4", "arrick_c4_checks", "arrick_c4_link", "driver")),
+        *(
+            f"instruments.drivers.{name}"
+            for name in ("kvh", "registry", "resolution", "unit_handlers", "watlow", "watlow_f4")
+        ),
     ]
 
 

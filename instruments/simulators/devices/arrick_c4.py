@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 
 from instruments.bench_config import part_of
 from instruments.protocols import arrick_c4_lines as lines
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
+from instruments.simulators.physics.world import number
 from instruments.simulators.setup import InstrumentSetup
 
 BITS_PER_BYTE = 10
 SPEED = re.compile(r"sp1,(\d+)")
 RAMP = re.compile(r"ra1,(\d+)")
-#: The controller also accepts the home command of two motors.
-HOME_COMMANDS = frozenset({lines.HOME, "h12"})
 IDENTITY = "C4 simulated\r\n"
 REFUSED, BUSY = "e", "1"
 MAX_COMMAND_BYTES = 80
-CR = 0x0D
+LINE_ENDS = b"\r\n"
+ACKNOWLEDGED = "a\r\n"
 
 
 @dataclass
@@ -39,13 +40,16 @@ class SimulatedC4:
         self._step_deg = 360.0 / table.steps_per_turn
         self._direction = table.direction
         self._divisor: int | None = None
+        #: True step rate over that of the divisor: `[simulation] table = { step_clock_ratio = ... }`.
+        self.clock_ratio = number(setup.world.settings.table, "step_clock_ratio", 1.0)
+        self.missed_steps = 0  #: the next move is so much shorter than what was asked for
         self._line = bytearray()
         self._replies: list[_Reply] = []
 
     def receive(self, data: bytes, t_s: float) -> None:
-        """Take bytes; a command is executed when its CR arrives."""
+        """Take bytes; a command is executed when its CR or LF arrives."""
         for byte in data:
-            if byte == CR:
+            if byte in LINE_ENDS:
                 command, self._line = self._line.decode("latin-1"), bytearray()
                 self._execute(command, t_s)
             elif len(self._line) < MAX_COMMAND_BYTES:
@@ -85,8 +89,12 @@ class SimulatedC4:
             self._replies.clear()
             self._world.table.abort(t_s)
             self._reply(lines.ACCEPTED, t_s)
-        elif body in HOME_COMMANDS:
-            self._finish(self._world.table.home(t_s), t_s)
+        elif body in {lines.HOME, lines.HOME_BOTH}:
+            end_s = self._world.table.home(t_s)
+            for _motor in body.removeprefix("h"):
+                self._finish(end_s, t_s)
+        elif lines.PARAMETER.fullmatch(body):
+            self._reply(ACKNOWLEDGED, t_s)
         else:
             self._program_or_move(body, t_s)
 
@@ -105,7 +113,9 @@ class SimulatedC4:
     def _move(self, way: str, steps: int, divisor: int, t_s: float) -> None:
         start_s = self._reply(lines.ACCEPTED, t_s)
         signed = (steps if way == "f" else -steps) * self._direction
-        step_hz = self._clock_hz / divisor
+        step_hz = self.clock_ratio * self._clock_hz / divisor
+        signed -= int(math.copysign(min(self.missed_steps, steps), signed))
+        self.missed_steps = 0
         end_s = self._world.table.start(start_s, signed, step_hz, self._acceleration_dps2)
         if self._faults.trigger(["stall"], t_s) is not None:
             end_s = self._world.table.abort(start_s + 0.3 * (end_s - start_s))

@@ -31,6 +31,8 @@ class SimulatedF4(ModbusDevice):
         self.writes: list[int] = []  #: every written set point: each one wears the EEPROM
         self.inputs, self.input_functions, self.active_states = [0] * f4.INPUTS, [0] * f4.INPUTS, [1] * f4.INPUTS
         self.events = [1] * f4.EVENTS
+        self.profile = 1  #: current one, while the mode says that one runs
+        self.alarm_words = [0] * (f4.AIR_COUNTS[0] - 1)  #: from register 101 on
         if chamber.enable_event is not None:
             self.events[chamber.enable_event - 1] = 0
         super().__init__("rtu", self._make_cells(), setup.faults, chamber.address)
@@ -51,6 +53,8 @@ class SimulatedF4(ModbusDevice):
             f4.DECIMALS.number: int16(lambda _: self.decimals),
             f4.UNITS.number: int16(lambda _: self.units),
             f4.SCALE.number: int16(lambda _: self.scale),
+            **items(f4.AIR.number + 1, 1, self.alarm_words),
+            f4.CURRENT_PROFILE.number: int16(lambda _: self.profile),
             f4.TERMINATE.number: Cell(lambda _: (0,), self._terminate),
             **items(f4.INPUT_STATE.number, f4.INPUT_STRIDE, self.inputs),
             **items(f4.INPUT_FUNCTION.number, f4.INPUT_SETUP_STRIDE, self.input_functions),

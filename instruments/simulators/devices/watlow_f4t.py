@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from instruments.bench_config import part_of
 from instruments.protocols import watlow_f4t_registers as f4t
 from instruments.protocols.modbus_registers import WordOrder
@@ -10,6 +12,8 @@ from instruments.simulators.links.modbus_device import Cell, ModbusDevice, const
 from instruments.simulators.setup import InstrumentSetup
 
 AMBIENT_C = 25.0
+LIMIT_SLOT = 5
+#: Without profiles, with 6 alarms and one control loop; `[simulation] chamber = { part_number = ... }` says otherwise.
 PART_NUMBER = "F4T1A1A1A1A1A1A"
 #: Registers that exist on the controller and that no driver reads.
 CONTROL_MODE_COPY, SETPOINT_COPY, UNITS_COPY = 2730, 2810, 14080
@@ -22,12 +26,17 @@ class SimulatedF4T(ModbusDevice):
         chamber = part_of(setup.bench.chamber, WatlowSettings)
         self._world = setup.world
         self._order: WordOrder = chamber.word_order
-        self.part_number = [ord(letter) for letter in PART_NUMBER]
+        part = str(setup.world.settings.chamber.get("part_number", PART_NUMBER))
+        self.part_number = [ord(letter) for letter in part]
+        wanted = chamber.cascade
+        self._loop = f4t.CASCADE if (f4t.has_cascade(part) if wanted is None else wanted) else f4t.LOOP
         self.status = f4t.STATUS_OK
         self.units = f4t.UNITS_CELSIUS  #: 30: Fahrenheit
         self.control_mode = f4t.MODE_AUTO
         self.profile_state = f4t.PROFILE_NOT_STARTED
-        self.alarms = [f4t.ALARM_NONE] * f4t.ALARMS
+        self.alarms = [f4t.ALARM_NONE] * f4t.alarms_of(part)
+        self.limit_module = [f4t.STATUS_OK, f4t.STATUS_OK, f4t.NONE]  #: state, status and error of the one in slot 5
+        self.output = f4t.ON  #: output 1 of module 1
         self.setpoint_c = AMBIENT_C
         self.min_c, self.max_c = chamber.min_c, chamber.max_c
         self.writes: list[float] = []  #: every written set point: each one wears the EEPROM
@@ -41,16 +50,24 @@ class SimulatedF4T(ModbusDevice):
             f4t.ETHERNET_UNITS.number: int16(lambda _: self.units),
             UNITS_COPY: int16(lambda _: self.units),
             CONTROL_MODE_COPY: constant(f4t.MODE_AUTO),
-            f4t.CONTROL_MODE.number: int16(lambda _: self.control_mode),
+            self._loop.mode.number: int16(lambda _: self.control_mode),
             f4t.PROFILE_ACTION.number: Cell(lambda _: (0,), self._profile_action),
             f4t.PROFILE_STATE.number: int16(lambda _: self.profile_state),
             **items(f4t.ALARM.number, f4t.ALARM_STRIDE, self.alarms),
-            f4t.SETPOINT_LOW.number: float32(order, lambda _: self.min_c),
-            f4t.SETPOINT_HIGH.number: float32(order, lambda _: self.max_c),
-            f4t.SETPOINT.number: float32(order, lambda _: self.setpoint_c, self._set),
+            **{
+                register.nth(LIMIT_SLOT, f4t.LIMIT_STRIDE).number: int16(partial(self._limit, n))
+                for n, register in enumerate((f4t.LIMIT_STATE, f4t.LIMIT_STATUS, f4t.LIMIT_ERROR))
+            },
+            f4t.OUTPUT.number: int16(lambda _: self.output),
+            self._loop.low.number: float32(order, lambda _: self.min_c),
+            self._loop.high.number: float32(order, lambda _: self.max_c),
+            self._loop.setpoint.number: float32(order, lambda _: self.setpoint_c, self._set),
             SETPOINT_COPY: float32(order, lambda _: self.setpoint_c),
-            f4t.AIR.number: float32(order, self._world.heat.air_c),
+            self._loop.air.number: float32(order, self._world.heat.air_c),
         }
+
+    def _limit(self, part: int, _t_s: float) -> int:
+        return self.limit_module[part]
 
     def _set(self, temperature_c: float, t_s: float) -> bool:
         if not self.min_c <= temperature_c <= self.max_c:

@@ -34,7 +34,7 @@ class GyroSample:
     supply_v: Array  #: (n,)
 
 
-def _number(settings: Mapping[str, object], name: str, usual: float) -> float:
+def number(settings: Mapping[str, object], name: str, usual: float) -> float:
     """Return a setting of the simulation; raises ValueError where it is no number."""
     value = settings.get(name, usual)
     if not isinstance(value, int | float):
@@ -48,22 +48,22 @@ class World:
     def __init__(self, bench: BenchFile) -> None:
         settings = bench.simulation or SimulationSettings()
         self.settings = settings
-        self.north_deg = _number(settings.table, "north_deg", 33.0)
+        self.north_deg = number(settings.table, "north_deg", 33.0)
         latitude_deg = settings.latitude_deg if settings.latitude_deg is not None else bench.latitude_deg
         self._earth = EarthRotation(latitude_deg, self.north_deg)
         self.table = TableMotion(
             bench.table.steps_per_turn,
-            step_error_deg=_number(settings.table, "step_error_deg", 0.0225),
-            gear_error_deg=_number(settings.table, "gear_error_deg", 0.0),
+            step_error_deg=number(settings.table, "step_error_deg", 0.0225),
+            gear_error_deg=number(settings.table, "gear_error_deg", 0.0),
         )
         self._profile: ProfileMotion | None = None
-        self._encoder_noise_deg = _number(settings.table, "encoder_noise_deg", 0.0)
-        self._encoder_late_s = _number(settings.table, "encoder_late_s", 0.0)
+        self._encoder_noise_deg = number(settings.table, "encoder_noise_deg", 0.0)
+        self._encoder_late_s = number(settings.table, "encoder_late_s", 0.0)
         self._encoder_rng = np.random.default_rng([settings.seed, settings.noise_seed, zlib.crc32(b"encoder")])
         self.position, self.mounting, self.run = "z", 0, 0
         self.powered_on_s: float | None = None
         truths = {gyro.name: self._make(gyro, settings) for gyro in bench.gyros}
-        self.start_c = start_c = _number(settings.chamber, "start_c", 25.0)
+        self.start_c = start_c = number(settings.chamber, "start_c", 25.0)
         bodies = {
             name: Body(t.sensor_tau_s, t.self_heating_c, t.heating_tau_s, t.deep_tau_s, start_c, start_c)
             for name, t in truths.items()
@@ -71,9 +71,9 @@ class World:
         self.heat = Heat(
             start_c,
             bench.chamber.ramp_c_per_min,
-            _number(settings.chamber, "air_tau_s", 180.0),
+            number(settings.chamber, "air_tau_s", 180.0),
             bodies,
-            _number(settings.chamber, "noise_c", 0.02),
+            number(settings.chamber, "noise_c", 0.02),
             settings.seed + 1000 * settings.noise_seed,
         )
         self._gyros = {gyro.name: SimulatedGyro(self, gyro, truths[gyro.name]) for gyro in bench.gyros}

@@ -110,7 +110,9 @@ FAILURES: tuple[Failure, ...] = (
     ),
     Failure(
         r"nothing heard|no answer|gave no answer|no intact datagram|no whole line|does not answer|link .* broke|"
-        r"cannot be opened|no Modbus TCP|reply belongs to another request|not reached again",
+        r"cannot be opened|no Modbus TCP|reply belongs to another request|not reached again|"
+        r"link is gone|came that are no reply|answered instead of unit|reply to request|line was never silent|"
+        r"no Modbus instrument",
         "An instrument did not answer.",
         f"Check its power and cable with `labctl bench check`, {RESUME}.",
     ),

@@ -93,7 +93,13 @@ def limits_of(bench: BenchFile) -> BenchLimits:
     """Return what a bench's instruments may be asked for, from its file alone."""
     table, chamber = bench.table, bench.chamber
     return BenchLimits(
-        TableLimits(table.max_rate_dps, table.acceleration_dps2, 360.0 / table.steps_per_turn),
+        TableLimits(
+            table.max_rate_dps,
+            table.acceleration_dps2,
+            360.0 / table.steps_per_turn,
+            clock_run_s=getattr(table, "clock_run_s", 0.0),  # keys of a driver's own model
+            checks_home=getattr(table, "check_home", False),
+        ),
         ChamberLimits(chamber.min_c, chamber.max_c, USUAL_RESOLUTION_C, chamber.ramp_c_per_min),
         {gyro.name: GyroLimits(gyro.max_rate_dps, gyro.min_c, gyro.max_c) for gyro in bench.gyros},
     )

@@ -166,12 +166,19 @@ class StoreJournal:
 
     @outlasting
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
-        """Record that no more readings follow: figures are derived and blocks packed into one, in one transaction."""
+        """Record that no more readings follow: figures are derived and blocks packed into one, in one transaction.
+
+        A complete data set becomes partial where its readings turn out to be wrong afterwards; they are kept.
+        """
         with self._writing() as connection:
             d = tables.data_sets.c
             mine = d.recording_id.in_(self._recordings.values())
             this_one = (mine, d.number == dataset, d.state == DataSetState.OPEN.value)
             there = set(connection.scalars(sa.select(d.recording_id).where(*this_one)))
+            if state is DataSetState.PARTIAL:
+                withdrawn = (mine, d.number == dataset, d.state == DataSetState.COMPLETE.value)
+                values = {"state": state.value, "reason": reason}
+                connection.execute(sa.update(tables.data_sets).where(*withdrawn).values(**values))
             for gyro, recording in self._recordings.items():
                 if recording in there:
                     raw = self._raw_of(connection, gyro, recording, dataset)

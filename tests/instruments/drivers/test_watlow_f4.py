@@ -173,6 +173,62 @@ def test_an_input_that_profiles_wait_for_is_no_alarm(make_rig: Callable[..., Any
         rig.driver.identify()
 
 
+@pytest.mark.parametrize(
+    ("offset", "value", "text"),
+    [(0, 3, "error 3 of input 1"), (1, 1, "alarm 1 high"), (1, 2, "alarm 1 low"), (5, 1, "alarm 2 high")],
+)
+def test_alarms_come_with_the_air_where_the_controller_has_them(
+    make_rig: Callable[..., Any], offset: int, value: int, text: str
+) -> None:
+    rig = make_rig("f4")
+    assert rig.driver.read().alarms == ()
+    rig.simulated.alarm_words[offset] = value
+    assert rig.driver.read().alarms == (text,)
+    quiet = make_rig("f4", alarm_registers=False)
+    quiet.simulated.alarm_words[offset] = value
+    assert quiet.driver.read().alarms == ()
+
+
+@pytest.mark.parametrize(("there", "counts"), [(range(101, 103), "0003"), ((), "0001")])
+def test_a_controller_without_alarm_registers_is_read_without_them(f4: Any, there: Any, counts: str) -> None:
+    for number in range(101, 107):
+        if number not in there:
+            del f4.simulated._cells[number]
+    f4.simulated.alarm_words[1] = 1
+    state = f4.driver.read()
+    assert state.temperature_c == pytest.approx(25.0, abs=0.2)
+    assert state.alarms == (("alarm 1 high",) if there else ())
+    f4.tap.forget()
+    f4.driver.read()
+    assert [frame[4:6].hex() for frame in f4.tap.heard if frame[2:4] == b"\x00\x64"] == [counts]  # known from then on
+
+
+def test_codes_of_absent_registers_are_no_alarms(f4: Any) -> None:
+    f4.simulated.alarm_words[:] = [-32000] * 6
+    assert f4.driver.read().alarms == ()
+
+
+def test_air_set_point_and_mode_have_replies_of_their_own_length(f4: Any) -> None:
+    """A late reply to one of them does not fit another."""
+    f4.driver.set_temperature_c(40.0)
+    f4.driver.read()
+    lengths = {request[2:4]: len(reply) for request, reply in f4.tap.exchanges() if request[1] == 3}
+    assert len({lengths[number.to_bytes(2, "big")] for number in (100, 200, 300)}) == 3
+
+
+@pytest.mark.parametrize("absent", [None, 0, -32000])
+def test_an_f4p_in_manual_mode_runs_no_profile(f4: Any, absent: int | None) -> None:
+    """Mode 2 is a running profile on an F4, manual on its sister model F4P, which has no profiles."""
+    del f4.simulated._cells[4100]
+    f4.simulated.absent, f4.simulated.mode = absent, 2
+    for act in (lambda: f4.driver.set_temperature_c(40.0), f4.driver.make_safe):
+        with pytest.raises(RequestRejected, match=r"is in manual mode, .* set it to auto at its panel"):
+            act()
+    assert TERMINATE_FRAME not in sent(f4)
+    f4.simulated.mode = 1
+    assert f4.driver.set_temperature_c(40.0) == 40.0
+
+
 def test_the_event_that_switches_the_chamber(make_rig: Callable[..., Any]) -> None:
     rig = make_rig("f4", enable_event=3)
     rig.driver.make_safe()

@@ -76,9 +76,18 @@ def test_a_set_point_that_reads_back_otherwise_is_an_error(f4t: Any, monkeypatch
 def test_words_in_another_order_are_seen_at_once(make_rig: Callable[..., Any]) -> None:
     rig = make_rig("f4t", word_order="big")
     rig.driver._registers._word_order = "little"
-    rig.simulated.setpoint_c = 36.6
-    with pytest.raises(MalformedReply, match="check the sensor, the word order"):
-        rig.driver.read()
+    for value_c in (25.0, 36.6, -40.0, 85.0, 100.0):  # round numbers are denormal floats in the other order
+        rig.simulated.setpoint_c = value_c
+        with pytest.raises(MalformedReply, match=rf"exchanged it is {value_c:g}: set word_order = 'big' in the bench"):
+            rig.driver._read_setpoint()
+    with pytest.raises(MalformedReply, match="set word_order = 'big' in the bench file"):
+        rig.driver.identify()
+
+
+def test_limits_in_the_wrong_order_are_said(f4t: Any) -> None:
+    f4t.simulated.min_c = f4t.simulated.max_c = 0.0
+    with pytest.raises(MalformedReply, match=r"limits read 0 to 0 deg C, .* set word_order = 'big' in the bench file"):
+        f4t.driver.identify()
 
 
 def test_the_chamber_follows(f4t: Any) -> None:
@@ -155,9 +164,53 @@ def test_every_passing_fault_is_survived(f4t: Any, kind: Any) -> None:
 
 
 def test_an_exception_of_the_controller_is_a_refusal(f4t: Any) -> None:
+    f4t.driver.identify()
     f4t.faults.arm("modbus_exception", value=2, count=1)
     with pytest.raises(RequestRejected, match=r"refused to read air temperature \(register 2820\): Modbus exception 2"):
         f4t.driver.read()
+
+
+@pytest.mark.parametrize(("digit", "count"), [("A", 6), ("E", 8), ("F", 14)])
+def test_the_part_number_says_how_many_alarms_there_are(make_rig: Callable[..., Any], digit: str, count: int) -> None:
+    rig = make_rig("f4t", simulated={"part_number": f"F4T1A1{digit}1A1A1A1A"})
+    assert rig.driver.read().alarms == ()
+    assert len(rig.simulated.alarms) == count
+    rig.simulated.alarms[-1] = 8
+    rig.clock.sleep(ALARMS_EVERY_S)
+    assert rig.driver.read().alarms == (f"alarm {count}",)
+
+
+@pytest.mark.parametrize(("part", "value"), [(0, 28), (1, 32), (2, 53)])
+def test_a_limit_module_that_tripped_is_an_alarm(f4t: Any, part: int, value: int) -> None:
+    assert f4t.driver.read().alarms == ()
+    f4t.simulated.limit_module[part] = value
+    f4t.clock.sleep(ALARMS_EVERY_S)
+    assert f4t.driver.read().alarms == ("limit module 5",)
+
+
+def test_a_cascade_loop_has_registers_of_its_own(make_rig: Callable[..., Any]) -> None:
+    rig = make_rig("f4t", simulated={"part_number": "F4T1A1D1A1A6A1A"})
+    assert rig.driver.set_temperature_c(40.0) == 40.0
+    sent = b"".join(rig.tap.heard)
+    assert bytes.fromhex("10 0FCA 0002 04") in sent  # 4042
+    assert bytes.fromhex("10 0ADE") not in sent  # 2782 of control loop 1
+    rig.clock.sleep(3600)
+    assert rig.driver.read().temperature_c == pytest.approx(40.0, abs=0.3)
+    rig.simulated.control_mode = 62
+    with pytest.raises(RequestRejected, match="cascade loop 1 is in mode off, not auto"):
+        rig.driver.set_temperature_c(30.0)
+
+
+def test_a_chamber_that_does_not_run_is_seen_by_its_output(make_rig: Callable[..., Any]) -> None:
+    rig = make_rig("f4t", run_output=(1, 1))
+    assert rig.driver.read().alarms == ()
+    rig.simulated.output = 62
+    with pytest.raises(
+        RequestRejected, match=r"does not run \(output 1 of module 1 is off\); switch it on at its panel"
+    ):
+        rig.driver.set_temperature_c(40.0)
+    rig.clock.sleep(ALARMS_EVERY_S)
+    assert rig.driver.read().alarms == ("the chamber does not run",)
 
 
 def test_closing_twice_is_fine(f4t: Any) -> None:

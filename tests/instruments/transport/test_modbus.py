@@ -19,10 +19,12 @@ from instruments.simulators.links.modbus_device import ModbusDevice, constant, i
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Registers
 from instruments.transport.modbus_link import RETRY_PAUSES_S, Client, RefusedRegister
+from instruments.transport.rtu_line import LEAST_LATENCY_S, SILENCE_FACTOR
 
 AIR = Register(100, "air temperature", "int16", "counts")
 SETPOINT = Register(300, "set point", "int16", "counts", low=-400, high=1500, access="rw")
-ALL_TRIES_S = 3 * 1.0 + sum(RETRY_PAUSES_S)
+#: Three time-outs and what lies between them: pauses, or on RTU the wait for silence.
+ALL_TRIES_S = {"tcp": 3 * 1.0 + sum(RETRY_PAUSES_S), "rtu": 3 * 1.0 + 2 * SILENCE_FACTOR * LEAST_LATENCY_S}
 
 
 class Bench:
@@ -96,7 +98,7 @@ def test_silence_is_named_after_bounded_time_without_a_real_second(bench: Bench)
         NoReply, match=r"chamber: no answer to read air temperature \(register 100\).*address 1 \(3 tri"
     ):
         bench.registers.get(AIR)
-    assert bench.clock.now_s() == pytest.approx(ALL_TRIES_S, abs=0.01)
+    assert bench.clock.now_s() == pytest.approx(ALL_TRIES_S[bench.framing], abs=0.01)
 
 
 @pytest.mark.parametrize("kind", ["silence", "lost_reply", "wrong_crc", "noise", "split", "dropped_link"])
@@ -116,7 +118,7 @@ def test_a_lasting_fault_is_named_and_gone_with_its_cause(bench: Bench, kind: An
     bench.faults.arm(kind)
     with pytest.raises(error, match=r"chamber: .*3 tries in"):
         bench.registers.get(AIR)
-    assert bench.clock.now_s() < 2 * ALL_TRIES_S
+    assert bench.clock.now_s() < 2 * ALL_TRIES_S[bench.framing]
     bench.faults.clear()
     assert bench.registers.get(AIR) == -221
 
@@ -129,13 +131,27 @@ def test_the_link_is_opened_again_after_it_dropped(bench: Bench) -> None:
     assert len(bench.clients) == 1  # the same client: its transaction numbers go on
 
 
-@pytest.mark.parametrize("code", [1, 2, 3, 4, 11])
+@pytest.mark.parametrize("code", [1, 2, 3, 4, 8, 10, 11])
 def test_an_exception_reply_is_a_refusal_and_not_tried_again(bench: Bench, code: int) -> None:
     fault = bench.faults.arm("modbus_exception", value=code, count=5)
     with pytest.raises(RefusedRegister, match=rf"refused to read air temperature \(register 100\).*exception {code},"):
         bench.registers.get(AIR)
     assert fault.count == 4
     assert issubclass(RefusedRegister, RequestRejected)
+
+
+@pytest.mark.parametrize(
+    ("code", "name"),
+    [
+        (8, "memory parity error; switch it off and on"),
+        (10, "gateway path unavailable; check the gateway's serial port"),
+        (11, "gateway target device failed to respond; check address, power and cable behind the gateway"),
+    ],
+)
+def test_exceptions_of_memories_and_gateways_have_names(bench: Bench, code: int, name: str) -> None:
+    bench.faults.arm("modbus_exception", value=code, count=1)
+    with pytest.raises(RefusedRegister, match=f"Modbus exception {code}, {name}"):
+        bench.registers.get(AIR)
 
 
 def test_a_busy_instrument_is_asked_again(bench: Bench) -> None:
@@ -147,7 +163,9 @@ def test_a_busy_instrument_is_asked_again(bench: Bench) -> None:
 
 
 def test_a_late_reply_is_not_taken_for_the_next_one(bench: Bench) -> None:
-    bench.faults.arm("merge", until_s=ALL_TRIES_S + 0.1)  # held back until after the request was given up
+    bench.faults.arm(
+        "merge", until_s=ALL_TRIES_S[bench.framing] + 0.1
+    )  # held back until after the request was given up
     with pytest.raises(NoReply):
         bench.registers.get(Register(101, "other"))
     bench.faults.arm("lost_reply", count=1)  # so that the late one alone would be there
@@ -215,6 +233,28 @@ def test_a_reply_that_does_not_fit_is_no_reply(make_bench: Callable[..., Bench],
     assert bench.registers.get(AIR) == -221
 
 
+@pytest.mark.parametrize(
+    ("answer", "text"),
+    [
+        ("{t} 0000 0005 02 03 02 FF23", r"unit 2 answered instead of unit 1; set address in the bench file"),
+        ("0063 0000 0005 01 03 02 FF23", r"the reply to request 99 came, not to request 3; find the second master"),
+        ("{t} 0001 0005 01 03 02 FF23", r"protocol number 1 came, Modbus TCP has 0; check host and tcp_port"),
+        (b"HTTP/1.0 400 Bad Request\r\n\r\n".hex(), r"an HTTP server answered, no Modbus instrument; check host"),
+        ("{t} 0000 0005 01 03", r"8 bytes came that are no reply; check line settings and cable"),
+    ],
+)
+def test_what_came_instead_of_a_reply_is_said_in_one_line(
+    make_bench: Callable[..., Bench], answer: str, text: str
+) -> None:
+    bench = make_bench("tcp")
+    bench.wire = Scripted(*[answer] * 3)
+    with pytest.raises(
+        MalformedReply, match=rf"^chamber: cannot read air temperature \(register 100\), {text}"
+    ) as error:
+        bench.registers.get(AIR)
+    assert len(str(error.value).splitlines()) == 1
+
+
 def test_of_two_replies_the_one_with_the_requests_number_counts(make_bench: Callable[..., Bench]) -> None:
     bench = make_bench("tcp")
     late = "0000 0005 01 03 02 1111"
@@ -239,7 +279,7 @@ def test_no_garbage_ever_raises_anything_else(framing: str, answers: list[bytes]
     with contextlib.suppress(InstrumentError):
         bench.registers.get(AIR)
     bench.registers.close()
-    assert bench.clock.now_s() < 10 * ALL_TRIES_S
+    assert bench.clock.now_s() < 10 * ALL_TRIES_S[framing]
 
 
 @settings(max_examples=100)
@@ -318,6 +358,11 @@ def test_closing_twice_is_fine_and_the_next_request_opens_again(bench: Bench) ->
     bench.registers.close()
     bench.registers.close()
     assert bench.registers.get(AIR) == -221
+
+
+def test_foreign_text_stays_on_one_line() -> None:
+    error = LinkError("table", "port x cannot be opened (first line\r\n  second\x00 line);\tcheck the cable")
+    assert str(error) == "table: port x cannot be opened (first line second line); check the cable"
 
 
 def test_a_real_host_that_refuses_is_named() -> None:

@@ -33,7 +33,8 @@ def test_the_checksum_is_the_standards() -> None:
 def test_f4_air_of_minus_22_1_c_on_the_wire(f4: Any) -> None:
     f4.simulated.sensor_code = -221
     state = f4.driver.read()
-    assert (rtu("01 03 0064 0001"), rtu("01 03 02 FF23")) in f4.tap.exchanges()
+    # 100 to 106: the temperature, with input error and alarms
+    assert (rtu("01 03 0064 0007"), rtu("01 03 0E FF23" + 6 * "0000")) in f4.tap.exchanges()
     assert (rtu("01 03 025E 0001"), rtu("01 03 02 0001")) in f4.tap.exchanges()  # 606: one decimal
     assert state.temperature_c == pytest.approx(-22.1, abs=1e-12)
 

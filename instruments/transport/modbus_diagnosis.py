@@ -1,0 +1,45 @@
+"""What bytes that are no reply say about their cause."""
+
+from __future__ import annotations
+
+from pymodbus.framer import FramerRTU
+
+from instruments.protocols.modbus_codes import TCP_PREFIX_BYTES
+
+SHORTEST_RTU_BYTES = 5
+LINE = "check line settings and cable"
+
+
+def explain_rtu(received: bytes, address: int) -> str:
+    """Return why bytes on a serial line are no reply of unit `address`, and what to do."""
+    if len(received) >= SHORTEST_RTU_BYTES and received[0] != address and _is_frame(received):
+        return _other_unit(received[0], address)
+    return _bytes(received, LINE)
+
+
+def explain_tcp(received: bytes, sent: bytes, address: int) -> str:
+    """Return why bytes on a TCP link are no reply to a request of unit `address`, and what to do."""
+    if received.startswith(b"HTTP/") or b"<html" in received[:200].lower():
+        return "an HTTP server answered, no Modbus instrument; check host and tcp_port in the bench file"
+    if len(received) <= TCP_PREFIX_BYTES:
+        return _bytes(received, LINE)
+    if protocol := int.from_bytes(received[2:4], "big"):
+        return f"protocol number {protocol} came, Modbus TCP has 0; check host and tcp_port in the bench file"
+    if received[:2] != sent[:2]:
+        number, asked = (int.from_bytes(each[:2], "big") for each in (received, sent))
+        return f"the reply to request {number} came, not to request {asked}; find the second master of this link"
+    if received[TCP_PREFIX_BYTES] != address:
+        return _other_unit(received[TCP_PREFIX_BYTES], address)
+    return _bytes(received, LINE)
+
+
+def _is_frame(data: bytes) -> bool:
+    return FramerRTU.check_CRC(data[:-2], int.from_bytes(data[-2:], "big"))
+
+
+def _other_unit(found: int, address: int) -> str:
+    return f"unit {found} answered instead of unit {address}; set address in the bench file, or find the second device"
+
+
+def _bytes(received: bytes, advice: str) -> str:
+    return f"{len(received)} bytes came that are no reply; {advice}"

@@ -1,0 +1,107 @@
+"""The line of a Modbus RTU instrument between requests: silence after a time-out, echoes and stray bytes.
+
+A reply on RTU carries no number: only silence tells that no reply to an earlier request is still to come.
+"""
+
+from __future__ import annotations
+
+import logging
+
+from instruments.clock import Clock
+from instruments.errors import MalformedReply
+from instruments.protocols.modbus_codes import READ_FUNCTIONS
+from instruments.transport.serial import SerialPort
+
+log = logging.getLogger(__name__)
+
+#: The line has to be silent for this much longer than the longest latency that was seen.
+SILENCE_FACTOR = 1.25
+#: No less than the time-out of a request, s: a reply that did not come within it may come later.
+LEAST_LATENCY_S = 1.0
+#: One reply after minutes makes no later failure cost minutes, s.
+LARGEST_LATENCY_S = 5.0
+#: A line that is never silent is given up after this long, s.
+LONGEST_DRAIN_S = 20.0
+POLL_S = 0.02
+#: What an RS-485 driver makes of the line when it is switched on or off; no unit of a serial line has these numbers.
+STRAY_BYTES = b"\x00\xff"
+
+
+class RtuLine:
+    """What is known of one line. `remarks` tells a technician what was survived."""
+
+    def __init__(self, device: str, clock: Clock) -> None:
+        self._device, self._clock = device, clock
+        self._sent = b""
+        self._sent_s = 0.0
+        self._latency_s = LEAST_LATENCY_S
+        self._doubtful_since_s: float | None = None
+        self._echoes = False
+        self.remarks: list[str] = []
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a reply to an earlier request may still come."""
+        return self._doubtful_since_s is not None
+
+    def send(self, frame: bytes) -> None:
+        """Note a request that is sent now."""
+        self._sent, self._sent_s = frame, self._clock.now_s()
+
+    def doubt(self, asked_s: float | None = None) -> None:
+        """Note that a reply may come late. `asked_s`: since when the answer was awaited; default: the last request."""
+        self._note_latency(self._sent_s if asked_s is None else asked_s)
+        self._doubtful_since_s = self._clock.now_s()
+
+    def await_silence(self, port: SerialPort) -> None:
+        """Read and drop until the line was silent for longer than the longest latency; at once when nothing is due.
+
+        Raises MalformedReply for a line that is never silent, and an error of `BROKEN`.
+        """
+        if self._doubtful_since_s is None:
+            return
+        begun_s = self._clock.now_s()
+        silent_until_s = self._doubtful_since_s + SILENCE_FACTOR * self._latency_s
+        while True:
+            now_s = self._clock.now_s()
+            if waiting := port.in_waiting:
+                port.read(waiting)
+                self._note_latency(self._sent_s)
+                silent_until_s = now_s + SILENCE_FACTOR * self._latency_s
+            elif now_s >= silent_until_s - 1e-9:
+                break
+            if now_s - begun_s >= LONGEST_DRAIN_S:
+                raise MalformedReply(
+                    self._device,
+                    f"the line was never silent for {SILENCE_FACTOR * self._latency_s:.2g} s in {LONGEST_DRAIN_S:g} s "
+                    "without a request; find the second master, or the device that sends by itself, on this line",
+                )
+            self._clock.sleep(min(POLL_S, silent_until_s - now_s))
+        self._doubtful_since_s = None
+
+    def clean(self, data: bytes) -> bytes:
+        """Return received bytes without the adapter's echo of the request and without stray bytes before a reply.
+
+        The echo of a read is never a reply. The echo of a write looks like its reply, so it is dropped only once the
+        echo of a read was seen; every driver reads before it writes.
+        """
+        is_read = self._sent[1:2] and self._sent[1] in READ_FUNCTIONS
+        if is_read or self._echoes:
+            if data.startswith(self._sent):
+                self._echoes = True
+                self._remark("the RS-485 adapter echoes each request; switch its local echo off")
+                data = data[len(self._sent) :]
+            elif self._sent.startswith(data):
+                return b""  # the beginning of an echo: more is to come
+        kept = data.lstrip(STRAY_BYTES)
+        if kept and len(kept) < len(data):
+            self._remark("stray bytes come before replies; check termination and bias of the RS-485 line")
+        return kept
+
+    def _note_latency(self, since_s: float) -> None:
+        self._latency_s = min(max(self._latency_s, self._clock.now_s() - since_s), LARGEST_LATENCY_S)
+
+    def _remark(self, text: str) -> None:
+        if text not in self.remarks:
+            self.remarks.append(text)
+            log.warning("link.line", extra={"device": self._device, "reason": text})

@@ -1,0 +1,101 @@
+"""Campaigns on a table that measures its own steps: a slow step clock, and steps that were missed."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from instruments.bench_config import BenchFile, read_bench
+from instruments.clock import VirtualClock
+from instruments.drivers.resolution import resolve
+from labctl.fitting import fit
+from labctl.services.campaigns.execution import run
+from labctl.services.campaigns.preparation import prepare
+from labctl.store import open_store
+
+RECIPE = """format = "labctl-recipe/1"
+name = "checked"
+temperatures_c = [24, 26]
+rates_dps = [-90, -30, 0, 30, 90]
+positions = ["z"]
+[soak]
+hold_s = 120
+max_drift_c = 1.0
+drift_window_s = 60
+[acquire]
+duration_s = 20
+settle_s = 2
+"""
+
+
+def checked_bench(**table: Any) -> BenchFile:
+    record = read_bench("single-axis-sim").model_dump()
+    record["table"] |= {"clock_run_s": 60.0, "check_home": True}
+    record["simulation"]["table"] |= table
+    return resolve(BenchFile.model_validate(record))
+
+
+def rows(location: str, query: str) -> list[Any]:
+    with sqlite3.connect(location) as raw:
+        found = raw.execute(query).fetchall()
+    raw.close()
+    return found
+
+
+def scale_of(location: str, ratio: float) -> float:
+    """Return the scale factor that a campaign finds on a table whose steps run at `ratio` of the nominal rate."""
+    with open_store(location, write=True) as store:
+        recipe = RECIPE.replace("[24, 26]", "[25]")
+        prepared = prepare(store, recipe, checked_bench(step_clock_ratio=ratio), VirtualClock(), clip=False)
+        kinds = [step.kind for step in prepared.plan.steps]
+        assert kinds[:2] == ["home", "measure_clock"]
+        assert kinds.count("check_home") == 2  # before and after each temperature
+        answer = run(store, prepared)
+        assert answer.state == "done", answer.reason
+        points = store.recordings.points(next(iter(answer.recordings.values())))
+    recorded = np.asarray(points.columns["table_rate_dps"])
+    assert np.allclose(np.unique(np.round(recorded)), [-90, -30, 0, 30, 90])
+    found = fit(points, "single_temperature").fitted.axes["z"]
+    return 1 + float(dict(zip(found.names, found.values[:, 0], strict=True))["scale_factor"])
+
+
+def test_with_a_slow_step_clock_the_reference_and_the_fit_are_right(tmp_path: Path) -> None:
+    """Steps 9.1 % slow: without the measurement the table does 81.8 deg/s where 90 are recorded."""
+    exact, slow = str(tmp_path / "exact.sqlite"), str(tmp_path / "slow.sqlite")
+    assert scale_of(slow, 1 / 1.1) == pytest.approx(scale_of(exact, 1.0), abs=1e-5)
+    for location, ratio in ((exact, 1.0), (slow, 1 / 1.1)):
+        ((figures,),) = rows(location, "select result from steps where kind = 'measure_clock'")
+        assert json.loads(figures)["figures"]["step_clock_ratio"] == pytest.approx(ratio, abs=3e-6)
+        ((level, message, value),) = rows(
+            location, "select level, message, value from events where kind = 'table_clock'"
+        )
+        assert level == ("info" if ratio == 1 else "warning")
+        assert value == pytest.approx(1e6 * (ratio - 1), abs=3)
+        assert ("set step_clock_hz = 18181" in message) is (ratio != 1)
+
+
+def test_missed_steps_end_the_campaign_and_the_data_sets_since_the_last_check(tmp_path: Path) -> None:
+    location = str(tmp_path / "lab.sqlite")
+    with open_store(location, write=True) as store:
+        prepared = prepare(store, RECIPE, checked_bench(), VirtualClock(), clip=False)
+        device = prepared.bench.simulation.device("sim://arrick")._device  # type: ignore[union-attr]
+        move, moves = device._move, []
+
+        def missing(way: str, steps: int, divisor: int, t_s: float) -> None:
+            moves.append(steps)
+            device.missed_steps = 16 if len(moves) == 12 else 0  # at the second temperature
+            move(way, steps, divisor, t_s)
+
+        device._move = missing
+        answer = run(store, prepared)
+    assert answer.state == "failed"
+    assert "table: home is 16 steps (3.6 deg) from where it was left, limit 2 steps, at 26 deg C" in answer.reason
+    states = [state for (state,) in rows(location, "select state from data_sets order by number")]
+    assert states == ["complete"] * 5 + ["partial"] * 5
+    (reasons,) = rows(location, "select distinct reason from data_sets where state = 'partial'")
+    assert "steps were missed" in reasons[0]
