@@ -182,7 +182,7 @@ def test_a_campaign_that_waits_keeps_its_bench_and_lets_it_go_when_it_is_lost(
                 BenchHold(lab.store, BENCH.name, lab.clock).take()
             except Conflict as error:
                 refusals.append(str(error))
-            lab.lose()  # whatever came of it: the campaign would wait for ever
+            lab.lose()  # in either case: else the campaign would wait without end
 
     lab.runner.listen(heard)
     lab.runner.start(CampaignRequest(recipe="short"))
