@@ -3,6 +3,7 @@
 import asyncio
 import os
 import shutil
+import sys
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -20,6 +21,9 @@ settings.load_profile("labctl")
 #: How long a coroutine of a test may take, seconds.
 LOOP_S = 60.0
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# The processes that tests start would each compile all modules again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 @pytest.fixture(scope="session")
