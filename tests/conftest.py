@@ -1,6 +1,7 @@
 """For all tests: small matrices are solved fastest by one thread, and two workers must not fight for two cores."""
 
 import asyncio
+import contextlib
 import os
 import shutil
 import sys
@@ -48,6 +49,17 @@ def cache(run_folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatc
     return folder
 
 
+@pytest.fixture
+def shared_answers(cache: Path, run_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Take kept answers from a cache of the run: the same criticism is worked out once, as it is for a person."""
+    kept = run_folder / "answers"
+    (kept / "labctl").mkdir(mode=0o700, parents=True, exist_ok=True)
+    with contextlib.suppress(FileExistsError):
+        (kept / "labctl" / "walks").symlink_to(run_folder / "walks", target_is_directory=True)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(kept))
+    return kept
+
+
 @pytest.fixture(autouse=True)
 def signals() -> Iterator[None]:
     """Let each test begin with the default handlers; those that it leaves behind go."""
@@ -78,8 +90,8 @@ def in_a_loop() -> Callable[[Coroutine[Any, Any, Any]], Any]:
     return run
 
 
-#: Folders whose tests mostly wait (for a browser, a process, a serial line): first, so that others compute meanwhile.
-WAITING = ("tests/system/", "tests/web/")
+#: Tests that mostly wait (for a browser, a process, a serial line), or are long: first, so that none is left at the end.
+WAITING = ("tests/system/", "tests/web/", "tests/test_docs_")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -17,7 +17,8 @@ def ask(
 ) -> int:
     """Run a command to its end; returns its exit status, -n where signal n ended it.
 
-    `streams` are the open files that are its input, output and error output. A command ends with the process that asked for it.
+    `streams` are the open files that are its input, output and error output. A command ends with the process that asked
+    for it.
     """
     request = {"arguments": list(arguments), "folder": folder, "environment": dict(environment)}
     with socket.socket(socket.AF_UNIX) as line:
