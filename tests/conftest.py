@@ -90,7 +90,7 @@ def in_a_loop() -> Callable[[Coroutine[Any, Any, Any]], Any]:
     return run
 
 
-#: Tests that mostly wait (for a browser, a process, a serial line), or are long: first, so that none is left at the end.
+#: Tests that mostly wait (for a browser, a process, a serial line), or are long: first, so that none is left alone.
 WAITING = ("tests/system/", "tests/web/", "tests/test_docs_")
 
 
