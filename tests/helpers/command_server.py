@@ -14,7 +14,9 @@ import select
 import signal
 import socket
 import sys
-from typing import Any, TextIO
+from typing import Any, TextIO, cast
+
+from tests.helpers.paths import ROOT
 
 #: What commands of labctl load when they are called.
 MODULES = (
@@ -37,7 +39,7 @@ def serve(address: str) -> None:
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(address)
         listener.listen()
-        print("ready", flush=True)  # noqa: T201
+        os.write(1, b"ready\n")
         while True:
             ready, _, _ = select.select([listener, woken, 0, *running.values()], [], [])
             if 0 in ready:
@@ -91,7 +93,7 @@ def _become(request: dict[str, Any], streams: list[int]) -> None:
         os.close(stream)
     sys.stdin, sys.stdout, sys.stderr = _opened(0, "r"), _opened(1, "w"), _opened(2, "w")
     os.chdir(request["folder"])
-    inherited = {"", os.path.abspath("."), *os.environ.get("PYTHONPATH", "").split(os.pathsep)}  # noqa: PTH100
+    inherited = {str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)}
     os.environ.clear()
     os.environ.update(request["environment"])
     own = [place for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place]
@@ -101,7 +103,7 @@ def _become(request: dict[str, Any], streams: list[int]) -> None:
 
 
 def _opened(number: int, mode: str) -> TextIO:
-    return open(number, mode, buffering=1, encoding="utf-8", closefd=False)  # type: ignore[return-value]
+    return cast(TextIO, open(number, mode, buffering=1, encoding="utf-8", closefd=False))
 
 
 if __name__ == "__main__":

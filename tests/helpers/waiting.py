@@ -1,4 +1,4 @@
-"""Waiting for what another thread does: looked at when it reports that something happened, ever more rarely."""
+"""Waiting for what another thread does: checked when it reports that something happened, ever more rarely."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 WAIT_S = 60.0  #: for the next event
-QUIET_S = 0.2  #: without an event: time to look
+QUIET_S = 0.2  #: without an event: time to check
 
 
 def wait_until(
@@ -16,8 +16,8 @@ def wait_until(
 ) -> Any:
     """Return what `look` gives once it `holds`; `listen` calls back at each event and returns how to end that.
 
-    It looks after one event, then after two more, and so on: a campaign in virtual time reports thousands. Where
-    nothing happens for QUIET_S it looks at once. Raises AssertionError when no event comes for WAIT_S.
+    It checks after one event, then after two more, and so on: a campaign in virtual time reports thousands. Where
+    nothing happens for QUIET_S it checks at once. Raises AssertionError when no event comes for WAIT_S.
     """
     events = threading.Semaphore(0)
     stop = listen(events.release)
