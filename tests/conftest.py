@@ -1,8 +1,10 @@
 """For all tests: small matrices are solved fastest by one thread, and two workers must not fight for two cores."""
 
 import asyncio
+import contextlib
 import os
 import shutil
+import sys
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -20,6 +22,9 @@ settings.load_profile("labctl")
 #: How long a coroutine of a test may take, seconds.
 LOOP_S = 60.0
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# The processes that tests start would each compile all modules again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 @pytest.fixture(scope="session")
@@ -42,6 +47,17 @@ def cache(run_folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatc
     (folder / "labctl" / "walks").symlink_to(walks, target_is_directory=True)
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     return folder
+
+
+@pytest.fixture
+def shared_answers(cache: Path, run_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Take kept answers from a cache of the run: the same criticism is worked out once, as it is for a person."""
+    kept = run_folder / "answers"
+    (kept / "labctl").mkdir(mode=0o700, parents=True, exist_ok=True)
+    with contextlib.suppress(FileExistsError):
+        (kept / "labctl" / "walks").symlink_to(run_folder / "walks", target_is_directory=True)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(kept))
+    return kept
 
 
 @pytest.fixture(autouse=True)
@@ -74,8 +90,8 @@ def in_a_loop() -> Callable[[Coroutine[Any, Any, Any]], Any]:
     return run
 
 
-#: Folders whose tests mostly wait (for a browser, a process, a serial line): first, so that others compute meanwhile.
-WAITING = ("tests/system/", "tests/web/")
+#: Tests that mostly wait (for a browser, a process, a serial line), or are long: first, so that none is left alone.
+WAITING = ("tests/system/", "tests/web/", "tests/test_docs_")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

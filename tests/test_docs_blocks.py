@@ -38,7 +38,7 @@ def text_of(page: Path) -> str:
 @pytest.mark.parametrize(
     "name", [name for name in NAMES if name not in ELSEWHERE and FENCE.search(text_of(ROOT / name))]
 )
-def test_blocks_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared_answers: Path) -> None:
     with open_playground(tmp_path) as playground:
         monkeypatch.chdir(tmp_path)
         monkeypatch.setenv("LABCTL_DATABASE", str(tmp_path / "labctl.sqlite"))

@@ -38,6 +38,8 @@ def codes_of(values: NDArray[np.float64]) -> Codes:
     """Return what the readings of one data set, (n,), show of a converter's steps, in their unit."""
     std = float(values.std()) if len(values) else 0.0
     some = values[:CODE_READINGS]
+    if np.isfinite(std) and len(set(some[: MOST_CODES + 1].tolist())) > MOST_CODES:  # a fine converter, mostly
+        return Codes(np.nan, np.nan, std, std)
     codes = np.unique(some)
     if len(some) < LEAST_READINGS or len(codes) > min(MOST_CODES, len(some) // 4):
         return Codes(np.nan, np.nan, std, std)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,14 @@ def white_std(values: NDArray[np.float64]) -> float:
     Lines from the table's steps make a reading scatter, but average out over a data set; they fill few frequencies, so
     the median does not see them. Neither does it see drift, which fills only the lowest.
     """
-    window = np.hanning(len(values))  # a strong line must not leak into the frequencies beside it
-    spectrum = np.abs(np.fft.rfft((values - values.mean()) * window)[2:-1]) ** 2 / np.sum(window**2)
+    window, power = _window(len(values))  # a strong line must not leak into the frequencies beside it
+    spectrum = np.abs(np.fft.rfft((values - values.mean()) * window)[2:-1]) ** 2 / power
     return float(np.sqrt(np.median(spectrum) / _MEDIAN_TO_MEAN))
+
+
+@lru_cache(maxsize=64)
+def _window(number: int) -> tuple[NDArray[np.float64], float]:
+    """Return the weights (number,) of the readings of a spectrum, and the sum of their squares."""
+    window = np.hanning(number)
+    window.flags.writeable = False
+    return window, float(np.sum(window**2))

@@ -17,6 +17,7 @@ from sybil import Document, Example, Lexeme, Region, Sybil
 from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser, SkipParser
 
+from tests.helpers.forked_commands import shell_command
 from tests.helpers.paths import ROOT
 from tests.helpers.processes import WAIT_S
 from tests.helpers.signal_defaults import default_signals
@@ -48,7 +49,7 @@ class Playground:
         (self.folder / ".venv").symlink_to(sys.prefix)
         command = self.folder / ".bin" / "labctl"
         command.parent.mkdir()
-        command.write_text(f'#!/bin/sh\nexec {sys.executable} -m labctl "$@"\n', encoding="utf-8")
+        command.write_text(shell_command(), encoding="utf-8")
         command.chmod(0o755)
 
     @property

@@ -16,6 +16,7 @@ from typing import Any
 import httpx
 
 from labctl.store import holder_of, is_url, open_store
+from tests.helpers.forked_commands import run_labctl
 from tests.helpers.signal_defaults import default_signals
 
 #: For what a process does on a busy machine.
@@ -77,9 +78,8 @@ class ServiceProcess:
 
     def run(self, *arguments: str, status: int = 0, key: str = "") -> subprocess.CompletedProcess[str]:
         """Run a command to its end, which must be with this exit status."""
-        environment = {**os.environ, "LABCTL_KEY": key}
-        command = labctl(self.database, *arguments)
-        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        given = [*arguments, "--database", str(self.database)]
+        done = run_labctl(given, environment={**os.environ, "LABCTL_KEY": key})
         assert done.returncode == status, done.stderr
         return done
 

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from tests.helpers.extending_page import PAGE, commands_of, files_of, sections, write_files
+from tests.helpers.forked_commands import run_labctl
 from tests.helpers.paths import EXAMPLES, ROOT
 
 GYRO, EFFECT, EXPORT, IMPORTER, RECIPE = sections()
@@ -45,8 +46,7 @@ class Outside:
         found = os.environ.get("PYTHONPATH", "")
         path = os.pathsep.join(filter(None, [str(self.site), str(ROOT), found]))
         environment = {**os.environ, "PYTHONPATH": path, "LABCTL_DATABASE": str(self.folder / "lab.sqlite")}
-        command = [sys.executable, "-m", "labctl", *line.split()[1:]]
-        done = subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
+        done = run_labctl(line.split()[1:], folder=self.folder, environment=environment)
         assert done.returncode == status, done.stdout + done.stderr
         return done
 

@@ -32,7 +32,18 @@ def service(tmp_path: Path) -> Iterator[ServiceProcess]:
         yield made
 
 
-def test_commands_ask_the_service_that_holds_the_database(service: ServiceProcess) -> None:
+@pytest.fixture(scope="module")
+def lasting_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceProcess]:
+    """A service for the tests that neither end it nor run a campaign, and leave nothing that another asks for."""
+    folder = tmp_path_factory.mktemp("lasting")
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("XDG_CACHE_HOME", str(folder))
+        with running(folder / "lab.sqlite") as made:
+            yield made
+
+
+def test_commands_ask_the_service_that_holds_the_database(lasting_service: ServiceProcess) -> None:
+    service = lasting_service
     assert json.loads(service.run("import", str(EXAMPLES / "osu-fog"), "--json").stdout)["datasets"] == 695
     fitted = json.loads(service.run("fit", "OSU-FOG-2024", "--model", "ojeda2000", "--json").stdout)
     assert fitted["version"] == 1
@@ -47,14 +58,14 @@ def test_commands_ask_the_service_that_holds_the_database(service: ServiceProces
     assert service.http.get("/api/units/OSU-FOG-2024/calibration").status_code == 404
 
 
-def test_what_happens_to_the_terminal_of_a_service_is_not_for_its_processes(service: ServiceProcess) -> None:
-    for pid in (service.bench_pid, service.web_pid):
+def test_what_happens_to_the_terminal_of_a_service_is_not_for_its_processes(lasting_service: ServiceProcess) -> None:
+    for pid in (lasting_service.bench_pid, lasting_service.web_pid):
         assert os.getsid(pid) == pid
 
 
-def test_a_second_service_is_refused_and_told_where_the_first_is(service: ServiceProcess) -> None:
-    refused = service.run("serve", "--port", "0", status=2)
-    assert service.url in refused.stderr
+def test_a_second_service_is_refused_and_told_where_the_first_is(lasting_service: ServiceProcess) -> None:
+    refused = lasting_service.run("serve", "--port", "0", status=2)
+    assert lasting_service.url in refused.stderr
 
 
 def test_a_campaign_is_aborted_from_the_command_line(service: ServiceProcess) -> None:
@@ -132,7 +143,8 @@ def test_a_request_that_never_ends_does_not_either(service: ServiceProcess) -> N
     assert holder_of(str(service.database)) is None
 
 
-def test_a_page_that_a_browser_was_led_to_cannot_reach_the_service(service: ServiceProcess) -> None:
+def test_a_page_that_a_browser_was_led_to_cannot_reach_the_service(lasting_service: ServiceProcess) -> None:
+    service = lasting_service
     assert service.http.get("/api/units").status_code == 200
     assert service.http.get("/api/units", headers={"Host": "evil.example"}).status_code == 403
     origin = {"Origin": "http://evil.example"}
@@ -178,10 +190,10 @@ def test_a_service_that_is_interrupted_twice_ends_its_campaign_first(service: Se
 
 
 def test_a_proxy_of_the_laboratory_is_neither_asked_nor_told_a_key(
-    service: ServiceProcess, monkeypatch: pytest.MonkeyPatch
+    lasting_service: ServiceProcess, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    service = lasting_service
     monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
     monkeypatch.setenv("ALL_PROXY", "http://127.0.0.1:9")
-    service.run("backup", str(service.database.parent / "copy.sqlite"))
-    service.run("campaign", "schedule", "cancel", "7", status=2)
+    service.run("backup", str(tmp_path / "copy.sqlite"))
     assert "scheduled start 7 is not" in service.run("campaign", "schedule", "cancel", "7", status=2).stderr

@@ -22,12 +22,9 @@ ARGUMENTS = (
 
 
 @pytest.fixture(autouse=True)
-def cache(run_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """All pages share their kept answers: the same criticism is worked out once, as it is for a person."""
-    kept = run_folder / "pages"
-    kept.mkdir(mode=0o700, exist_ok=True)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(kept))
-    return kept
+def answers(shared_answers: Path) -> Path:
+    """All pages share their kept answers."""
+    return shared_answers
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ not depend on the times of sampling.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
@@ -30,11 +31,22 @@ class Body:
     heated_c: float = 0.0
     powered: bool = False
 
-    def step(self, air_c: float) -> None:
-        """Advance by one second."""
-        self.heated_c += ((self.self_heating_c if self.powered else 0.0) - self.heated_c) * _share(self.heating_tau_s)
-        self.sensor_c += (air_c - self.sensor_c) * _share(self.sensor_tau_s)
-        self.deep_c += (self.sensor_c + self.heated_c - self.deep_c) * _share(self.deep_tau_s)
+    def follow(self, airs_c: list[float], sensor: list[float], deep: list[float]) -> None:
+        """Advance by one second for each air temperature, and append where both thermometers are then, deg C.
+
+        Plain numbers in one loop: a simulated campaign takes 10^5 of these steps.
+        """
+        heating_c = self.self_heating_c if self.powered else 0.0
+        of_heating, of_sensor, of_deep = _share(self.heating_tau_s), _share(self.sensor_tau_s), _share(self.deep_tau_s)
+        heated_c, sensor_c, deep_c = self.heated_c, self.sensor_c, self.deep_c
+        for air_c in airs_c:
+            heated_c += (heating_c - heated_c) * of_heating
+            sensor_c += (air_c - sensor_c) * of_sensor
+            shown_c = sensor_c + heated_c
+            deep_c += (shown_c - deep_c) * of_deep
+            sensor.append(shown_c)
+            deep.append(deep_c)
+        self.heated_c, self.sensor_c, self.deep_c = heated_c, sensor_c, deep_c
 
 
 @cache
@@ -103,20 +115,30 @@ class Heat:
         return np.interp(t_s, (first + np.arange(len(piece))) * GRID_S, piece)
 
     def _advance(self, t_s: float) -> None:
-        followers = [(body, self._sensor[name], self._deep[name]) for name, body in self._bodies.items()]
-        for _ in range(len(self._air) - 1, int(t_s / GRID_S)):
-            distance = self._target_c - self._ramped_c
-            self._ramped_c += math.copysign(min(abs(distance), self._ramp_per_s * GRID_S), distance)
-            self._air_c += (self._ramped_c - self._air_c) * self._air_share
-            self._air_noise_c += -self._air_noise_c * 0.05 + self._noise_c * 0.31 * self._draw()
-            air = self._air_c + self._air_noise_c
-            self._air.append(air)
-            for body, sensor, deep in followers:
-                body.step(air)
-                sensor.append(body.sensor_c + body.heated_c)
-                deep.append(body.deep_c)
+        seconds = int(t_s / GRID_S) - len(self._air) + 1
+        if seconds <= 0:
+            return
+        airs_c = self._airs_after(seconds)
+        self._air += airs_c
+        for name, body in self._bodies.items():
+            body.follow(airs_c, self._sensor[name], self._deep[name])
 
-    def _draw(self) -> float:
-        if not self._draws:
-            self._draws = self._rng.standard_normal(4096).tolist()
-        return self._draws.pop()
+    def _airs_after(self, seconds: int) -> list[float]:
+        """Return the air temperature after each of the next seconds, deg C."""
+        target_c, ramped_c, air_c, noise_c = self._target_c, self._ramped_c, self._air_c, self._air_noise_c
+        step_c, scatter_c, share = self._ramp_per_s * GRID_S, self._noise_c * 0.31, self._air_share
+        found = []
+        for draw in self._draws_of(seconds):
+            distance = target_c - ramped_c
+            ramped_c += math.copysign(step_c, distance) if abs(distance) > step_c else distance
+            air_c += (ramped_c - air_c) * share
+            noise_c += -noise_c * 0.05 + scatter_c * draw
+            found.append(air_c + noise_c)
+        self._ramped_c, self._air_c, self._air_noise_c = ramped_c, air_c, noise_c
+        return found
+
+    def _draws_of(self, number: int) -> Iterator[float]:
+        for _ in range(number):
+            if not self._draws:
+                self._draws = self._rng.standard_normal(4096).tolist()
+            yield self._draws.pop()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
@@ -22,6 +22,8 @@ from labctl.fitting.poses.moves import Moves
 STEPS, SMALL = 30, 1e-10
 #: A good move is taken for a wrong one with this probability.
 FALSE_ALARM = 1e-4
+#: Median of chi squared with two degrees of freedom.
+MEDIAN = 2 * float(np.log(2))
 #: Rounds in which wrong moves are left out and taken in again.
 ROUNDS = 12
 
@@ -56,7 +58,7 @@ def fit_gyroscope(moves: Moves, accelerometer: Accelerometer, bias: Bias, readin
     for turn in range(ROUNDS):
         equations, noise, extra, errors = _solved(moves, accelerometer, bias, readings_u, errors, used, first=turn == 0)
         held_out = held_out_moves(equations, noise + extra * np.eye(len(noise)), used)
-        agrees = held_out.chi2 <= chi2.isf(FALSE_ALARM, 2)
+        agrees = held_out.chi2 <= chdtri(2, FALSE_ALARM)
         if turn > 0 and (np.array_equal(agrees, used) or agrees.tobytes() in seen):
             break
         if np.count_nonzero(agrees) >= LEAST_MOVES:
@@ -99,7 +101,7 @@ def _robust_variance(equations: Equations, noise: NDArray[np.float64]) -> float:
     """Return the variance of a component beyond its known noise, by the median of the moves."""
     size = np.sum(equations.residual.reshape(-1, 2) ** 2, axis=1)
     known = np.diag(noise).reshape(-1, 2).mean(axis=1)
-    return float(max(np.median(size) / chi2.median(2) - np.median(known), 0.0))
+    return float(max(np.median(size) / MEDIAN - np.median(known), 0.0))
 
 
 def _robust_start(moves: Moves, accelerometer: Accelerometer, bias: Bias) -> NDArray[np.float64]:
@@ -108,7 +110,7 @@ def _robust_start(moves: Moves, accelerometer: Accelerometer, bias: Bias) -> NDA
     for _ in range(STEPS):
         equations = equations_of(moves, accelerometer, bias, errors)
         size = np.linalg.norm(equations.residual.reshape(-1, 2), axis=1)
-        scale = max(float(np.median(size)) / np.sqrt(chi2.median(2)), 1e-9)
+        scale = max(float(np.median(size)) / np.sqrt(MEDIAN), 1e-9)
         weight = np.repeat(1.0 / np.sqrt(1.0 + (size / (2.4 * scale)) ** 2), 2)
         step, *_ = np.linalg.lstsq(equations.jacobian * weight[:, None], equations.residual * weight)
         errors = errors - step.reshape(3, 3)

@@ -106,14 +106,8 @@ class DriftModes:
     @staticmethod
     def of(tau_s: float, white_var: Array, t_s: Array, run: NDArray[np.int64]) -> DriftModes:
         """Return the modes of m data sets; `white_var` (m,) is the white variance of the means, (deg/s)^2."""
-        blocks, variance = [], np.empty(len(t_s))
-        for number in np.unique(run):
-            rows = np.flatnonzero(run == number)
-            white_dps = np.sqrt(white_var[rows])
-            values, vectors = np.linalg.eigh(correlation(t_s[rows], tau_s) / np.outer(white_dps, white_dps))
-            variance[rows] = np.maximum(values, 0.0)
-            blocks.append((rows, vectors / white_dps[:, None]))
-        return DriftModes(blocks, variance, float(np.log(white_var).sum()))
+        given = (np.ascontiguousarray(values, dtype=np.float64).tobytes() for values in (white_var, t_s))
+        return _modes(tau_s, *given, np.ascontiguousarray(run, dtype=np.int64).tobytes())
 
     def amplitudes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return values (m, k) as amplitudes of the modes, (m, k), over white noise."""
@@ -126,6 +120,21 @@ class DriftModes:
         """Return the factors (m,) that whiten amplitudes where the drift has a size, and the log determinant."""
         total = 1.0 + size_dps**2 * self.variance
         return 1.0 / np.sqrt(total), self.log_white + float(np.log(total).sum())
+
+
+@lru_cache(maxsize=2 * len(TAUS_S))
+def _modes(tau_s: float, white: bytes, times: bytes, runs: bytes) -> DriftModes:
+    """Cached by the bytes of the arrays: axes, and the steps of a search, share the decomposition."""
+    white_var, t_s = np.frombuffer(white, dtype=np.float64), np.frombuffer(times, dtype=np.float64)
+    run = np.frombuffer(runs, dtype=np.int64)
+    blocks, variance = [], np.empty(len(t_s))
+    for number in np.unique(run):
+        rows = np.flatnonzero(run == number)
+        white_dps = np.sqrt(white_var[rows])
+        values, vectors = np.linalg.eigh(correlation(t_s[rows], tau_s) / np.outer(white_dps, white_dps))
+        variance[rows] = np.maximum(values, 0.0)
+        blocks.append((rows, vectors / white_dps[:, None]))
+    return DriftModes(blocks, variance, float(np.log(white_var).sum()))
 
 
 def whiten(

@@ -1,0 +1,113 @@
+"""Runs `labctl` in processes of its own that are forked from one that has loaded it.
+
+Each of them is a process as any other: with its own arguments, folder, environment, files and end. What it is spared is
+a second of processor time to load the libraries. Tests of the start itself, and of signals, start `python -m labctl`.
+"""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import json
+import os
+import select
+import signal
+import socket
+import sys
+from typing import Any, TextIO, cast
+
+from tests.helpers.paths import ROOT
+
+#: What commands of labctl load when they are called.
+MODULES = (
+    "blosc2", "pyarrow.csv", "pyarrow.parquet", "alembic.command", "labctl.cli.app", "labctl.cli.printing.criticism",
+    "labctl.plots", "labctl.services.commands.computed", "labctl.services.commands.open",
+    "labctl.services.commands.registry", "labctl.services.criticism.evaluation",
+    "labctl.services.criticism.next_experiment", "labctl.services.lab_service", "labctl.services.simulation.visibility",
+)  # fmt: skip
+
+
+def serve(address: str) -> None:
+    """Fork a process for each request until standard input ends; returns in the forked processes only."""
+    for module in MODULES:
+        importlib.import_module(module)
+    gc.freeze()  # pages that the collector does not touch stay shared
+    woken, waking = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+    signal.set_wakeup_fd(waking)
+    signal.signal(signal.SIGCHLD, lambda *_: None)
+    running: dict[int, socket.socket] = {}
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(address)
+        listener.listen()
+        os.write(1, b"ready\n")
+        while True:
+            ready, _, _ = select.select([listener, woken, 0, *running.values()], [], [])
+            if 0 in ready:
+                sys.exit()
+            if woken in ready:
+                os.read(woken, 4096)
+                _report(running)
+            for pid in [pid for pid, line in running.items() if line in ready]:
+                os.kill(pid, signal.SIGKILL)  # who asked is gone
+                running.pop(pid).close()
+            if listener in ready and _forks(listener.accept()[0], running):
+                return
+
+
+def _report(running: dict[int, socket.socket]) -> None:
+    """Tell those who asked how their processes ended."""
+    while True:
+        try:
+            pid, status = os.waitpid(-1, os.WNOHANG)
+        except ChildProcessError:
+            return
+        if pid == 0:
+            return
+        if line := running.pop(pid, None):
+            with line:
+                line.sendall(b"%d\n" % os.waitstatus_to_exitcode(status))
+
+
+def _forks(line: socket.socket, running: dict[int, socket.socket]) -> bool:
+    """Fork the process of a request; returns whether this is it."""
+    _, streams, _, _ = socket.recv_fds(line, 1, 3)
+    request = json.loads(line.makefile().readline())
+    pid = os.fork()
+    if pid == 0:
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        for other in [line, *running.values()]:
+            other.close()
+        _become(request, streams)
+        return True
+    running[pid] = line
+    for stream in streams:
+        os.close(stream)
+    return False
+
+
+def _become(request: dict[str, Any], streams: list[int]) -> None:
+    """Take over arguments, folder, environment and files of a request."""
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
+        os.close(stream)
+    sys.stdin, sys.stdout, sys.stderr = _opened(0, "r"), _opened(1, "w"), _opened(2, "w")
+    os.chdir(request["folder"])
+    inherited = {str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)}
+    os.environ.clear()
+    os.environ.update(request["environment"])
+    own = [place for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place]
+    sys.path[:] = [request["folder"], *own, *(place for place in sys.path if place not in inherited)]
+    importlib.invalidate_caches()
+    sys.argv = ["labctl", *request["arguments"]]
+
+
+def _opened(number: int, mode: str) -> TextIO:
+    return cast(TextIO, open(number, mode, buffering=1, encoding="utf-8", closefd=False))
+
+
+if __name__ == "__main__":
+    serve(sys.argv[1])
+    from labctl.cli import main
+
+    main()
