@@ -24,7 +24,7 @@ from instruments.protocols.kvh_lines import (
     parse_line,
 )
 from instruments.transport.factory import Ports
-from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime
+from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream
 
 SILENCE_S = 2.0
@@ -69,7 +69,7 @@ class KvhGyro:
         )
         self._unfinished = b""
         self._in_line = False
-        self._time: StreamTime | None = None
+        self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
         self._last_line_s = 0.0
 
     @property
@@ -95,9 +95,9 @@ class KvhGyro:
         self._stream.open()
         if command := self._model.format.start_command:
             self._stream.write(command.encode() * START_REPEATS)
-        self._time = None
         self._discard()
         self._last_line_s = self._clock.now_s()
+        self._time = StreamTime(1.0 / self.sample_rate_hz, self._last_line_s)
 
     def read(self, duration_s: float) -> Readings:
         """Get every reading of the next `duration_s` seconds; fewer where lines are missing.
@@ -140,8 +140,7 @@ class KvhGyro:
     def _discard(self) -> None:
         self._stream.discard_input()
         self._unfinished, self._in_line = b"", False
-        if self._time is not None:
-            self._time.drop()
+        self._time.drop()
 
     def _no_line(self, silence_s: float) -> NoReply:
         return NoReply(
@@ -163,11 +162,11 @@ class KvhGyro:
         raw = {channel.name: codes[:, i] for i, channel in enumerate(self.channels)}
         if not good:
             return Readings(np.zeros(0), raw, np.zeros(0, dtype=bool), 0, damaged)
-        if self._time is None:
-            self._time = StreamTime(1.0 / self.sample_rate_hz, self._clock.now_s())
+        came = self._stream.last
         advance = np.ones(len(good), dtype=np.int64)
         advance[0] += damaged  # a damaged line has taken its sampling period too
-        times, lost = self._time.times(advance, self._clock.now_s())
+        times, lost = self._time.times(advance, came.now_s, newest_s=came.newest_s, width_s=came.width_s)
+        refuse_other_rate(self.name, self.settings.port, self._time.line)
         valid = np.asarray([line.flag and abs(line.rate) <= self._limit_counts for line in good])
         return Readings(times, raw, valid, lost, damaged)
 

@@ -23,7 +23,7 @@ from instruments.protocols.stim300_frames import (
     scan,
 )
 from instruments.transport.factory import Ports
-from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime
+from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream
 
 SILENCE_S = 2.0
@@ -53,7 +53,7 @@ class Stim300:
         )
         self._unfinished = b""
         self._counter: int | None = None
-        self._time: StreamTime | None = None
+        self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
         self._last_frame_s = 0.0
 
     @property
@@ -78,9 +78,9 @@ class Stim300:
     def start(self) -> None:
         """Control the stream: open the port and drop stale bytes; raises LinkError."""
         self._stream.open()
-        self._time = None
         self._discard()
         self._last_frame_s = self._clock.now_s()
+        self._time = StreamTime(1.0 / self.sample_rate_hz, self._last_frame_s)
 
     def read(self, duration_s: float) -> Readings:
         """Get every reading of the next `duration_s` seconds; fewer where the stream has gaps.
@@ -114,8 +114,7 @@ class Stim300:
     def _discard(self) -> None:
         self._stream.discard_input()
         self._unfinished, self._counter = b"", None
-        if self._time is not None:
-            self._time.drop()
+        self._time.drop()
 
     def _no_datagram(self, when: str) -> NoReply:
         return NoReply(
@@ -153,9 +152,9 @@ class Stim300:
         advance = (np.diff(counter, prepend=before) % 256) // step
         advance[advance == 0] = wrap
         self._counter = int(counter[-1])
-        if self._time is None:
-            self._time = StreamTime(1.0 / self.sample_rate_hz, self._clock.now_s())
-        times, uncounted = self._time.times(advance, self._clock.now_s(), wrap)
+        came = self._stream.last
+        times, uncounted = self._time.times(advance, came.now_s, wrap, newest_s=came.newest_s, width_s=came.width_s)
+        refuse_other_rate(self.name, self.settings.port, self._time.line)
         return times, int(advance.sum() - len(advance)) + uncounted
 
 

@@ -46,6 +46,11 @@ class SimulatedStim300:
         self._sent = newest
         return self._encode(index, t_s).tobytes()
 
+    @property
+    def newest_s(self) -> float:
+        """When the newest frame was complete, s."""
+        return self._sent / self._rate_hz
+
     def skip(self, t_s: float) -> None:
         """Lose the frames up to `t_s`."""
         self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))

@@ -35,6 +35,7 @@ class UnitTruth:
     deep_tau_s: float = 420.0
     supply_v: float = 5.0
     warm_up: Callable[[Array], Array] | None = field(default=None)  #: (seconds since power-on (n,)) -> (n,) deg/s
+    sample_clock_ppm: float = 0.0  #: by how much more readings come than the bench file says
 
     def k(self, temperature_c: float) -> Array:
         """Return K at a temperature, (axes, 3): K[output, input]."""
