@@ -23,9 +23,10 @@ from instruments.protocols.kvh_lines import (
     LineFormat,
     parse_line,
 )
+from instruments.transport.adapters import require_adapter
 from instruments.transport.factory import Ports
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
-from instruments.transport.serial_stream import SerialStream
+from instruments.transport.serial_stream import SerialStream, line_of
 
 SILENCE_S = 2.0
 EMPTY_EVERY_S = 1.0
@@ -65,8 +66,9 @@ class KvhGyro:
         self.limits = GyroLimits(settings.max_rate_dps, settings.min_c, settings.max_c)
         self._clock = clock
         self._stream = SerialStream(
-            self.name, settings.port or "", ports, clock, baudrate=self._baudrate, timeout_s=SILENCE_S
-        )
+            self.name, settings.port or "", ports, clock, baudrate=self._baudrate, timeout_s=SILENCE_S,
+            line=line_of(options),
+        )  # fmt: skip
         self._unfinished = b""
         self._in_line = False
         self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
@@ -79,7 +81,11 @@ class KvhGyro:
         return (rate, Channel("temperature_c", "deg C", C_PER_COUNT)) if self._model.has_temperature else (rate,)
 
     def identify(self) -> GyroIdentity:
-        """Get the unit's identity from the bench file, after one line was read; raises NoReply, LinkError."""
+        """Get the unit's identity from the bench file, after one line was read.
+
+        Raises WrongInstrument where the port is on another USB adapter than the bench file names, NoReply, LinkError.
+        """
+        adapter = require_adapter(self.name, self.settings.port, self.settings.options.adapter)
         was_open = self._stream.is_open
         self.start()
         self.read_latest()
@@ -87,8 +93,9 @@ class KvhGyro:
             self.stop()
         settings = self.settings
         return GyroIdentity(
-            settings.serial, settings.model or self._model.name, settings.technology or "fog", settings.datasheet
-        )
+            settings.serial, settings.model or self._model.name, settings.technology or "fog", settings.datasheet,
+            reported=adapter,
+        )  # fmt: skip
 
     def start(self) -> None:
         """Control the stream: open the port, ask for rates, and drop stale or partial lines; raises LinkError."""

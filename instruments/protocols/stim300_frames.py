@@ -1,128 +1,38 @@
-"""STIM300 datagrams (data sheet TS1524): scales, layouts, CRC and a vectorised scanner for intact frames.
+"""STIM300 datagrams (data sheet TS1524): scales, and a vectorised scanner for intact frames.
 
-The CRC (polynomial 04C11DB7, start FFFFFFFF, most significant bit first, no final exclusive or) is linear over GF(2):
-the CRC of a frame is the exclusive or of one table entry for each pair of its bytes. Frames nearly always follow each
-other at a fixed stride, so the scanner checks the stride first and searches only the gaps byte by byte.
+Frames nearly always follow each other at a fixed stride, so the scanner checks the stride first and searches only the
+gaps byte by byte. What stands in a gap may be a datagram that a unit sends at its start or when it is asked.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
-from instruments.bench_config import GyroSettings, Strict
+from instruments.protocols.stim300_layouts import LAYOUTS, SPECIALS, Bytes, Layout, crc32_mpeg2
+from instruments.protocols.stim300_settings import DatagramOptions, Stim300Settings
 
-Bytes = NDArray[np.uint8]
-POLYNOMIAL = 0x04C11DB7
+__all__ = [
+    "LAYOUTS", "Bytes", "DatagramOptions", "Layout", "Scan", "Stim300Settings", "crc32_mpeg2", "int16", "int24",
+    "layout_of", "scan",
+]  # fmt: skip
 CHUNK = 2048  #: frames that are checked together: their tables and columns stay in the cache
 AXES = ("x", "y", "z")
 RATE_PER_LSB = 2.0**-14  #: deg/s
+ANGLE_PER_LSB = 2.0**-21  #: deg, of incremental and integrated angles
 TEMPERATURE_PER_LSB = 2.0**-8  #: deg C
 COUNTS_PER_S = 2000  #: the counter of a datagram counts internal samples
 #: Status bits that make a reading invalid: integrity, start-up, outside conditions, overload, channel error.
 BAD_STATUS = 0xF8
-OVERLOAD = 0x10
+OVERLOAD, START_UP = 0x10, 0x40
 #: The output saturates at this rate, deg/s; a reading at the rail is not a measurement (data sheet, table 5-3).
 SATURATION_DPS = 480.0
 
 
-class DatagramOptions(Strict):
-    """Configuration of the unit's output: datagram, line end, bit rate in bit/s."""
-
-    datagram: Literal[0x90, 0x94, 0xA7] = 0x94
-    crlf: bool = False
-    baudrate: int = 460_800
-
-
-class Stim300Settings(GyroSettings):
-    """Settings of a STIM300, as a bench file gives them."""
-
-    options: DatagramOptions = Field(default_factory=DatagramOptions)
-
-
-def crc32_mpeg2(data: bytes, start: int = 0xFFFFFFFF) -> int:
-    """Return the CRC-32/MPEG-2 of bytes, one bit at a time: the definition that the tables are made from."""
-    crc = start
-    for byte in data:
-        crc ^= byte << 24
-        for _ in range(8):
-            crc = ((crc << 1) ^ POLYNOMIAL) & 0xFFFFFFFF if crc & 0x80000000 else (crc << 1) & 0xFFFFFFFF
-    return crc
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Offsets of the fields of a datagram, bytes (data sheet TS1524, section 5.5.6)."""
-
-    id: int
-    length: int  #: without CR LF
-    pad: int  #: zero bytes that the CRC covers but that are not sent
-    status: int
-    temperature: int | None
-    temperature_status: int | None
-    crlf: bool = False
-
-    @property
-    def stride(self) -> int:
-        """Bytes from one frame to the next."""
-        return self.length + (2 if self.crlf else 0)
-
-    @property
-    def covered(self) -> int:
-        """Bytes before the CRC."""
-        return self.length - 4
-
-    @property
-    def counter(self) -> int:
-        """Offset of the counter."""
-        return self.length - 7
-
-    @cached_property
-    def _tables(self) -> tuple[int, list[NDArray[np.uint32]]]:
-        """Return the CRC of zeros, and a table for each pair of covered bytes (the last may stand alone)."""
-        size = self.covered + self.pad
-        single = np.zeros((size, 256), dtype=np.uint32)
-        for place in range(size):
-            bits = [
-                crc32_mpeg2(bytes(place) + bytes([1 << bit]) + bytes(size - place - 1), start=0) for bit in range(8)
-            ]
-            for bit, value in enumerate(bits):
-                single[place, (np.arange(256) >> bit) & 1 == 1] ^= np.uint32(value)
-        # two bytes read as one little-endian word: the first is the low one
-        pairs = [
-            (single[place + 1][:, None] ^ single[place][None, :]).reshape(-1) for place in range(0, self.covered - 1, 2)
-        ]
-        if self.covered % 2:
-            pairs.append(single[self.covered - 1])
-        return crc32_mpeg2(bytes(size)), pairs
-
-    def crc(self, frames: Bytes) -> NDArray[np.uint32]:
-        """Return the CRC, (n,), of frames (n, >= length - 4)."""
-        zeros, pairs = self._tables
-        words = np.ascontiguousarray(frames[:, : self.covered // 2 * 2]).view("<u2")
-        crc = np.full(len(frames), zeros, dtype=np.uint32)
-        for index in range(self.covered // 2):
-            crc ^= pairs[index].take(words[:, index])
-        if self.covered % 2:
-            crc ^= pairs[-1].take(frames[:, self.covered - 1])
-        return crc
-
-    def intact(self, frames: Bytes) -> NDArray[np.bool_]:
-        """Return which frames (n, stride) carry the right id and CRC, (n,)."""
-        sent = np.ascontiguousarray(frames[:, self.covered : self.length]).view(">u4")[:, 0]
-        return (frames[:, 0] == self.id) & (self.crc(frames) == sent)
-
-
-LAYOUTS = {
-    0x90: Layout(0x90, 18, 2, 10, None, None),
-    0x94: Layout(0x94, 25, 3, 10, 11, 17),
-    0xA7: Layout(0xA7, 59, 1, 10, 31, 37),
-}
+SPECIAL_BEGINS = re.compile(b"[" + re.escape(bytes(SPECIALS)) + b"]")
 
 
 def layout_of(options: DatagramOptions) -> Layout:
@@ -137,12 +47,13 @@ class Scan:
     frames: Bytes
     rest: bytes
     damaged: int
+    specials: tuple[bytes, ...] = ()  #: other datagrams of the unit, without CR LF
 
 
 def scan(data: bytes, layout: Layout) -> Scan:
     """Find every intact frame in `data`; `rest` holds the unfinished end, for the next scan."""
     raw = np.frombuffer(data, dtype=np.uint8)
-    stride, found, at, skipped = layout.stride, [], 0, 0
+    stride, found, at, gaps = layout.stride, [], 0, _Gaps(data, layout)
     while len(raw) - at >= stride:
         n = min((len(raw) - at) // stride, CHUNK)
         frames = raw[at : at + n * stride].reshape(n, stride)
@@ -153,16 +64,78 @@ def scan(data: bytes, layout: Layout) -> Scan:
             continue
         last = _last_at_stride(good)
         found.append(frames[:last][good[:last]])
-        skipped += int((~good[:last]).sum()) * stride
+        for bad in np.flatnonzero(~good[:last]):
+            gaps.add(at + bad * stride, at + (bad + 1) * stride)
         at += last * stride
         ahead = _next_intact(raw, at, layout)
-        skipped += ahead - at
+        is_unfinished = False
+        if ahead > len(raw) - stride:
+            ahead, is_unfinished = _end_of_gap(data, at, ahead)
+        gaps.add(at, ahead)
         at = ahead
+        if is_unfinished:
+            break
     return Scan(
         np.concatenate(found) if found else np.zeros((0, stride), dtype=np.uint8),
         raw[at:].tobytes(),
-        -(-skipped // stride),
+        gaps.damaged,
+        tuple(gaps.specials),
     )
+
+
+class _Gaps:
+    """Bytes between the frames: other datagrams of the unit, and damage."""
+
+    def __init__(self, data: bytes, layout: Layout) -> None:
+        self._data, self._stride = data, layout.stride
+        self._skipped = 0
+        self.specials: list[bytes] = []
+
+    @property
+    def damaged(self) -> int:
+        """Damage in numbers of frames."""
+        return -(-self._skipped // self._stride)
+
+    def add(self, start: int, end: int) -> None:
+        """Take in that no frame lies between two offsets."""
+        skipped = end - start
+        while candidate := SPECIAL_BEGINS.search(self._data, start, end):
+            start = candidate.start()
+            special = special_at(self._data, start)
+            if special is None or start + special.stride > end:
+                start += 1
+                continue
+            self.specials.append(self._data[start : start + special.length])
+            start += special.stride
+            skipped -= special.stride
+        self._skipped += max(skipped, 0)
+
+
+def special_at(data: bytes, at: int) -> Layout | None:
+    """Return the layout of the intact special datagram whose identifier is at an offset; None where it is not one."""
+    layout = SPECIALS[data[at]]
+    if len(data) - at < layout.stride:
+        return None
+    frame = np.frombuffer(data, dtype=np.uint8, count=layout.stride, offset=at)
+    return layout if layout.intact(frame[None])[0] else None
+
+
+def _end_of_gap(data: bytes, at: int, ahead: int) -> tuple[int, bool]:
+    """Return where a gap ends in which no frame begins from `at` to `ahead`, at the end of the data.
+
+    It ends behind a special datagram that reaches further, or before one that has not come whole: then also True.
+    """
+    done = at
+    for candidate in SPECIAL_BEGINS.finditer(data, at):
+        start = candidate.start()
+        if start >= ahead:
+            break
+        end = start + SPECIALS[data[start]].stride
+        if start >= done and end > len(data):
+            return start, True
+        if start >= done and special_at(data, start) is not None:
+            done, ahead = end, max(ahead, end)
+    return ahead, False
 
 
 def _last_at_stride(good: NDArray[np.bool_]) -> int:

@@ -84,9 +84,7 @@ class Ports:
         self._hardware = HardwareLinks(clock)
         self._simulated = simulated
 
-    def serial(
-        self, url: str, *, device: str, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1
-    ) -> SerialPort:
+    def serial(self, url: str, *, device: str, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
         """Open a serial port, 8 data bits, locked for this process.
 
         Raises LinkError with port and remedy, also while another process has the port open.

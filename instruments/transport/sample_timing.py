@@ -68,11 +68,15 @@ class StreamTime:
         if self._dropped and self._started:
             index += self._resumed(now_s) - index[-1]
         self._dropped = False
-        if not self._started:
+        if self._started:
+            lost = self._lost(int(index[-1]), now_s, wrap)
+        else:
+            lost = 0
             self._begin(int(index[-1]), now_s)
-        lost = self._lost(int(index[-1]), now_s, wrap)
         index = index + lost
         period_s = self._period_with(int(index[-1]), now_s if newest_s is None else newest_s, width_s)
+        if newest_s is not None and self._line.is_followed:
+            now_s = newest_s
         behind_s = now_s - (self._anchor_s + int(index[-1]) * period_s)
         self._anchor_s += behind_s if behind_s < 0 else FOLLOW * max(behind_s - period_s, 0.0)
         times = self._anchor_s + index * period_s
@@ -89,7 +93,7 @@ class StreamTime:
         if newest >= ENOUGH and UNKNOWN < took_s / (newest * period_s) < 1 / UNKNOWN:
             # the reading before the first came within a period of the emptying of the port
             self._line.add(-1, self._last_now_s + period_s, 2 * period_s)
-        self._anchor_s, self._started = now_s - newest * period_s, True
+        self._anchor_s, self._index, self._started = now_s - newest * period_s, newest, True
 
     def _lost(self, newest: int, now_s: float, wrap: int) -> int:
         """Return how many readings are missing that no counter shows: the stream is too far behind the Clock."""

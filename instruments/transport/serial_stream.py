@@ -6,12 +6,18 @@ from typing import NoReturn
 
 from instruments.clock import Clock, sleep_until
 from instruments.errors import LinkError
+from instruments.protocols.serial_options import SerialOptions
 from instruments.transport.factory import Ports
 from instruments.transport.serial import BROKEN, EIGHT_N_1, Line, SerialPort
 from instruments.transport.stream_reader import Received, StreamReader
 
 #: Clock seconds that count as no time: rounding of sums of durations.
 TINY_S = 1e-9
+
+
+def line_of(options: SerialOptions) -> Line:
+    """Return the electrical settings that a bench file gives."""
+    return Line(options.parity, options.stop_bits, options.dtr, options.rts)
 
 
 class SerialStream:

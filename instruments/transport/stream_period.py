@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
-#: Largest share by which the period of a device may differ from the one in the bench file.
+#: Largest share by which the rate of a device may differ from the one in the bench file.
 TOLERANCE = 0.04
 #: Before anything was measured the period may be off by this share: a wrong bench file is told from lost readings.
 UNKNOWN = 0.5
-#: A period that is known to this share is measured.
-MEASURED = 0.005
+#: A period that is known to this share, from so many points, is measured.
+MEASURED, ENOUGH_POINTS = 0.005, 8
 #: Points fade with this time constant, s.
 MEMORY_S = 600.0
 #: An arrival is never taken to be known better than this, s.
@@ -30,13 +30,17 @@ class PeriodLine:
 
     def __init__(self, nominal_s: float) -> None:
         self.nominal_s = nominal_s
-        self.period_s = nominal_s  #: of the device, as far as it is known
-        self._is_followed = False
+        self._weight = self._mean_x = self._mean_z = 0.0  # of the present stretch
+        self._last_s = 0.0
+        self._forget()
+
+    def _forget(self) -> None:
+        """Know nothing of the period."""
+        self.period_s = self.nominal_s  #: of the device, as far as it is known
+        self.is_followed = False  #: whether the arrivals have excluded the nominal period
         self._points = 0.0  # number of points, faded
         # sums of all stretches about their own means; z is the arrival less the nominal time of the reading
         self._sxx = self._sxz = 0.0
-        self._weight = self._mean_x = self._mean_z = 0.0  # of the present stretch
-        self._last_s = 0.0
 
     @property
     def u_share(self) -> float:
@@ -47,14 +51,16 @@ class PeriodLine:
 
     @property
     def measured_s(self) -> float | None:
-        """Slope of the line, s; None where it is not known to MEASURED."""
-        return self.nominal_s + self._shift_s if self.u_share < MEASURED else None
+        """Slope of the line, s; None where it is not known to MEASURED from ENOUGH_POINTS."""
+        known = self._points >= ENOUGH_POINTS and self.u_share < MEASURED
+        return self.nominal_s + self._shift_s if known else None
 
     @property
     def is_outside_tolerance(self) -> bool:
-        """Whether the arrivals exclude every period within TOLERANCE of the nominal one."""
-        known = self.u_share < MEASURED
-        return known and abs(self._shift_s) - self._bound_s > TOLERANCE * self.nominal_s
+        """Whether the arrivals exclude every rate within TOLERANCE of the nominal one."""
+        if (period_s := self.measured_s) is None:
+            return False
+        return abs(self.nominal_s / period_s - 1.0) > TOLERANCE + self._bound_s / period_s
 
     def restart(self) -> None:
         """Begin a new stretch: the number of the next reading is not known."""
@@ -68,6 +74,8 @@ class PeriodLine:
         z = t_s - 0.5 * width_s - x * self.nominal_s
         if self._weight and self._is_off(x, z, width_s):
             self.restart()
+            if self._points < ENOUGH_POINTS:  # readings may have been lost before: the line is not to be trusted
+                self._forget()
         self._fade(t_s)
         self._points += 1.0
         if not self._weight:
@@ -104,8 +112,8 @@ class PeriodLine:
         self._last_s = t_s
 
     def _choose(self) -> None:
-        if self._sxx <= 0.0 or not (self._is_followed or abs(self._shift_s) > self._bound_s):
+        if self._sxx <= 0.0 or not (self.is_followed or abs(self._shift_s) > self._bound_s):
             return
-        self._is_followed = True
+        self.is_followed = True
         limit_s = UNKNOWN * self.nominal_s
         self.period_s = self.nominal_s + min(max(self._shift_s, -limit_s), limit_s)

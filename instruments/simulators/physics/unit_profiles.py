@@ -139,6 +139,7 @@ def usual_rate_hz(driver: str) -> float:
 def make_unit(driver: str, axes: tuple[str, ...], settings: Mapping[str, object], seed: list[int]) -> UnitTruth:
     """Return one unit of a profile with the deviations of the bench file; raises ValueError for unknown names."""
     given = dict(settings)
+    given.pop("device", None)  # how its electronics are set is read by the simulated instrument
     profile = given.pop("profile", DEFAULT_PROFILES.get(driver))
     if profile is None:
         raise ValueError(
