@@ -174,8 +174,8 @@ class Stim300:
             if said := differences(found, self.settings):
                 raise WrongInstrument(
                     self.name,
-                    f"the unit on {self.settings.port} is set otherwise than needed: {'; '.join(said)}; set the unit in "
-                    "its service mode (commands u, m, d) or correct the bench file",
+                    f"the unit on {self.settings.port} is set otherwise than needed: {'; '.join(said)}; set the unit "
+                    "in its service mode (commands u, m, d) or correct the bench file",
                 )
             self._set = found
         elif (serial := parse_serial_number(special)) is not None:

@@ -1,4 +1,4 @@
-"""Whether a STIM300 is set as its bench file says: what differs, with the command of the service mode that changes it."""
+"""Whether a STIM300 is set as its bench file says, and which one it is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a STIM300 says about itself: its configuration and serial number (data sheet TS1524 rev. 31, 5.5.2 and 5.5.3)."""
+"""What a STIM300 says of itself: configuration and serial number (data sheet TS1524 rev. 31, 5.5.2 and 5.5.3)."""
 
 from __future__ import annotations
 
@@ -95,10 +95,8 @@ def parse_serial_number(frame: bytes) -> str | None:
 
 def configuration_frame(given: Configuration) -> bytes:
     """Return the configuration datagram, with CR LF where it is set so, of a unit that is set as given."""
-    if given.sample_rate_hz is None:
-        code = EXTERNAL_TRIGGER
-    else:
-        code = SAMPLE_RATES_HZ.index(given.sample_rate_hz)
+    rate_hz = given.sample_rate_hz
+    code = EXTERNAL_TRIGGER if rate_hz is None else SAMPLE_RATES_HZ.index(rate_hz)
     content = given.content
     body = bytearray(21)
     body[0], body[1] = ord(given.revision), given.firmware

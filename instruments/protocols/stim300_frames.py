@@ -64,7 +64,7 @@ def scan(data: bytes, layout: Layout) -> Scan:
             continue
         last = _last_at_stride(good)
         found.append(frames[:last][good[:last]])
-        for bad in np.flatnonzero(~good[:last]):
+        for bad in np.flatnonzero(~good[:last]).tolist():
             gaps.add(at + bad * stride, at + (bad + 1) * stride)
         at += last * stride
         ahead = _next_intact(raw, at, layout)

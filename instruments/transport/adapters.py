@@ -33,7 +33,7 @@ def require_adapter(device: str, port: str | None, wanted: str | None) -> dict[s
     if wanted is not None and wanted != found:
         raise WrongInstrument(
             device,
-            f"port {port} is on USB adapter {found or 'without a serial number'}, bench file {wanted}; two adapters may "
-            "have changed places: give the port's path in /dev/serial/by-id",
+            f"port {port} is on USB adapter {found or 'without a serial number'}, bench file {wanted}; two adapters "
+            "may have changed places: give the port's path in /dev/serial/by-id",
         )
     return {"adapter": found} if found else {}

@@ -23,8 +23,8 @@ SAME_PHASE = 0.25
 class StreamTime:
     """Times of a stream of evenly spaced readings, strictly rising.
 
-    `period_s` is the nominal period, s; the device's own is estimated from the arrivals of its readings. `now_s` is when
-    the port was emptied before the first of them.
+    `period_s` is the nominal period, s; the device's own is estimated from the arrivals of its readings. `now_s` is
+    when the port was emptied before the first of them.
     """
 
     def __init__(self, period_s: float, now_s: float) -> None:

@@ -14,7 +14,7 @@ PARITIES: dict[str, str] = {"none": serial.PARITY_NONE, "odd": serial.PARITY_ODD
 
 @dataclass(frozen=True)
 class Line:
-    """Electrical settings of a port beyond its bit rate; 8 data bits always. None: as the operating system leaves it."""
+    """Electrical settings of a port beyond its bit rate, with 8 data bits. None: as the system leaves it."""
 
     parity: Literal["none", "odd", "even"] = "none"
     stop_bits: Literal[1, 2] = 1

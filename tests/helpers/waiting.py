@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 WAIT_S = 60.0  #: for the next event
+LOOK_S = 0.002
 
 
 def wait_until(
@@ -27,3 +28,13 @@ def wait_until(
             assert happened.wait(WAIT_S), f"no event in {WAIT_S:g} s: {answer}"
     finally:
         stop()
+
+
+def eventually(holds: Callable[[], Any]) -> None:
+    """Return once a condition on another thread, which reports nothing, holds; AssertionError after WAIT_S."""
+    never = threading.Event()
+    for _ in range(round(WAIT_S / LOOK_S)):
+        if holds():
+            return
+        never.wait(LOOK_S)
+    raise AssertionError(f"not in {WAIT_S:g} s")

@@ -91,7 +91,7 @@ def test_the_serial_number_of_the_bench_file_is_held_against_the_units(stand: Ma
 
 def test_a_unit_that_does_not_hear_is_told_from_a_silent_one(stand: Make) -> None:
     s = unit(stand, {"mute": True})
-    with pytest.raises(NoReply, match="does not answer the commands C and I within 1.5 s; check the wire"):
+    with pytest.raises(NoReply, match=r"does not answer the commands C and I within 1\.5 s; check the wire"):
         s.gyro.identify()
     s = unit(stand, {"mute": True}, options={"ask": False})
     assert s.gyro.identify().reported == {}

@@ -25,9 +25,10 @@ def listen(rate_hz: float, looks_s: np.ndarray, jitter_s: float | None = None) -
             continue
         known: dict[str, Any] = {}
         if jitter_s is not None:  # an adapter holds bytes back, and a thread notes when they come
-            look_s = total / rate_hz + rng.uniform(0, jitter_s)
-            known = {"newest_s": look_s, "width_s": jitter_s}
-        found, missing = stream.times(np.ones(total - sent, dtype=np.int64), float(look_s), **known)
+            came_s = total / rate_hz + rng.uniform(0, jitter_s)
+            known = {"newest_s": came_s, "width_s": jitter_s}
+        now_s = float(known.get("newest_s", look_s))
+        found, missing = stream.times(np.ones(total - sent, dtype=np.int64), now_s, **known)
         sent, lost = total, lost + missing
         times.append(found)
     return stream, np.concatenate(times), lost
