@@ -21,7 +21,6 @@ from instruments.interfaces.unit_handler import UnitHandler
 from instruments.simulation import Simulation, open_simulation, simulated_links, simulated_unit_handler
 from instruments.transport.factory import Ports
 
-
 #: How long the readings of a unit are counted in a check, s.
 LISTEN_S = 5.0
 

@@ -92,7 +92,7 @@ class Ports:
         try:
             return self._links(url, device).serial_port(url, baudrate=baudrate, timeout_s=timeout_s, line=line)
         except NOT_OPENED as error:
-            raise LinkError(device, f"port {url} cannot be opened ({error}); {remedy(url, error)}") from error
+            raise LinkError(device, f"port {url} cannot be opened ({error}); check {remedy(url, error)}") from error
 
     def stream_reader(self, url: str, port: SerialPort) -> StreamReader:
         """Return what empties an open port: a thread for a real one, which does not wait for its reader."""

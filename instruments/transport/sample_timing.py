@@ -127,7 +127,7 @@ class StreamTime:
         if off_phase:
             self._anchor_s += behind_s
         if off_phase or (newest - self._index) * self._line.u_share > SAME_PHASE:
-            self._line.restart()  # which of the device's readings this is cannot be told
+            self._line.restart()  # the number of this reading is not known
         return newest
 
 

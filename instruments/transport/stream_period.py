@@ -11,7 +11,7 @@ import math
 
 #: Largest share by which the rate of a device may differ from the one in the bench file.
 TOLERANCE = 0.04
-#: Before anything was measured the period may be off by this share: a wrong bench file is told from lost readings.
+#: Before anything was measured the period may be off by this share: a wrong bench file is distinguished from losses.
 UNKNOWN = 0.5
 #: A period that is known to this share, from so many points, is measured.
 MEASURED, ENOUGH_POINTS = 0.005, 8

@@ -1,7 +1,7 @@
 """Reading a port that receives unsolicited bytes: everything that has come, and when the newest of it came.
 
 A real port is emptied by a thread of its own, so that a slow chamber or a busy processor costs no reading. A simulated
-one makes its bytes when it is looked at: no thread reads it, and a seed gives the same campaign again.
+one makes its bytes when it is read: no thread does that, and a seed gives the same campaign again.
 """
 
 from __future__ import annotations

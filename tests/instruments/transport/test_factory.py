@@ -48,14 +48,14 @@ def test_a_time_out_of_the_bench_clock_is_wall_time_on_hardware_and_itself_in_si
 @pytest.mark.parametrize(
     ("number", "says"),
     [
-        (errno.EACCES, r"this user may not use it: run `sudo usermod -aG dialout \$USER`, then log in again$"),
-        (errno.EBUSY, r"another process has it open: `fuser -v /dev/ttyUSB0` names it; end that one$"),
-        (errno.EAGAIN, r"another process has it open: `fuser -v /dev/ttyUSB0` names it; end that one$"),
+        (errno.EACCES, r"check that this user may use it: run `sudo usermod -aG dialout \$USER`, then log in again$"),
+        (errno.EBUSY, r"check which other process has it open: run `fuser -v /dev/ttyUSB0`, and end that one$"),
+        (errno.EAGAIN, r"check which other process has it open: run `fuser -v /dev/ttyUSB0`, and end that one$"),
         (errno.ENOENT, r"check the cable and the port's name; "),
         (errno.EIO, r"check the cable, the port's name and who else uses it$"),
     ],
 )
-def test_a_port_that_cannot_be_opened_is_named_with_the_command_that_mends_it(
+def test_a_port_that_cannot_be_opened_is_named_with_the_command_that_corrects_it(
     monkeypatch: pytest.MonkeyPatch, number: int, says: str
 ) -> None:
     def refuse(*_: Any, **__: Any) -> Any:

@@ -25,7 +25,7 @@ PERIOD_S = 1 / 125
 
 
 class Unit:
-    """A STIM300 at the far end of a pseudo-terminal: it sends what it is told to, and answers nothing."""
+    """A STIM300 at the far end of a pseudo-terminal: it sends datagrams and answers nothing."""
 
     def __init__(self) -> None:
         self.ours, self.theirs = os.openpty()
@@ -80,7 +80,7 @@ def test_a_reader_that_pauses_for_two_seconds_loses_nothing(unit: Unit) -> None:
         unit.send(125)
         clock.sleep(1.0)
         assert sum(len(part) for part in all_of(driver, 125)) == 125
-    unit.send(250)  # 6250 bytes: one look at the port shows 4095 of them
+    unit.send(250)  # 6250 bytes: the port reports 4095 of them
     clock.sleep(2.0)
     parts = all_of(driver, 250)
     assert sum(len(part) for part in parts) == 250
