@@ -9,15 +9,15 @@ from instruments.clock import Clock
 from instruments.drivers.driver import GyroDriver
 from instruments.errors import NoReply, WrongInstrument
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
-from instruments.protocols.stim300_checks import DEFAULT_RATE_HZ, differences, is_other_serial
-from instruments.protocols.stim300_datagrams import (
+from instruments.protocols.stim300.checks import DEFAULT_RATE_HZ, differences, is_other_serial
+from instruments.protocols.stim300.datagrams import (
     ASK_CONFIGURATION,
     ASK_SERIAL_NUMBER,
     Configuration,
     parse_configuration,
     parse_serial_number,
 )
-from instruments.protocols.stim300_frames import (
+from instruments.protocols.stim300.frames import (
     AXES,
     BAD_STATUS,
     COUNTS_PER_S,
@@ -29,7 +29,7 @@ from instruments.protocols.stim300_frames import (
     layout_of,
     scan,
 )
-from instruments.protocols.stim300_settings import Stim300Settings
+from instruments.protocols.stim300.settings import Stim300Settings
 from instruments.transport.adapters import require_adapter
 from instruments.transport.factory import Ports
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from instruments.bench_config import GyroSettings, Strict, part_of
-from instruments.protocols.stim300_datagrams import (
+from instruments.protocols.stim300.datagrams import (
     ASK_CONFIGURATION,
     ASK_SERIAL_NUMBER,
     RESET,
@@ -26,7 +26,7 @@ from instruments.protocols.stim300_datagrams import (
     content_of_datagram,
     serial_number_frame,
 )
-from instruments.protocols.stim300_frames import (
+from instruments.protocols.stim300.frames import (
     ANGLE_PER_LSB,
     AXES,
     COUNTS_PER_S,
@@ -37,8 +37,8 @@ from instruments.protocols.stim300_frames import (
     TEMPERATURE_PER_LSB,
     layout_of,
 )
-from instruments.protocols.stim300_layouts import Bytes
-from instruments.protocols.stim300_settings import Stim300Settings
+from instruments.protocols.stim300.layouts import Bytes
+from instruments.protocols.stim300.settings import Stim300Settings
 from instruments.simulators.setup import InstrumentSetup
 
 LATENCY_US = 506

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from instruments.errors import NoReply, WrongInstrument
-from instruments.protocols.stim300_frames import LAYOUTS
+from instruments.protocols.stim300.frames import LAYOUTS
 
 Make = Callable[..., Any]
 RATE_DPS = 30.0
@@ -131,7 +131,7 @@ def test_a_unit_that_comes_back_set_otherwise_is_noticed(stand: Make) -> None:
 
 
 def _as_incremental(says: bytes) -> bytes:
-    from instruments.protocols.stim300_layouts import crc32_mpeg2
+    from instruments.protocols.stim300.layouts import crc32_mpeg2
 
     if says[0] != 0xBC:
         return says

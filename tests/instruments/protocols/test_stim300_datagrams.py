@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from instruments.protocols.stim300_datagrams import (
+from instruments.protocols.stim300.datagrams import (
     Configuration,
     configuration_frame,
     parse_configuration,
     parse_serial_number,
     serial_number_frame,
 )
-from instruments.protocols.stim300_frames import scan
-from instruments.protocols.stim300_layouts import AUXILIARY, LAYOUTS, PLAIN, PPS, SPECIALS, Content, crc32_mpeg2
+from instruments.protocols.stim300.frames import scan
+from instruments.protocols.stim300.layouts import AUXILIARY, LAYOUTS, PLAIN, PPS, SPECIALS, Content, crc32_mpeg2
 
 #: Made by hand from table 5-16: revision K, firmware 12, 2000/s with everything and CR LF, 921600 bit/s, even, 2 stop
 #: bits, all axes, average rate delayed, pulse per second, 5 g. The CRC is that of the definition.
@@ -42,7 +44,7 @@ def test_a_configuration_by_hand() -> None:
 
 @pytest.mark.parametrize("rate_hz", [125, 250, 500, 1000, 2000, None])
 @pytest.mark.parametrize("unit", ["rate", "incremental", "average", "integrated"])
-def test_what_is_written_is_read(rate_hz: int | None, unit: str) -> None:
+def test_what_is_written_is_read(rate_hz: int | None, unit: Any) -> None:
     for datagram, (temperature, pps) in {0x90: (False, False), 0x94: (True, False), 0xF4: (True, True)}.items():
         given = Configuration(
             "-",
@@ -57,7 +59,7 @@ def test_what_is_written_is_read(rate_hz: int | None, unit: str) -> None:
             unit,
             False,
             pps,
-            30,  # type: ignore[arg-type]
+            30,
         )
         assert parse_configuration(configuration_frame(given)) == given
         assert given.datagrams[0] == datagram

@@ -14,8 +14,8 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.drivers.stim300 import Stim300
 from instruments.errors import LinkError
-from instruments.protocols.stim300_frames import LAYOUTS
-from instruments.protocols.stim300_settings import Stim300Settings
+from instruments.protocols.stim300.frames import LAYOUTS
+from instruments.protocols.stim300.settings import Stim300Settings
 from instruments.transport.factory import Ports
 from instruments.transport.serial import Line
 from instruments.transport.stream_reader import KEPT_BYTES, PolledReader, ThreadedReader
@@ -156,8 +156,9 @@ class Endless:
 
 
 def test_what_is_never_taken_does_not_grow_without_end() -> None:
-    reader = ThreadedReader(Endless(8), VirtualClock())  # type: ignore[arg-type]
-    eventually(lambda: reader._port.in_waiting == 0)
+    port: Any = Endless(8)
+    reader = ThreadedReader(port, VirtualClock())
+    eventually(lambda: port.in_waiting == 0)
     assert len(reader.take().data) == KEPT_BYTES
     reader.close()
 

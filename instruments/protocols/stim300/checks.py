@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from instruments.protocols.stim300_datagrams import RATE_UNITS, SERIAL_PATTERN, Configuration
-from instruments.protocols.stim300_settings import Stim300Settings
+from instruments.protocols.stim300.datagrams import RATE_UNITS, SERIAL_PATTERN, Configuration
+from instruments.protocols.stim300.settings import Stim300Settings
 
 UNIT_NAMES = {
     "rate": "ANGULAR RATE",

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from instruments.protocols.stim300_layouts import (
+from instruments.protocols.stim300.layouts import (
     AUXILIARY,
     CONFIGURATION,
     PLAIN,

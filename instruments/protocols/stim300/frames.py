@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.protocols.stim300_layouts import LAYOUTS, SPECIALS, Bytes, Layout, crc32_mpeg2
-from instruments.protocols.stim300_settings import DatagramOptions, Stim300Settings
+from instruments.protocols.stim300.layouts import LAYOUTS, SPECIALS, Bytes, Layout, crc32_mpeg2
+from instruments.protocols.stim300.settings import DatagramOptions, Stim300Settings
 
 __all__ = [
     "LAYOUTS", "Bytes", "DatagramOptions", "Layout", "Scan", "Stim300Settings", "crc32_mpeg2", "int16", "int24",
