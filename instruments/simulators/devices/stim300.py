@@ -158,7 +158,8 @@ class SimulatedStim300:
     def _with_replies(self, index: NDArray[np.int64], frames: Bytes) -> bytes:
         """Return the frames, (n, stride) or some fewer of them, with each reply in place of one."""
         index = index[len(index) - len(frames) :]
-        parts = [self._replies.get(int(number), frame.tobytes()) for number, frame in zip(index, frames, strict=True)]
+        both = zip(index.tolist(), frames, strict=True)
+        parts = [self._replies[number] if number in self._replies else frame.tobytes() for number, frame in both]
         self._replies = {number: reply for number, reply in self._replies.items() if number > self._sent}
         return b"".join(parts)
 

@@ -58,10 +58,8 @@ def unit() -> Iterator[Unit]:
 
 
 def driver_of(unit: Unit, clock: VirtualClock, **options: Any) -> Stim300:
-    options = {"ask": False, **options}
-    settings = Stim300Settings(
-        name="mems", driver="stim300", port=unit.path, serial="S-1", max_rate_dps=400.0, options=options
-    )
+    given = {"name": "mems", "driver": "stim300", "port": unit.path, "serial": "S-1", "max_rate_dps": 400.0}
+    settings = Stim300Settings.model_validate(given | {"options": {"ask": False, **options}})
     return Stim300(settings, Ports(clock), clock)
 
 
