@@ -7,8 +7,7 @@ one makes its bytes when it is read: no thread does that, and a seed gives the s
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from instruments.clock import Clock
 from instruments.transport.serial import BROKEN, SerialPort, StampingPort
@@ -22,8 +21,7 @@ KEPT_BYTES = 1 << 22
 JOIN_S = 2.0
 
 
-@dataclass(frozen=True)
-class Received:
+class Received(NamedTuple):
     """Bytes of a port, and when they came."""
 
     data: bytes
@@ -50,10 +48,10 @@ class StreamReader(Protocol):
 
 def empty(port: SerialPort) -> bytes:
     """Return all bytes that a port holds: one look shows no more than the driver's own buffer, often 4095."""
-    parts = []
+    data = b""
     while (waiting := port.in_waiting) and (part := port.read(waiting)):
-        parts.append(part)
-    return b"".join(parts)
+        data = data + part if data else part
+    return data
 
 
 class PolledReader:
@@ -66,6 +64,8 @@ class PolledReader:
     def take(self) -> Received:
         """Return everything that has come; raises an error of `BROKEN`."""
         data = empty(self._port)
+        if not data:
+            return Received(data, self._clock.now_s())
         newest_s = None if self._stamps is None else self._stamps.newest_s
         return Received(data, self._clock.now_s(), newest_s, None if newest_s is None else 0.0)
 
