@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.machine import describe, median_s
-from instruments.protocols.stim300_frames import LAYOUTS, int16, int24, scan
+from instruments.protocols.stim300.frames import LAYOUTS, int16, int24, scan
 
 N = 1_000_000
 

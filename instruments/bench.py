@@ -21,6 +21,9 @@ from instruments.interfaces.unit_handler import UnitHandler
 from instruments.simulation import Simulation, open_simulation, simulated_links, simulated_unit_handler
 from instruments.transport.factory import Ports
 
+#: How long the readings of a unit are counted in a check, s.
+LISTEN_S = 5.0
+
 
 @dataclass(frozen=True)
 class Bench:
@@ -88,14 +91,33 @@ def check(bench: BenchFile, clock: Clock) -> list[tuple[str, bool, str]]:
     try:
         for name, device in devices.items():
             try:
-                found = device.identify()
-                text = found if isinstance(found, str) else f"{found.model}, serial {found.serial}"
+                text = _gyro_text(device) if name in opened.gyros else device.identify()
                 results.append((name, True, text))
             except InstrumentError as error:
                 results.append((name, False, str(error)))
     finally:
         opened.close()
     return results
+
+
+def _gyro_text(gyro: Gyro) -> str:
+    """Return what a unit says of itself, and how its readings come."""
+    found = gyro.identify()
+    said = "".join(f", {name.replace('_', ' ')} {value}" for name, value in found.reported.items())
+    gyro.start()
+    gyro.read_latest()
+    readings = gyro.read(LISTEN_S)
+    gyro.stop()
+    text = f"{found.model}, serial {found.serial}"
+    if said:
+        text += f"; the unit says{said[1:]}"
+    if len(readings) < 2:
+        return f"{text}; {len(readings)} readings in {LISTEN_S:g} s"
+    rate_hz = (len(readings) - 1) / float(readings.t_s[-1] - readings.t_s[0])
+    off_ppm = 1e6 * (rate_hz / gyro.sample_rate_hz - 1.0)
+    text += f"; {rate_hz:.6g} readings/s ({off_ppm:+.0f} ppm), {readings.lost} lost, {readings.damaged} damaged"
+    invalid = int((~readings.valid).sum())
+    return f"{text}, {invalid} marked bad" if invalid else text
 
 
 def _unit_handler(bench: BenchFile, simulation: Simulation | None, clock: Clock) -> UnitHandler:

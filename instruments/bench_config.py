@@ -133,6 +133,8 @@ class BenchFile(Strict):
     #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
     #: here is not used.
     drivers: dict[str, DriverRelease] = Field(default_factory=dict)
+    #: gyro name -> what the unit and its USB adapter say of themselves, filled in when a campaign is prepared.
+    reported: dict[str, dict[str, str]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _every_unit_is_one(self) -> BenchFile:

@@ -23,9 +23,10 @@ from instruments.protocols.kvh_lines import (
     LineFormat,
     parse_line,
 )
+from instruments.transport.adapters import require_adapter
 from instruments.transport.factory import Ports
-from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime
-from instruments.transport.serial_stream import SerialStream
+from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
+from instruments.transport.serial_stream import SerialStream, line_of
 
 SILENCE_S = 2.0
 EMPTY_EVERY_S = 1.0
@@ -65,11 +66,12 @@ class KvhGyro:
         self.limits = GyroLimits(settings.max_rate_dps, settings.min_c, settings.max_c)
         self._clock = clock
         self._stream = SerialStream(
-            self.name, settings.port or "", ports, clock, baudrate=self._baudrate, timeout_s=SILENCE_S
-        )
+            self.name, settings.port or "", ports, clock, baudrate=self._baudrate, timeout_s=SILENCE_S,
+            line=line_of(options),
+        )  # fmt: skip
         self._unfinished = b""
         self._in_line = False
-        self._time: StreamTime | None = None
+        self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
         self._last_line_s = 0.0
 
     @property
@@ -79,7 +81,11 @@ class KvhGyro:
         return (rate, Channel("temperature_c", "deg C", C_PER_COUNT)) if self._model.has_temperature else (rate,)
 
     def identify(self) -> GyroIdentity:
-        """Get the unit's identity from the bench file, after one line was read; raises NoReply, LinkError."""
+        """Get the unit's identity from the bench file, after one line was read.
+
+        Raises WrongInstrument where the port is on another USB adapter than the bench file names, NoReply, LinkError.
+        """
+        adapter = require_adapter(self.name, self.settings.port, self.settings.options.adapter)
         was_open = self._stream.is_open
         self.start()
         self.read_latest()
@@ -87,17 +93,18 @@ class KvhGyro:
             self.stop()
         settings = self.settings
         return GyroIdentity(
-            settings.serial, settings.model or self._model.name, settings.technology or "fog", settings.datasheet
-        )
+            settings.serial, settings.model or self._model.name, settings.technology or "fog", settings.datasheet,
+            reported=adapter,
+        )  # fmt: skip
 
     def start(self) -> None:
         """Control the stream: open the port, ask for rates, and drop stale or partial lines; raises LinkError."""
         self._stream.open()
         if command := self._model.format.start_command:
             self._stream.write(command.encode() * START_REPEATS)
-        self._time = None
         self._discard()
         self._last_line_s = self._clock.now_s()
+        self._time = StreamTime(1.0 / self.sample_rate_hz, self._last_line_s)
 
     def read(self, duration_s: float) -> Readings:
         """Get every reading of the next `duration_s` seconds; fewer where lines are missing.
@@ -140,8 +147,7 @@ class KvhGyro:
     def _discard(self) -> None:
         self._stream.discard_input()
         self._unfinished, self._in_line = b"", False
-        if self._time is not None:
-            self._time.drop()
+        self._time.drop()
 
     def _no_line(self, silence_s: float) -> NoReply:
         return NoReply(
@@ -163,11 +169,11 @@ class KvhGyro:
         raw = {channel.name: codes[:, i] for i, channel in enumerate(self.channels)}
         if not good:
             return Readings(np.zeros(0), raw, np.zeros(0, dtype=bool), 0, damaged)
-        if self._time is None:
-            self._time = StreamTime(1.0 / self.sample_rate_hz, self._clock.now_s())
+        came = self._stream.last
         advance = np.ones(len(good), dtype=np.int64)
         advance[0] += damaged  # a damaged line has taken its sampling period too
-        times, lost = self._time.times(advance, self._clock.now_s())
+        times, lost = self._time.times(advance, came.now_s, newest_s=came.newest_s, width_s=came.width_s)
+        refuse_other_rate(self.name, self.settings.port, self._time.line)
         valid = np.asarray([line.flag and abs(line.rate) <= self._limit_counts for line in good])
         return Readings(times, raw, valid, lost, damaged)
 

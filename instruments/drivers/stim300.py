@@ -7,35 +7,49 @@ from numpy.typing import NDArray
 
 from instruments.clock import Clock
 from instruments.drivers.driver import GyroDriver
-from instruments.errors import NoReply
+from instruments.errors import NoReply, WrongInstrument
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
-from instruments.protocols.stim300_frames import (
+from instruments.protocols.stim300.checks import DEFAULT_RATE_HZ, differences, is_other_serial
+from instruments.protocols.stim300.datagrams import (
+    ASK_CONFIGURATION,
+    ASK_SERIAL_NUMBER,
+    Configuration,
+    parse_configuration,
+    parse_serial_number,
+)
+from instruments.protocols.stim300.frames import (
     AXES,
     BAD_STATUS,
     COUNTS_PER_S,
     RATE_PER_LSB,
     SATURATION_DPS,
     TEMPERATURE_PER_LSB,
-    Stim300Settings,
     int16,
     int24,
     layout_of,
     scan,
 )
+from instruments.protocols.stim300.settings import Stim300Settings
+from instruments.transport.adapters import require_adapter
 from instruments.transport.factory import Ports
-from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime
-from instruments.transport.serial_stream import SerialStream
+from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
+from instruments.transport.serial_stream import SerialStream, line_of
 
 SILENCE_S = 2.0
 #: Least size of a port's input buffer; the port is emptied when half of it can be full, and at least every second.
 PORT_BUFFER_BYTES = 4096
 EMPTY_EVERY_S = 1.0
 START_WITHIN_S = 1.5
-DEFAULT_RATE_HZ = 125.0
+#: A question that was not answered is put again after this, s.
+ASK_EVERY_S = 0.4
 
 
 class Stim300:
-    """Driver of a STIM300 in normal mode."""
+    """Driver of a STIM300 in normal mode.
+
+    After each start the unit is asked how it is set and who it is, before its first reading is passed on. What it says
+    of itself later, after a reset, is checked in the same way.
+    """
 
     def __init__(self, settings: Stim300Settings, ports: Ports, clock: Clock) -> None:
         self.name = settings.name
@@ -49,12 +63,15 @@ class Stim300:
         self._empty_every_s = min(EMPTY_EVERY_S, half_full_s)
         self._clock = clock
         self._stream = SerialStream(
-            self.name, settings.port or "", ports, clock, baudrate=self.options.baudrate, timeout_s=SILENCE_S
-        )
+            self.name, settings.port or "", ports, clock, baudrate=self.options.baudrate, timeout_s=SILENCE_S,
+            line=line_of(self.options),
+        )  # fmt: skip
         self._unfinished = b""
         self._counter: int | None = None
-        self._time: StreamTime | None = None
+        self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
         self._last_frame_s = 0.0
+        self._set: Configuration | None = None  # as the unit says
+        self._serial: str | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -64,23 +81,29 @@ class Stim300:
         return (*rates, *(warm if self.layout.temperature is not None else ()), Channel("status", "", 1.0))
 
     def identify(self) -> GyroIdentity:
-        """Get the unit's identity from the bench file, after one intact datagram; raises NoReply, LinkError."""
+        """Get the unit's identity: the name of the bench file, and what the unit and its adapter say.
+
+        Raises WrongInstrument for a unit that is another one or set otherwise, NoReply, LinkError.
+        """
+        settings = self.settings
+        adapter = require_adapter(self.name, settings.port, self.options.adapter)
         was_open = self._stream.is_open
         self.start()
         self.read_latest()
         if not was_open:
             self.stop()
-        settings = self.settings
         return GyroIdentity(
-            settings.serial, settings.model or "Sensonor STIM300", settings.technology or "mems", settings.datasheet
-        )
+            settings.serial, settings.model or "Sensonor STIM300", settings.technology or "mems", settings.datasheet,
+            reported=self._reported() | adapter,
+        )  # fmt: skip
 
     def start(self) -> None:
         """Control the stream: open the port and drop stale bytes; raises LinkError."""
         self._stream.open()
-        self._time = None
+        self._set = self._serial = None
         self._discard()
         self._last_frame_s = self._clock.now_s()
+        self._time = StreamTime(1.0 / self.sample_rate_hz, self._last_frame_s)
 
     def read(self, duration_s: float) -> Readings:
         """Get every reading of the next `duration_s` seconds; fewer where the stream has gaps.
@@ -96,16 +119,25 @@ class Stim300:
         return readings
 
     def read_latest(self) -> Readings:
-        """Get one fresh reading and drop everything older; raises NoReply after START_WITHIN_S, LinkError."""
+        """Get one fresh reading and drop everything older; the first time, ask the unit how it is set.
+
+        Raises NoReply after START_WITHIN_S, WrongInstrument, LinkError.
+        """
         self._discard()
-        deadline_s = self._clock.now_s() + START_WITHIN_S
-        while self._clock.now_s() < deadline_s:
+        newest, began_s = None, self._clock.now_s()
+        ask_s = began_s
+        while (now_s := self._clock.now_s()) < began_s + START_WITHIN_S:
+            if self._is_unknown and now_s >= ask_s:
+                self._stream.write(ASK_CONFIGURATION + ASK_SERIAL_NUMBER)
+                ask_s = now_s + ASK_EVERY_S
             self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
             data = self._stream.read_available()
             if data and len(readings := self._decode(data)):
                 self._last_frame_s = self._clock.now_s()
-                return readings.newest()
-        raise self._no_datagram(f"within {START_WITHIN_S:g} s")
+                newest = readings.newest()
+            if newest is not None and not self._is_unknown:
+                return newest
+        raise self._no_datagram(f"within {START_WITHIN_S:g} s") if newest is None else self._no_answer()
 
     def stop(self) -> None:
         """Control the stream: close the port; safe to call twice."""
@@ -114,8 +146,7 @@ class Stim300:
     def _discard(self) -> None:
         self._stream.discard_input()
         self._unfinished, self._counter = b"", None
-        if self._time is not None:
-            self._time.drop()
+        self._time.drop()
 
     def _no_datagram(self, when: str) -> NoReply:
         return NoReply(
@@ -124,14 +155,57 @@ class Stim300:
             f"bit rate {self.options.baudrate} and datagram 0x{self.options.datagram:02X}",
         )
 
+    def _no_answer(self) -> NoReply:
+        return NoReply(
+            self.name,
+            f"sends datagrams on {self.settings.port} but does not answer the commands C and I within "
+            f"{START_WITHIN_S:g} s; check the wire to the unit's receiver, or set options.ask = false where there is "
+            "none",
+        )
+
+    @property
+    def _is_unknown(self) -> bool:
+        """Whether the unit has yet to say how it is set and who it is."""
+        return self.options.ask and (self._set is None or self._serial is None)
+
+    def _hear(self, special: bytes) -> None:
+        """Take in what the unit says of itself; raises WrongInstrument where its bench file says otherwise."""
+        if (found := parse_configuration(special)) is not None:
+            if said := differences(found, self.settings):
+                raise WrongInstrument(
+                    self.name,
+                    f"the unit on {self.settings.port} is set otherwise than needed: {'; '.join(said)}; set the unit "
+                    "in its service mode (commands u, m, d) or correct the bench file",
+                )
+            self._set = found
+        elif (serial := parse_serial_number(special)) is not None:
+            if is_other_serial(serial, self.settings.serial):
+                raise WrongInstrument(
+                    self.name,
+                    f"the unit on {self.settings.port} has serial number {serial}, bench file {self.settings.serial}; "
+                    "connect the right unit or correct port or serial",
+                )
+            self._serial = serial
+
+    def _reported(self) -> dict[str, str]:
+        """Return what the unit has said of itself."""
+        reported = {} if self._serial is None else {"serial": self._serial}
+        if self._set is not None:
+            unit = f"{self._set.unit}, delayed" if self._set.is_delayed else self._set.unit
+            reported |= {"firmware": str(self._set.firmware), "revision": self._set.revision, "output_unit": unit}
+        return reported
+
     def _decode(self, data: bytes) -> Readings:
         found = scan(self._unfinished + data, self.layout)
         self._unfinished = found.rest
+        for special in found.specials:
+            self._hear(special)
         frames, layout = found.frames, self.layout
         if len(frames) == 0:
             return Readings(
-                np.zeros(0), {c.name: np.zeros(0, dtype=np.int64) for c in self.channels}, np.zeros(0, bool)
-            )
+                np.zeros(0), {c.name: np.zeros(0, dtype=np.int64) for c in self.channels}, np.zeros(0, bool), 0,
+                found.damaged,
+            )  # fmt: skip
         rates = int24(frames, 1).astype(np.int64)
         status = frames[:, layout.status].astype(np.int64)
         valid = (status & BAD_STATUS) == 0
@@ -153,9 +227,9 @@ class Stim300:
         advance = (np.diff(counter, prepend=before) % 256) // step
         advance[advance == 0] = wrap
         self._counter = int(counter[-1])
-        if self._time is None:
-            self._time = StreamTime(1.0 / self.sample_rate_hz, self._clock.now_s())
-        times, uncounted = self._time.times(advance, self._clock.now_s(), wrap)
+        came = self._stream.last
+        times, uncounted = self._time.times(advance, came.now_s, wrap, newest_s=came.newest_s, width_s=came.width_s)
+        refuse_other_rate(self.name, self.settings.port, self._time.line)
         return times, int(advance.sum() - len(advance)) + uncounted
 
 

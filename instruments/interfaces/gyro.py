@@ -60,6 +60,8 @@ class GyroIdentity:
     technology: str = ""  #: "fog", "mems", "piezo" or "" for unknown
     datasheet: Mapping[str, float] = field(default_factory=dict)
     output: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)  #: axis -> unit, offset, scale
+    #: What the device and its adapter say of themselves: serial, firmware, adapter ...; empty where they say nothing.
+    reported: Mapping[str, str] = field(default_factory=dict)
 
 
 class Gyro(Protocol):

@@ -8,7 +8,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from instruments.bench_config import GyroSettings, Strict
+from instruments.bench_config import GyroSettings
+from instruments.protocols.serial_options import SerialOptions
 
 #: Raw rates are whole microdegrees per second, raw temperatures whole millidegrees Celsius: the digits of the line.
 DPS_PER_COUNT = 1e-6
@@ -44,7 +45,7 @@ DSP3000 = LineFormat(r"\s*(?P<rate>-?\d+\.\d{6})\s+(?P<flag>[01])", 38_400, 100.
 RD2100 = LineFormat(r"\s*(?P<rate>-?\d+\.\d+)(?:\s+(?P<temperature>-?\d+\.\d+))?\s*", 9_600, 10.0, 1, 150.0)
 
 
-class LineOptions(Strict):
+class LineOptions(SerialOptions):
     """Deviations of a unit from the line format of its model, from the manual of the unit."""
 
     pattern: str | None = None

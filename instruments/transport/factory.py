@@ -15,7 +15,9 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from instruments.bench_config import is_simulated_address
 from instruments.clock import Clock
 from instruments.errors import LinkError
-from instruments.transport.serial import BROKEN, SerialPort
+from instruments.transport.port_failures import remedy
+from instruments.transport.serial import BROKEN, EIGHT_N_1, PARITIES, Line, SerialPort
+from instruments.transport.stream_reader import PolledReader, StreamReader, ThreadedReader
 
 NOT_OPENED: tuple[type[Exception], ...] = (*BROKEN, ValueError)
 
@@ -23,8 +25,8 @@ NOT_OPENED: tuple[type[Exception], ...] = (*BROKEN, ValueError)
 class LinkFactory(Protocol):
     """Makes ports and Modbus clients of one kind, hardware or simulated. Time-outs are seconds of the bench clock."""
 
-    def serial_port(self, url: str, *, baudrate: int, timeout_s: float) -> SerialPort:
-        """Return an open port with 8 data bits, no parity, one stop bit; raises what pyserial raises."""
+    def serial_port(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
+        """Return an open port with 8 data bits; raises what pyserial raises."""
         ...
 
     def port_timeout_s(self, timeout_s: float) -> float:
@@ -46,10 +48,19 @@ class HardwareLinks:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
 
-    def serial_port(self, url: str, *, baudrate: int, timeout_s: float) -> SerialPort:
+    def serial_port(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
         """Return an open port, locked for this process; raises what pyserial raises."""
         wall_s = self._clock.wall_s(timeout_s)
-        return serial.serial_for_url(url, baudrate=baudrate, timeout=wall_s, write_timeout=wall_s, exclusive=True)
+        port = serial.serial_for_url(
+            url, do_not_open=True, baudrate=baudrate, parity=PARITIES[line.parity], stopbits=line.stop_bits,
+            timeout=wall_s, write_timeout=wall_s, exclusive=True,
+        )  # fmt: skip
+        if line.dtr is not None:
+            port.dtr = line.dtr
+        if line.rts is not None:
+            port.rts = line.rts
+        port.open()
+        return port
 
     def port_timeout_s(self, timeout_s: float) -> float:
         """Return the seconds of real time of a time-out in seconds of the bench clock."""
@@ -69,20 +80,23 @@ class Ports:
     """Opens the links of one bench; `simulated` makes the links of `sim://` addresses, where the bench has any."""
 
     def __init__(self, clock: Clock, simulated: LinkFactory | None = None) -> None:
+        self._clock = clock
         self._hardware = HardwareLinks(clock)
         self._simulated = simulated
 
-    def serial(self, url: str, *, device: str, baudrate: int, timeout_s: float) -> SerialPort:
-        """Open a serial port, 8 data bits, no parity, one stop bit, locked for this process.
+    def serial(self, url: str, *, device: str, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
+        """Open a serial port, 8 data bits, locked for this process.
 
         Raises LinkError with port and remedy, also while another process has the port open.
         """
         try:
-            return self._links(url, device).serial_port(url, baudrate=baudrate, timeout_s=timeout_s)
+            return self._links(url, device).serial_port(url, baudrate=baudrate, timeout_s=timeout_s, line=line)
         except NOT_OPENED as error:
-            raise LinkError(
-                device, f"port {url} cannot be opened ({error}); check the cable, the port's name and who else uses it"
-            ) from error
+            raise LinkError(device, f"port {url} cannot be opened ({error}); check {remedy(url, error)}") from error
+
+    def stream_reader(self, url: str, port: SerialPort) -> StreamReader:
+        """Return what empties an open port: a thread for a real one, which does not wait for its reader."""
+        return PolledReader(port, self._clock) if is_simulated_address(url) else ThreadedReader(port, self._clock)
 
     def port_timeout_s(self, url: str, timeout_s: float, *, device: str) -> float:
         """Return the `timeout` of an open port that stands for `timeout_s` seconds of the bench clock."""

@@ -5,26 +5,41 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.errors import WrongInstrument
+from instruments.transport.stream_period import TOLERANCE, UNKNOWN, PeriodLine
+
 #: Share of the distance to the clock that each read makes up: small, so that the times do not take on wire jitter.
 FOLLOW = 0.02
 #: A stream further behind than this many periods has lost readings that its counter does not show.
 LOST_PERIODS = 12.0
 #: Polling interval for one fresh reading, in periods: a short one keeps the reading's age below a fraction of a period.
 FRESH_PERIODS = 0.125
+#: So many readings after the start tell the period roughly, by the time that they took.
+ENOUGH = 20
 #: After readings were dropped the known phase is kept, unless the next reading is off by more than this many periods.
 SAME_PHASE = 0.25
 
 
 class StreamTime:
-    """Times of a stream of evenly spaced readings, strictly rising."""
+    """Times of a stream of evenly spaced readings, strictly rising.
+
+    `period_s` is the nominal period, s; the device's own is estimated from the arrivals of its readings. `now_s` is
+    when the port was emptied before the first of them.
+    """
 
     def __init__(self, period_s: float, now_s: float) -> None:
-        self._period_s = period_s
+        self._line = PeriodLine(period_s)
         self._anchor_s = now_s
         self._index = -1
         self._started = False
         self._dropped = False
         self._last_s = -np.inf
+        self._last_now_s = now_s
+
+    @property
+    def line(self) -> PeriodLine:
+        """What is known of the period."""
+        return self._line
 
     def drop(self) -> None:
         """Expect any number of missing readings before the next ones, which must be passed on as soon as they come.
@@ -34,39 +49,93 @@ class StreamTime:
         """
         self._dropped = True
 
-    def times(self, advance: NDArray[np.int64], now_s: float, wrap: int = 0) -> tuple[NDArray[np.float64], int]:
+    def times(
+        self,
+        advance: NDArray[np.int64],
+        now_s: float,
+        wrap: int = 0,
+        *,
+        newest_s: float | None = None,
+        width_s: float | None = None,
+    ) -> tuple[NDArray[np.float64], int]:
         """Return the clock times (n,) of readings that follow each other by `advance` (n,) periods, and the losses.
 
-        The newest cannot be later than now. `wrap` is how many lost readings leave a device's counter as it was; where
-        the stream falls behind the Clock by whole wraps, they are counted as lost (0: any number of readings).
+        The newest cannot be later than now; where it is known better, it arrived within the `width_s` seconds before
+        `newest_s`. `wrap` is how many lost readings leave a device's counter as it was; where the stream falls behind
+        the Clock by whole wraps, they are counted as lost (0: any number of readings).
         """
         index = self._index + np.cumsum(advance)
         if self._dropped and self._started:
             index += self._resumed(now_s) - index[-1]
         self._dropped = False
-        newest = int(index[-1])
-        if not self._started:
-            self._anchor_s, self._started = now_s - newest * self._period_s, True
-        behind_s = now_s - (self._anchor_s + newest * self._period_s)
-        lost = 0
-        if behind_s > LOST_PERIODS * self._period_s:
-            unit = wrap or 1
-            lost = unit * round(behind_s / self._period_s / unit)
-            index = index + lost
-            behind_s -= lost * self._period_s
-        self._anchor_s += behind_s if behind_s < 0 else FOLLOW * max(behind_s - self._period_s, 0.0)
-        times = self._anchor_s + index * self._period_s
-        if times[0] - self._last_s < 0.5 * self._period_s:
+        if self._started:
+            lost = self._lost(int(index[-1]), now_s, wrap)
+        else:
+            lost = 0
+            self._begin(int(index[-1]), now_s)
+        index = index + lost
+        period_s = self._period_with(int(index[-1]), now_s if newest_s is None else newest_s, width_s)
+        if newest_s is not None and self._line.is_followed:
+            now_s = newest_s
+        behind_s = now_s - (self._anchor_s + int(index[-1]) * period_s)
+        self._anchor_s += behind_s if behind_s < 0 else FOLLOW * max(behind_s - period_s, 0.0)
+        times = self._anchor_s + index * period_s
+        if times[0] - self._last_s < 0.5 * period_s:
             # The device is ahead of the Clock and was just held back: its readings share the time since the last one.
             share = (index - self._index) / (index[-1] - self._index)
             times = self._last_s + share * (max(float(times[-1]), now_s) - self._last_s)
-        self._index, self._last_s = int(index[-1]), float(times[-1])
+        self._index, self._last_s, self._last_now_s = int(index[-1]), float(times[-1]), now_s
         return np.asarray(times, dtype=np.float64), lost
+
+    def _begin(self, newest: int, now_s: float) -> None:
+        """Anchor the times at the newest of the first readings."""
+        period_s, took_s = self._line.period_s, now_s - self._last_now_s
+        if newest >= ENOUGH and UNKNOWN < took_s / (newest * period_s) < 1 / UNKNOWN:
+            # the reading before the first came within a period of the emptying of the port
+            self._line.add(-1, self._last_now_s + period_s, 2 * period_s)
+        self._anchor_s, self._index, self._started = now_s - newest * period_s, newest, True
+
+    def _lost(self, newest: int, now_s: float, wrap: int) -> int:
+        """Return how many readings are missing that no counter shows: the stream is too far behind the Clock."""
+        period_s = self._line.period_s
+        behind = (now_s - self._anchor_s) / period_s - newest
+        # while the period is hardly known, a slow device falls behind without any loss
+        slow = self._line.u_share * (now_s - self._last_now_s) / period_s
+        if behind <= LOST_PERIODS + slow:
+            return 0
+        unit = wrap or 1
+        lost = unit * round(behind / unit)
+        if lost:
+            self._line.restart()
+        return lost
+
+    def _period_with(self, newest: int, t_s: float, width_s: float | None) -> float:
+        """Return the period after one more arrival; the line of the times turns about the last reading."""
+        before_s = self._line.period_s
+        self._line.add(newest, t_s, before_s if width_s is None else width_s)
+        period_s = self._line.period_s
+        if period_s != before_s:
+            self._anchor_s += self._index * (before_s - period_s)
+        return period_s
 
     def _resumed(self, now_s: float) -> int:
         """Return the index of a reading that has just come."""
-        newest = max(round((now_s - self._anchor_s) / self._period_s), self._index + 1)
-        behind_s = now_s - (self._anchor_s + newest * self._period_s)
-        if abs(behind_s) > SAME_PHASE * self._period_s:
+        period_s = self._line.period_s
+        newest = max(round((now_s - self._anchor_s) / period_s), self._index + 1)
+        behind_s = now_s - (self._anchor_s + newest * period_s)
+        off_phase = abs(behind_s) > SAME_PHASE * period_s
+        if off_phase:
             self._anchor_s += behind_s
+        if off_phase or (newest - self._index) * self._line.u_share > SAME_PHASE:
+            self._line.restart()  # the number of this reading is not known
         return newest
+
+
+def refuse_other_rate(device: str, port: str | None, line: PeriodLine) -> None:
+    """Raise WrongInstrument for a stream that is faster or slower than its bench file says, beyond the tolerance."""
+    if line.is_outside_tolerance and (period_s := line.measured_s):
+        raise WrongInstrument(
+            device,
+            f"sends {1 / period_s:.4g} readings/s on {port}, and the bench file says {1 / line.nominal_s:.4g}, limit "
+            f"+-{100 * TOLERANCE:g} %; set sample_rate_hz = {1 / period_s:.4g} or configure the unit",
+        )

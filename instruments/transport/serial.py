@@ -3,9 +3,27 @@
 from __future__ import annotations
 
 import importlib
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Literal, Protocol, runtime_checkable
 
 import serial
+
+#: Names of pyserial's parities.
+PARITIES: dict[str, str] = {"none": serial.PARITY_NONE, "odd": serial.PARITY_ODD, "even": serial.PARITY_EVEN}
+
+
+@dataclass(frozen=True)
+class Line:
+    """Electrical settings of a port beyond its bit rate, with 8 data bits. None: as the system leaves it."""
+
+    parity: Literal["none", "odd", "even"] = "none"
+    stop_bits: Literal[1, 2] = 1
+    dtr: bool | None = None
+    rts: bool | None = None
+
+
+#: 8 data bits, no parity, one stop bit.
+EIGHT_N_1 = Line()
 
 
 class SerialPort(Protocol):
@@ -38,6 +56,16 @@ class SerialPort(Protocol):
 
     def close(self) -> None:
         """Close the port; safe to call twice."""
+        ...
+
+
+@runtime_checkable
+class StampingPort(Protocol):
+    """A port that knows when its newest byte came."""
+
+    @property
+    def newest_s(self) -> float | None:
+        """Clock time of the newest byte that was received; None where it is not known."""
         ...
 
 

@@ -6,21 +6,43 @@ from typing import NoReturn
 
 from instruments.clock import Clock, sleep_until
 from instruments.errors import LinkError
+from instruments.protocols.serial_options import SerialOptions
 from instruments.transport.factory import Ports
-from instruments.transport.serial import BROKEN, SerialPort
+from instruments.transport.serial import BROKEN, EIGHT_N_1, Line, SerialPort
+from instruments.transport.stream_reader import Received, StreamReader
 
 #: Clock seconds that count as no time: rounding of sums of durations.
 TINY_S = 1e-9
 
 
-class SerialStream:
-    """One serial port, opened by `open` and read as bytes on the bench clock. Every failure is a LinkError."""
+def line_of(options: SerialOptions) -> Line:
+    """Return the electrical settings that a bench file gives."""
+    return Line(options.parity, options.stop_bits, options.dtr, options.rts)
 
-    def __init__(self, device: str, url: str, ports: Ports, clock: Clock, *, baudrate: int, timeout_s: float) -> None:
+
+class SerialStream:
+    """One serial port, opened by `open` and read as bytes on the bench clock. Every failure is a LinkError.
+
+    A real port is read all the time by a thread of its own; nothing is lost while the caller does something else.
+    """
+
+    def __init__(
+        self,
+        device: str,
+        url: str,
+        ports: Ports,
+        clock: Clock,
+        *,
+        baudrate: int,
+        timeout_s: float,
+        line: Line = EIGHT_N_1,
+    ) -> None:
         self._device, self._url = device, url
         self._ports, self._clock = ports, clock
-        self._baudrate, self._timeout_s = baudrate, timeout_s
+        self._baudrate, self._timeout_s, self._line = baudrate, timeout_s, line
         self._port: SerialPort | None = None
+        self._reader: StreamReader | None = None
+        self.last = Received(b"", clock.now_s())  #: what was read last: its time is that of the bytes returned last
 
     @property
     def is_open(self) -> bool:
@@ -31,37 +53,43 @@ class SerialStream:
         """Open the port unless it is open; raises LinkError."""
         if self._port is None:
             self._port = self._ports.serial(
-                self._url, device=self._device, baudrate=self._baudrate, timeout_s=self._timeout_s
+                self._url, device=self._device, baudrate=self._baudrate, timeout_s=self._timeout_s, line=self._line
             )
+            self._reader = self._ports.stream_reader(self._url, self._port)
 
     def close(self) -> None:
         """Close the port; safe to call twice."""
+        if self._reader is not None:
+            self._reader.close()
+            self._reader = None
         if self._port is not None:
             self._port.close()
             self._port = None
 
     def write(self, data: bytes) -> None:
         """Send bytes; raises LinkError."""
+        self._reading()
+        assert self._port is not None
         try:
-            self._opened().write(data)
+            self._port.write(data)
         except BROKEN as error:
             self._fail(error)
 
     def discard_input(self) -> None:
         """Drop every byte that was not read yet; raises LinkError."""
         try:
-            self._opened().reset_input_buffer()
+            self._reading().discard()
         except BROKEN as error:
             self._fail(error)
 
     def read_available(self) -> bytes:
         """Return the bytes that have arrived, without waiting; raises LinkError."""
-        port = self._opened()
+        reader = self._reading()
         try:
-            waiting = port.in_waiting
-            return bytes(port.read(waiting)) if waiting else b""
+            self.last = reader.take()
         except BROKEN as error:
             self._fail(error)
+        return self.last.data
 
     def read_for(self, duration_s: float, every_s: float) -> bytes:
         """Return the bytes of the next `duration_s` clock seconds; the port is emptied every `every_s` seconds.
@@ -76,10 +104,10 @@ class SerialStream:
             if self._clock.now_s() >= end_s - TINY_S:
                 return data
 
-    def _opened(self) -> SerialPort:
-        if self._port is None:
+    def _reading(self) -> StreamReader:
+        if self._reader is None:
             raise LinkError(self._device, f"the stream on {self._url} was not started; start it first")
-        return self._port
+        return self._reader
 
     def _fail(self, error: Exception) -> NoReturn:
         self.close()

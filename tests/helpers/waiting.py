@@ -9,6 +9,7 @@ from typing import Any
 
 WAIT_S = 60.0  #: for the next event
 QUIET_S = 0.2  #: without an event: time to check
+LOOK_S = 0.002  #: between two looks at what reports nothing
 
 
 def wait_until(
@@ -33,3 +34,13 @@ def wait_until(
         raise AssertionError
     finally:
         stop()
+
+
+def eventually(holds: Callable[[], Any]) -> None:
+    """Return once a condition on another thread, which reports nothing, holds; AssertionError after WAIT_S."""
+    never = threading.Event()
+    for _ in range(round(WAIT_S / LOOK_S)):
+        if holds():
+            return
+        never.wait(LOOK_S)
+    raise AssertionError(f"not in {WAIT_S:g} s")

@@ -15,7 +15,7 @@ from instruments.drivers.stim300 import Stim300
 from instruments.errors import LinkError
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
 from instruments.protocols.kvh_lines import KvhSettings
-from instruments.protocols.stim300_frames import Stim300Settings
+from instruments.protocols.stim300.frames import Stim300Settings
 from instruments.transport.factory import Ports
 
 

@@ -48,6 +48,11 @@ class _SimulatedLines(ABC):
             lines = lines[gap.value :]
         return "".join(line + "\r\n" for line in lines).encode("ascii")
 
+    @property
+    def newest_s(self) -> float:
+        """When the newest line was complete, s."""
+        return self._sent / self._rate_hz
+
     def skip(self, t_s: float) -> None:
         """Lose the lines up to `t_s`."""
         self._sent = max(self._sent, int(np.floor(t_s * self._rate_hz + 1e-9)))

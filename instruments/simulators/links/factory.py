@@ -16,8 +16,9 @@ class SimulatedLinks:
     def __init__(self, device: Callable[[str], SimulatedDevice], clock: Clock) -> None:
         self._device, self._clock = device, clock
 
-    def serial_port(self, url: str, *, baudrate: int, timeout_s: float) -> SimulatedSerialPort:
-        """Return an open port; raises LinkError for an unknown address."""
+    def serial_port(self, url: str, *, baudrate: int, timeout_s: float, line: object = None) -> SimulatedSerialPort:
+        """Return an open port, whatever its line settings; raises LinkError for an unknown address."""
+        del line
         return SimulatedSerialPort(self._device(url), self._clock, baudrate=baudrate, timeout=timeout_s)
 
     def port_timeout_s(self, timeout_s: float) -> float:

@@ -136,6 +136,11 @@ class FaultyWire:
             return min(ends) if ends and np.isfinite(min(ends)) else None
         return self._device.next_byte_s(t_s)
 
+    @property
+    def newest_s(self) -> float | None:
+        """When the newest byte was sent, s; None where the instrument does not tell, or a fault may hide it."""
+        return None if self.faults.armed or self._held else getattr(self._device, "newest_s", None)
+
     def _check_link(self, t_s: float) -> None:
         if self.faults.trigger(["dropped_link"], t_s) is not None:
             raise serial.SerialException("device disconnected")

@@ -60,6 +60,12 @@ class SimulatedSerialPort(serial.SerialBase):
         self._receive()
         return len(self._unread)
 
+    @property
+    def newest_s(self) -> float | None:
+        """Clock time at which the newest byte was sent; None where the instrument does not tell."""
+        found = getattr(self._device, "newest_s", None)
+        return None if found is None else float(found)
+
     def read(self, size: int = 1) -> bytes:
         """Read `size` bytes, or as many as come before the time-out."""
         self._receive()

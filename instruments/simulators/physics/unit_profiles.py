@@ -35,6 +35,7 @@ class UnitTruth:
     deep_tau_s: float = 420.0
     supply_v: float = 5.0
     warm_up: Callable[[Array], Array] | None = field(default=None)  #: (seconds since power-on (n,)) -> (n,) deg/s
+    sample_clock_ppm: float = 0.0  #: by how much more readings come than the bench file says
 
     def k(self, temperature_c: float) -> Array:
         """Return K at a temperature, (axes, 3): K[output, input]."""
@@ -138,6 +139,7 @@ def usual_rate_hz(driver: str) -> float:
 def make_unit(driver: str, axes: tuple[str, ...], settings: Mapping[str, object], seed: list[int]) -> UnitTruth:
     """Return one unit of a profile with the deviations of the bench file; raises ValueError for unknown names."""
     given = dict(settings)
+    given.pop("device", None)  # how its electronics are set is read by the simulated instrument
     profile = given.pop("profile", DEFAULT_PROFILES.get(driver))
     if profile is None:
         raise ValueError(

@@ -155,7 +155,8 @@ class SimulatedGyro:
         self.world = world
         self.settings = settings
         self.truth = truth
-        self.sample_rate_hz = settings.sample_rate_hz or usual_rate_hz(settings.driver)
+        nominal_hz = settings.sample_rate_hz or usual_rate_hz(settings.driver)
+        self.sample_rate_hz = nominal_hz * (1.0 + 1e-6 * truth.sample_clock_ppm)  #: as its own clock makes it
         seed = [world.settings.seed, zlib.crc32(settings.name.encode()), zlib.crc32(settings.serial.encode())]
         self._rng = np.random.default_rng([*seed, world.settings.noise_seed])
         # one generator for both noises: instability draws first here, white noise first in every sample

@@ -117,7 +117,7 @@ FAILURES: tuple[Failure, ...] = (
         f"Check its power and cable with `labctl bench check`, {RESUME}.",
     ),
     Failure(
-        r"check address and driver|not a C4|, serial ",
+        r"check address and driver|not a C4|, serial |is set otherwise|readings/s on |has serial number|on USB adapter",
         "Another instrument answered than the one in the bench file.",
         f"Compare the bench file with the bench, {RESUME}.",
     ),

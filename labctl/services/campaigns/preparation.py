@@ -9,7 +9,7 @@ from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
-from instruments.interfaces.gyro import Gyro
+from instruments.interfaces.gyro import Gyro, GyroIdentity
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
 from labctl.json_types.recordings import RawChannelJson
@@ -136,7 +136,10 @@ def prepare(
         if bench.table.is_moving():  # the process that drove it was killed, and a move continues
             _rest(bench, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
-        units = tuple(_unit(gyro, bench_file, clock) for gyro in bench.gyros.values())
+        identities = {name: gyro.identify() for name, gyro in bench.gyros.items()}
+        said = {name: dict(found.reported) for name, found in identities.items() if found.reported}
+        bench_file = bench_file.model_copy(update={"reported": said})
+        units = tuple(_unit(gyro, identities[name], bench_file, clock) for name, gyro in bench.gyros.items())
         new = NewCampaign(
             recipe_name=recipe.name,
             recipe=plan.recipe.model_dump(mode="json"),
@@ -166,8 +169,7 @@ def _rest(bench: Bench, clock: Clock) -> None:
         raise InstrumentError(bench.table.name, complaint)
 
 
-def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
-    identity = gyro.identify()
+def _unit(gyro: Gyro, identity: GyroIdentity, bench: BenchFile, clock: Clock) -> NewUnit:
     latitude = bench.latitude_deg
     info = RecordingInfo.model_validate(
         {

@@ -97,6 +97,8 @@ class Campaigns:
             }
             if drivers := new.bench.get("drivers"):
                 what["drivers"] = drivers
+            if reported := new.bench.get("reported"):
+                what["reported"] = reported
             simulation = new.bench.get("simulation")
             if isinstance(simulation, Mapping) and (hidden := simulation.get("hidden")):
                 what["hidden"] = hidden

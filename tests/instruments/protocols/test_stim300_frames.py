@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from instruments.protocols.stim300_frames import LAYOUTS, Layout, crc32_mpeg2, int16, int24, scan
+from instruments.protocols.stim300.frames import LAYOUTS, Layout, crc32_mpeg2, int16, int24, scan
 
 #: A real device's frame (0xAF: that of 0xA7 with four bytes of the AUX input), and two made by hand, CRC at the end.
 GOLDEN = {

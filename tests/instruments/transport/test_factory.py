@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 from typing import Any
 
 import pytest
+import serial
 
 from instruments.bench_config import read_bench
 from instruments.clock import ScaledClock, VirtualClock
@@ -41,3 +43,25 @@ def test_a_time_out_of_the_bench_clock_is_wall_time_on_hardware_and_itself_in_si
     ports = Ports(clock, simulated_links(simulation, clock))
     assert ports.port_timeout_s("/dev/ttyUSB0", 2.0, device="table") == pytest.approx(0.2)
     assert ports.port_timeout_s("sim://arrick", 2.0, device="table") == 2.0
+
+
+@pytest.mark.parametrize(
+    ("number", "says"),
+    [
+        (errno.EACCES, r"check that this user may use it: run `sudo usermod -aG dialout \$USER`, then log in again$"),
+        (errno.EBUSY, r"check which other process has it open: run `fuser -v /dev/ttyUSB0`, and end that one$"),
+        (errno.EAGAIN, r"check which other process has it open: run `fuser -v /dev/ttyUSB0`, and end that one$"),
+        (errno.ENOENT, r"check the cable and the port's name; "),
+        (errno.EIO, r"check the cable, the port's name and who else uses it$"),
+    ],
+)
+def test_a_port_that_cannot_be_opened_is_named_with_the_command_that_corrects_it(
+    monkeypatch: pytest.MonkeyPatch, number: int, says: str
+) -> None:
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise serial.SerialException(number, "could not open port")
+
+    monkeypatch.setattr("serial.serial_for_url", refuse)
+    with pytest.raises(LinkError, match=rf"mems: port /dev/ttyUSB0 cannot be opened \(.*\); {says}") as told:
+        Ports(VirtualClock()).serial("/dev/ttyUSB0", device="mems", baudrate=9600, timeout_s=1.0)
+    assert "\n" not in str(told.value)

@@ -1,0 +1,39 @@
+"""Whether a STIM300 is set as its bench file says, and which one it is."""
+
+from __future__ import annotations
+
+from instruments.protocols.stim300.datagrams import RATE_UNITS, SERIAL_PATTERN, Configuration
+from instruments.protocols.stim300.settings import Stim300Settings
+
+UNIT_NAMES = {
+    "rate": "ANGULAR RATE",
+    "incremental": "INCREMENTAL ANGLE",
+    "average": "AVERAGE ANGULAR RATE",
+    "integrated": "INTEGRATED ANGLE",
+}
+DEFAULT_RATE_HZ = 125.0
+
+
+def differences(found: Configuration, settings: Stim300Settings) -> list[str]:
+    """Return what a unit is set to that its bench file does not say, one phrase each."""
+    options, said = settings.options, []
+    if found.unit not in RATE_UNITS:
+        said.append(f"gyro output unit {UNIT_NAMES[found.unit]} in deg, needed ANGULAR RATE or AVERAGE ANGULAR RATE")
+    rate_hz = settings.sample_rate_hz or DEFAULT_RATE_HZ
+    if found.sample_rate_hz is None:
+        said.append(f"sample rate external trigger, bench file {rate_hz:g} Hz")
+    elif found.sample_rate_hz != rate_hz:
+        said.append(f"sample rate {found.sample_rate_hz} Hz, bench file {rate_hz:g} Hz")
+    if options.datagram not in found.datagrams:
+        said.append(f"datagram 0x{found.datagrams[0]:02X}, bench file 0x{options.datagram:02X}")
+    if found.crlf != options.crlf:
+        said.append(f"CR LF {'on' if found.crlf else 'off'}, bench file {'on' if options.crlf else 'off'}")
+    if missing := [axis for axis in settings.axes if axis not in found.axes]:
+        said.append(f"gyro axes {' '.join(found.axes) or 'none'}, bench file also {' '.join(missing)}")
+    return said
+
+
+def is_other_serial(found: str, given: str) -> bool:
+    """Return whether the serial number of a bench file is that of another STIM300; a name of its own is none."""
+    digits = SERIAL_PATTERN.fullmatch(given)
+    return digits is not None and digits[1] != found[1:]

@@ -1,0 +1,39 @@
+"""USB adapters of serial ports: which one a port is, and that it is the one the bench file names.
+
+Linux numbers ttyUSB ports in the order in which adapters are found: after a new start two of them may have changed
+places. The serial number of an adapter does not change.
+"""
+
+from __future__ import annotations
+
+import os
+
+from serial.tools import list_ports
+
+from instruments.errors import WrongInstrument
+
+
+def adapter_of(port: str | None) -> str:
+    """Return the serial number of the USB adapter of a port; empty where it has none, or is simulated."""
+    if not port or "://" in port:
+        return ""
+    real = os.path.realpath(port)
+    for found in list_ports.comports():
+        if os.path.realpath(found.device) == real:
+            return found.serial_number or ""
+    return ""
+
+
+def require_adapter(device: str, port: str | None, wanted: str | None) -> dict[str, str]:
+    """Return the adapter of a port as something that a device reports; empty where it has none.
+
+    Raises WrongInstrument where the bench file names another adapter.
+    """
+    found = adapter_of(port)
+    if wanted is not None and wanted != found:
+        raise WrongInstrument(
+            device,
+            f"port {port} is on USB adapter {found or 'without a serial number'}, bench file {wanted}; two adapters "
+            "may have changed places: give the port's path in /dev/serial/by-id",
+        )
+    return {"adapter": found} if found else {}
