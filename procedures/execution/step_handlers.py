@@ -15,6 +15,7 @@ from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
 from procedures.execution.soak_criterion import SoakCriterion
+from procedures.execution.turn import turn
 from procedures.execution.waiting import pass_time, polls, record_for
 
 Figures = dict[str, float]
@@ -87,6 +88,8 @@ def mount(context: ExecutionContext, step: Mount) -> Figures:
     """Have a person turn the units."""
     context.soaked = None
     text = f"turn the units so that body axis {step.position} points up along the table axis"
+    if (rules := context.recipe.turns) is not None:
+        text = rules.ask.of(rules.ask.place, step.position)
     ask(context, Prompt(context.new_prompt_id(), "mount", text, step.position))
     return {"mounting": float(step.mounting)}
 
@@ -166,6 +169,7 @@ HANDLERS: Mapping[str, Callable[..., Figures]] = {
     "move_chamber": move_chamber,
     "soak": soak,
     "acquire": acquire,
+    "turn": turn,
     "rest": rest,
     "safe_state": safe_state,
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from procedures.contracts.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerOn, Rest, Soak, Step
+from procedures.contracts.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerOn, Rest, Soak, Step, Turn
 
 
 def describe_step(step: Step, datasets: int) -> str:
@@ -12,6 +12,8 @@ def describe_step(step: Step, datasets: int) -> str:
         case Acquire():
             where = f"at {step.temperature_c:g} deg C, {step.position} up"
             text = f"data set {step.dataset} of {datasets}: {step.rate_dps:+g} deg/s {where}"
+        case Turn():
+            text = f"data set {step.dataset} of {datasets}: {step.turn_deg:+g} deg by hand, {step.position} up"
         case Soak():
             text = f"soak at {step.temperature_c:g} deg C for {step.hold_s / 60:g} min"
         case MoveChamber():

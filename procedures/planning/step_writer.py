@@ -7,6 +7,7 @@ import math
 from procedures.contracts.steps import Acquire, Home, Mount, MoveChamber, PowerOff, PowerOn, SafeState, Soak, Step
 from procedures.planning.limits import BenchLimits
 from procedures.planning.point_order import Level, MountingBlock, order_points
+from procedures.planning.turn_steps import turn_steps
 from procedures.recipe.recipe import Recipe
 
 # What is expected of things that have no limit to compute with; only the forecast hangs on them.
@@ -18,6 +19,8 @@ MOUNTING_S = 600.0  #: a person walks up, turns the units and confirms
 
 def write_steps(recipe: Recipe, limits: BenchLimits) -> tuple[Step, ...]:
     """Return the steps of a recipe that fits its bench, in order."""
+    if recipe.turns is not None:
+        return tuple(turn_steps(recipe, recipe.turns))
     writer = _StepWriter(recipe, limits)
     writer.write()
     return tuple(writer.steps)
@@ -70,7 +73,7 @@ class _StepWriter:
     def move_chamber(self, temperature_c: float) -> None:
         rules = self.recipe.soak
         way_c = abs(temperature_c - self.air_c)
-        expected_s = 60.0 * way_c / self.limits.chamber.ramp_c_per_min
+        expected_s = 60.0 * way_c / self.limits.ramp_c_per_min
         if way_c > rules.band_c:
             expected_s += CHAMBER_SETTLING_S
         self.air_c = temperature_c
@@ -102,7 +105,7 @@ class _StepWriter:
             self.datasets += 1
             real_dps = self.limits.real_rate_dps(rate_dps)
             duration_s = planned_duration_s(self.recipe, real_dps)
-            ramps_s = 2 * abs(real_dps) / self.limits.table.max_acceleration_dps2
+            ramps_s = 2 * abs(real_dps) / self.limits.max_acceleration_dps2
             self.steps.append(
                 Acquire(
                     dataset=self.datasets,

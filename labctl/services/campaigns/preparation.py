@@ -10,6 +10,7 @@ from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
+from instruments.interfaces.table import RateTable
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
 from labctl.json_types.recordings import RawChannelJson
@@ -131,12 +132,14 @@ def prepare(
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:
-        bench.table.identify()
-        bench.chamber.identify()
-        if bench.table.is_moving():  # the process that drove it was killed, and a move continues
-            _rest(bench, clock)
+        if bench.table is not None:
+            bench.table.identify()
+        if bench.chamber is not None:
+            bench.chamber.identify()
+        if bench.table is not None and bench.table.is_moving():  # the process that drove it was killed
+            _rest(bench.table, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
-        units = tuple(_unit(gyro, bench_file, clock) for gyro in bench.gyros.values())
+        units = tuple(_unit(gyro, bench_file, clock, recipe) for gyro in bench.gyros.values())
         new = NewCampaign(
             recipe_name=recipe.name,
             recipe=plan.recipe.model_dump(mode="json"),
@@ -161,12 +164,12 @@ def prepare(
         raise
 
 
-def _rest(bench: Bench, clock: Clock) -> None:
-    if complaint := stop_table(bench.table, clock):
-        raise InstrumentError(bench.table.name, complaint)
+def _rest(table: RateTable, clock: Clock) -> None:
+    if complaint := stop_table(table, clock):
+        raise InstrumentError(table.name, complaint)
 
 
-def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
+def _unit(gyro: Gyro, bench: BenchFile, clock: Clock, recipe: Recipe) -> NewUnit:
     identity = gyro.identify()
     latitude = bench.latitude_deg
     info = RecordingInfo.model_validate(
@@ -175,6 +178,8 @@ def _unit(gyro: Gyro, bench: BenchFile, clock: Clock) -> NewUnit:
             "model": identity.model,
             "axes": gyro.axes,
             "kind": "samples",
+            "motion": "rates" if recipe.turns is None else "turns",
+            "turn_common_u": None if recipe.turns is None else recipe.turns.common_u,
             "started_at": clock.utc(),
             "latitude_deg": latitude,
             "sample_rate_hz": gyro.sample_rate_hz,
