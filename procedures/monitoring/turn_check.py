@@ -61,8 +61,8 @@ def check_turn(step: Turn, rules: TurnRules, unit: UnitTurn) -> TurnResult:
     angles = unit.angles_deg()
     came = sign * angles[axis] if axis in angles else None
     refused = (
-        _lost(rules, unit)
-        or _at_limit(unit)
+        _at_limit(unit)  # an output at its limit may be marked bad
+        or _lost(rules, unit)
         or moved(unit.before, rules.still_dps, "before")
         or moved(unit.after, rules.still_dps, "after")
         or _moved_between(unit, rules.still_dps)

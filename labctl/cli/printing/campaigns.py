@@ -50,6 +50,17 @@ def hours(seconds: float) -> str:
     return f"{minutes // 60} h {minutes % 60:02d} min" if minutes >= 60 else f"{minutes} min"
 
 
+def turn_text(answer: CampaignResponse) -> str:
+    """Say how far a turn by hand has come; empty where none is under way."""
+    turn = answer.turn
+    if turn is None:
+        return ""
+    if turn.phase == "rest":
+        return f"keep the unit still, {turn.position} up"
+    came = ", ".join(f"{deg:.0f}" for deg in turn.came_deg.values()) or "nothing"
+    return f"so far {came} deg of {turn.asked_deg:g} about {turn.position}"
+
+
 def print_end(answer: CampaignResponse, *, as_json: bool) -> None:
     """Print how a campaign ended; exit 1 when that is not as it was meant."""
     print_json(answer) if as_json else print_campaign(answer)
@@ -85,8 +96,7 @@ def print_campaign(answer: CampaignResponse) -> None:
             f"  chamber {format_number(answer.chamber_c)} deg C, gyro {format_number(answer.gyro_c)} deg C, "
             f"table {format_number(answer.rate_dps)} deg/s"
         )
-    if answer.prompt is not None:
-        console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow", markup=False)
+    _print_question(answer)
     if answer.wish is not None:
         console.print(f"  {answer.wish} was requested and will be carried out", style="yellow", markup=False)
     for device, state in answer.links.items():
@@ -100,6 +110,14 @@ def print_campaign(answer: CampaignResponse) -> None:
     _print_advice(answer)
     for serial, recording in answer.recordings.items():
         console.print(f"  recording {recording}: {serial}", markup=False)
+
+
+def _print_question(answer: CampaignResponse) -> None:
+    """Print what a person is asked, and how far a turn by hand has come."""
+    if text := turn_text(answer):
+        console.print(f"  {text}", markup=False)
+    if answer.prompt is not None:
+        console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow", markup=False)
 
 
 def _print_advice(answer: CampaignResponse) -> None:

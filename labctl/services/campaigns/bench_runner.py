@@ -198,7 +198,9 @@ class BenchRunner:
             raise StalePrompt(
                 f"question {request.prompt!r} is not asked: this bench turns its units itself; send no answer"
             )
-        if request.confirmed:
+        if request.again:
+            operator.repeat(request.prompt, request.by, request.reason)
+        elif request.confirmed:
             operator.confirm(request.prompt, request.by)
         else:
             operator.decline(request.prompt, request.by, request.reason or "no reason given")

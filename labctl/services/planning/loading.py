@@ -57,6 +57,8 @@ def own_text(source: str) -> str:
 def recipe_document(recipe: Recipe) -> dict[str, JsonValue]:
     """Return a recipe as a recipe file says it: what it leaves as usual is left out."""
     document = recipe.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    if recipe.turns is not None:
+        document = {key: value for key, value in document.items() if value != []}  # it has no rates
     return {"format": "labctl-recipe/1", "name": recipe.name, **document}
 
 

@@ -104,6 +104,9 @@ class TimelineColumns(ResponseModel):
     expected_s: list[float]
     temperature_c: list[float | None] = Field(description="Set point in force; null: none was set yet.")
     rate_dps: list[float | None] = Field(description="Of data sets; null: the table is at rest.")
+    turn_deg: list[float | None] = Field(
+        description="Of turns by hand, positive counter-clockwise seen from above; null: no turn."
+    )
     position: list[str | None] = Field(description="In which the units are; null: as they were found.")
     dataset: list[int | None]
 
