@@ -17,6 +17,5 @@ def upgrade() -> None:
 
 def downgrade() -> None:
     """Remove them; turns by hand become data sets at rest."""
-    with op.batch_alter_table("data_sets") as batch:
-        batch.drop_column("turn_u_deg")
-        batch.drop_column("turn_deg")
+    op.drop_column("data_sets", "turn_u_deg")
+    op.drop_column("data_sets", "turn_deg")

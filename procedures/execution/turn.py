@@ -55,6 +55,7 @@ def _attempt(context: ExecutionContext, step: Turn, rules: TurnRules, shown: Tur
         if not refused:
             context.recorder.tracker.update(turn=(shown := replace(shown, phase="turn")))
             answer = ask(context, _question(context, step, rules, shown), lambda: readings.read_turn(shown))
+            readings.read_turn(shown)  # what came with the answer
             again = answer.again
             refused = (answer.reason or f"{answer.by} wants it again") if again else ""
         else:

@@ -115,9 +115,7 @@ def _moved_between(unit: UnitTurn, still_dps: float) -> str:
     for axis in unit.before.outputs:
         change = unit.after.mean_dps(axis) - unit.before.mean_dps(axis)
         if abs(change) > still_dps:
-            return (
-                f"the output about {axis} at rest changed by {change:+.1f} deg/s; the unit turned in one of the rests"
-            )
+            return f"the output about {axis} changed by {change:+.1f} deg/s between the rests; the unit moved in one"
     return ""
 
 
