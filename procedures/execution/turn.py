@@ -49,13 +49,14 @@ class _Found:
 
 
 def _attempt(context: ExecutionContext, step: Turn, rules: TurnRules, shown: TurnProgress) -> _Found:
-    readings = TurnReadings(context, step)
+    readings = TurnReadings(context, step, rules.still_dps)
     try:
         refused, again = _rest(readings, step, rules), False
         if not refused:
             context.recorder.tracker.update(turn=(shown := replace(shown, phase="turn")))
             answer = ask(context, _question(context, step, rules, shown), lambda: readings.read_turn(shown))
             readings.read_turn(shown)  # what came with the answer
+            readings.end_turn()
             again = answer.again
             refused = (answer.reason or f"{answer.by} wants it again") if again else ""
         else:

@@ -6,12 +6,14 @@ calibration is for: the tolerance is that of the scale factor.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from instruments.interfaces.gyro import Readings
 from procedures.contracts.steps import Turn
-from procedures.monitoring.turn_course import Array, Course
+from procedures.monitoring.turn_course import Array, Course, Nominal
 from procedures.recipe.turns import TurnRules
 
 #: Parts of a rest whose means are compared, s, and how many standard deviations of such a mean noise may be off.
@@ -45,6 +47,33 @@ class UnitTurn:
     def angles_deg(self) -> dict[str, float]:
         """Return the integral of each axis less its bias, deg."""
         return {axis: self.turned.angle_deg(axis, self.bias_dps(axis)) for axis in self.turned.outputs}
+
+
+@dataclass(frozen=True)
+class Stillness:
+    """What one unit says at rest, axis by axis, and from which change on it is no longer at rest."""
+
+    outputs: Mapping[str, Nominal]
+    bias_dps: Mapping[str, float]
+    limit_dps: Mapping[str, float]
+    part: int  #: readings of the means that are compared
+
+    @classmethod
+    def of(cls, rest: Course, still_dps: float) -> Stillness:
+        """Return it by a rest."""
+        n = _part(rest.sample_rate_hz)
+        limits = {axis: _limit_dps(rest.rate_dps(axis), n, still_dps) for axis in rest.outputs}
+        return cls(rest.outputs, {axis: rest.mean_dps(axis) for axis in rest.outputs}, limits, n)
+
+    def is_left(self, readings: Readings) -> bool:
+        """Return whether a unit moved in a block of readings. One that it marked bad may be at its limit."""
+        if not readings.valid.all():
+            return True
+        for axis, output in self.outputs.items():
+            rates = output.rate_dps(readings.raw[output.channel.name]) - self.bias_dps[axis]
+            if len(rates) and float(np.abs(_means(rates, self.part)).max()) > self.limit_dps[axis]:
+                return True
+        return False
 
 
 @dataclass(frozen=True)
@@ -94,16 +123,31 @@ def _at_limit(unit: UnitTurn) -> str:
 
 def moved(rest: Course, still_dps: float, when: str) -> str:
     """Return what moved in a rest, empty when nothing did: its mean over parts of a quarter of a second changed."""
-    n = max(int(PART_S * rest.sample_rate_hz), 1)
+    n = _part(rest.sample_rate_hz)
     for axis in rest.outputs:
         rates = rest.rate_dps(axis)
-        parts = rates[: len(rates) // n * n].reshape(-1, n).mean(axis=1)
-        if len(parts) < 2:
-            continue
-        off = float(np.abs(parts - np.median(parts)).max())
-        if off > still_dps + NOISE * _noise_dps(rates) / np.sqrt(n):
+        parts = _means(rates, n)
+        off = float(np.abs(parts - np.median(parts)).max()) if len(parts) > 1 else 0.0
+        if off > _limit_dps(rates, n, still_dps):
             return f"the unit moved during the rest {when} the turn, by {off:.1f} deg/s about {axis}"
     return ""
+
+
+def _part(sample_rate_hz: float) -> int:
+    """Return how many readings make a mean that is compared."""
+    return max(int(PART_S * sample_rate_hz), 1)
+
+
+def _means(rates: Array, n: int) -> Array:
+    """Return means of n readings each, (k,), of readings (m,); of fewer than n readings their mean."""
+    if len(rates) < n:
+        return np.array([rates.mean()]) if len(rates) else np.zeros(0)
+    return np.asarray(rates[: len(rates) // n * n].reshape(-1, n).mean(axis=1))
+
+
+def _limit_dps(rates: Array, n: int, still_dps: float) -> float:
+    """Return from which change of a mean of n readings on a unit moves: the limit beside the noise of rest (m,)."""
+    return still_dps + NOISE * _noise_dps(rates) / float(np.sqrt(n))
 
 
 def _noise_dps(rates: Array) -> float:

@@ -151,16 +151,50 @@ def test_a_person_may_want_a_turn_again() -> None:
     there = HandBench(operator=Slipping(lambda _, __: there.bench.unit_handler.turn("x", 360.0)))
     assert there.run().state == "done"
     assert there.said("turn.refused") == ["turn by 360 deg, x up: slipped off the edge: turn again"]
-    assert [state for _, state, _ in there.journal.closed] == ["partial", "partial", "complete", "complete", "complete"]
+    assert [state for _, state, _ in there.journal.closed] == ["partial"] * 3 + ["complete"] * 3
+
+
+def test_a_person_who_takes_time_lengthens_the_rests_and_not_the_turn() -> None:
+    class Slow(Person):
+        """Begins a minute after the question, and says that it is done a minute after the turn."""
+
+        begins_s = says_s = float("inf")
+
+        def answer(self, prompt_id: str) -> Any:
+            now_s = there.clock.now_s()
+            if (asked := self.pending) and now_s >= self.begins_s:
+                there.bench.unit_handler.turn("x", 360.0)
+                self.begins_s, self.says_s = float("inf"), now_s + 60.0
+            elif asked and now_s >= self.says_s:
+                self.confirm(asked.id, "Ada")
+            return super().answer(prompt_id)
+
+    there = HandBench(
+        operator=Slow(lambda person, _: setattr(person, "begins_s", there.clock.now_s() + 60.0)), within_s=200
+    )
+    assert there.run().state == "done"
+    lasted = [0.0, 0.0, 0.0]
+    for number, _, readings, _ in there.journal.blocks:
+        lasted[number - 1] += len(readings) / 125
+    before_s, turned_s, after_s = lasted
+    assert before_s == pytest.approx(2.0 + 61.5, abs=2.0)
+    assert turned_s == pytest.approx(360 / 180, abs=1.6)
+    assert after_s == pytest.approx(60.0 - 4.0, abs=2.0)  # nothing is read on when a rest has been taken already
+    assert sum(lasted) == pytest.approx(there.clock.now_s(), abs=1.0)
 
 
 def test_an_abort_takes_effect_at_once_while_a_turn_is_waited_for() -> None:
-    there = HandBench(operator=Person(lambda _, __: there.control.abort("enough")), within_s=3600.0)
+    asked_s: list[float] = []
+
+    def act(_: Person, __: Prompt) -> None:
+        asked_s.append(there.clock.now_s())
+        there.control.abort("enough")
+
+    there = HandBench(operator=Person(act), within_s=3600.0)
     outcome = there.run()
     assert (outcome.state, outcome.reason) == ("aborted", "aborted: enough")
-    asked_s = there.journal.headers[-1].gate_from_s
-    assert there.clock.now_s() - asked_s < 2.0
-    assert [(state, reason) for _, state, reason in there.journal.closed] == [("partial", "enough")] * 2
+    assert there.clock.now_s() - asked_s[0] < 1.0
+    assert [(state, reason) for _, state, reason in there.journal.closed] == [("partial", "enough")]
     assert there.operator.pending is None
 
 
