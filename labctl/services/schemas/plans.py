@@ -93,6 +93,7 @@ class RecipeResponse(ResponseModel):
     expected_s: float | None = None
     refused: str | None = Field(default=None, description="Why this bench cannot do it; then there are no figures.")
     remark: str = Field(default="", description="Objections to it although the bench can do it.")
+    by_hand: bool = Field(default=False, description="A person turns the units; no table and no chamber is driven.")
 
 
 class TimelineColumns(ResponseModel):

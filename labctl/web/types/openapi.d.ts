@@ -4114,6 +4114,12 @@ export interface components {
              * @default
              */
             remark: string;
+            /**
+             * By Hand
+             * @description A person turns the units; no table and no chamber is driven.
+             * @default false
+             */
+            by_hand: boolean;
         };
         /**
          * RecordingAlone
