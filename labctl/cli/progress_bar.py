@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Self
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from labctl.cli.output import stderr
-from labctl.cli.printing.campaigns import turn_text
+from labctl.cli.turn_text import turn_text
 
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse

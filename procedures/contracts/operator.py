@@ -138,6 +138,15 @@ class HumanOperator:
                 )
         self._reply(Answer(prompt_id, confirmed=False, by=by, reason=reason, again=True))
 
+    def reply(self, answer: Answer) -> None:
+        """Give an answer of any kind. Raises StalePrompt like `confirm` and `repeat`."""
+        if answer.again:
+            self.repeat(answer.prompt_id, answer.by, answer.reason)
+        elif answer.confirmed:
+            self.confirm(answer.prompt_id, answer.by)
+        else:
+            self.decline(answer.prompt_id, answer.by, answer.reason or "no reason given")
+
     def _reply(self, answer: Answer) -> None:
         with self._lock:
             if self._pending is None or self._pending.id != answer.prompt_id or self._answer is not None:

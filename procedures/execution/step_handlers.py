@@ -11,11 +11,11 @@ from procedures.contracts.journal import Event
 from procedures.contracts.operator import Prompt
 from procedures.contracts.steps import Home, Mount, MoveChamber, PowerOff, PowerOn, Rest, SafeState, Soak
 from procedures.execution.acquire import acquire
+from procedures.execution.by_hand.turn import turn
 from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
 from procedures.execution.soak_criterion import SoakCriterion
-from procedures.execution.turn import turn
 from procedures.execution.waiting import pass_time, polls, record_for
 
 Figures = dict[str, float]

@@ -10,7 +10,8 @@ import typer
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json
 from labctl.cli.output import console, print_json
-from labctl.cli.printing.campaigns import print_campaign, print_end, turn_text
+from labctl.cli.printing.campaigns import print_campaign, print_end
+from labctl.cli.turn_text import turn_text
 
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from labctl.cli.output import console, format_number, print_json, table
+from labctl.cli.turn_text import turn_text
 from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 
 if TYPE_CHECKING:
@@ -48,17 +49,6 @@ def hours(seconds: float) -> str:
     """Write a duration as a person says it: 41 h 52 min."""
     minutes = round(seconds / 60)
     return f"{minutes // 60} h {minutes % 60:02d} min" if minutes >= 60 else f"{minutes} min"
-
-
-def turn_text(answer: CampaignResponse) -> str:
-    """Say how far a turn by hand has come; empty where none is under way."""
-    turn = answer.turn
-    if turn is None:
-        return ""
-    if turn.phase == "rest":
-        return f"keep the unit still, {turn.position} up"
-    came = ", ".join(f"{deg:.0f}" for deg in turn.came_deg.values()) or "nothing"
-    return f"so far {came} deg of {turn.asked_deg:g} about {turn.position}"
 
 
 def print_end(answer: CampaignResponse, *, as_json: bool) -> None:

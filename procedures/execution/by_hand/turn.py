@@ -8,9 +8,9 @@ from procedures.contracts.errors import StepFailed
 from procedures.contracts.journal import Event
 from procedures.contracts.operator import Prompt
 from procedures.contracts.steps import Turn
+from procedures.execution.by_hand.readings import TurnReadings
 from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
-from procedures.execution.turn_readings import TurnReadings
 from procedures.monitoring.progress import TurnProgress
 from procedures.monitoring.turn_check import TurnResult, check_turn, moved
 from procedures.recipe.turns import TurnRules
