@@ -154,7 +154,7 @@ class AdviceResponse(ResponseModel):
 
     happened: str
     done: str = Field(description="What labctl did.")
-    next: str = Field(description="What the operator has to do next.")
+    next: str = Field(description="What the operator must do next.")
 
 
 class DriverResponse(ResponseModel):
@@ -188,7 +188,7 @@ class CampaignResponse(ResponseModel):
     wish: Literal["pause", "abort"] | None = Field(default=None, description="Requested, and not yet carried out.")
     prompt: PromptResponse | None = Field(default=None, description="The question that waits for a person.")
     turn: TurnResponse | None = Field(default=None, description="Of a campaign that runs here: the turn by hand, now.")
-    links: dict[str, str] = Field(default_factory=dict, description="Instruments that are degraded or lost.")
+    links: dict[str, str] = Field(default_factory=dict, description="Instruments that answer late or not at all.")
     dropped: dict[str, str] = Field(default_factory=dict, description="Units that take no further part: name -> why.")
     abandoned: bool = Field(default=False, description="No process runs it any more, and it has no end.")
     started_at: datetime | None = None

@@ -33,7 +33,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Sign of life of the service
+         * Whether the service answers
          * @description Whether the service answers: what every open page asks once a second.
          *
          *     No key is asked for and no database is read. `heard_s`, where present: seconds since the last answer of the
@@ -1228,7 +1228,7 @@ export interface components {
             done: string;
             /**
              * Next
-             * @description What the operator has to do next.
+             * @description What the operator must do next.
              */
             next: string;
         };
@@ -1283,7 +1283,7 @@ export interface components {
             };
             /**
              * Datasheet
-             * @description What the maker promises, if it is known.
+             * @description Figures of the data sheet, if it is known.
              */
             datasheet: {
                 [key: string]: number;
@@ -1435,7 +1435,7 @@ export interface components {
             subject: string;
             /**
              * Detail
-             * @description What belongs to the act; its keys depend on `action`.
+             * @description Details of the action; the keys depend on `action`.
              */
             detail: {
                 [key: string]: components["schemas"]["JsonValue"];
@@ -1702,7 +1702,7 @@ export interface components {
             column_map?: string;
             /**
              * Importer
-             * @description Importer; empty: the one that is surest.
+             * @description Importer; empty: the one that recognises the file best.
              * @default
              */
             importer?: string;
@@ -1734,7 +1734,7 @@ export interface components {
             column_map?: string;
             /**
              * Importer
-             * @description Importer; empty: the one that is surest.
+             * @description Importer; empty: the one that recognises the file best.
              * @default
              */
             importer?: string;
@@ -1926,7 +1926,7 @@ export interface components {
             turn: components["schemas"]["TurnResponse"] | null;
             /**
              * Links
-             * @description Instruments that are degraded or lost.
+             * @description Instruments that answer late or not at all.
              */
             links: {
                 [key: string]: string;
@@ -3281,7 +3281,7 @@ export interface components {
             in_force: boolean;
             /**
              * Due
-             * @description Until when it is in force as certified; null: no date.
+             * @description Date until which the certification is valid; null: no date.
              */
             due: string | null;
             /** @description The newest act on this version; null: there was none. */
@@ -3317,7 +3317,7 @@ export interface components {
         KeyRequest: {
             /**
              * Name
-             * @description Whose it is: the name that the audit trail will show. Used once.
+             * @description Owner's name, shown in the audit trail; each name is used once.
              */
             name: string;
             role: components["schemas"]["Role"];
@@ -3525,7 +3525,7 @@ export interface components {
             importer: string;
             /**
              * Title
-             * @description What the format is called.
+             * @description Title of the format.
              */
             title: string;
             /** Rows */
@@ -5351,7 +5351,7 @@ export interface components {
             in_force: boolean;
             /**
              * Due
-             * @description Until when it is in force as certified; null: no date.
+             * @description Date until which the certification is valid; null: no date.
              */
             due: string | null;
             /** @description The newest act on this version; null: there was none. */
@@ -6694,7 +6694,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Of `progress` a campaign, else an event. */
+            /** @description A campaign for `progress`, otherwise an event. */
             200: {
                 headers: {
                     [name: string]: unknown;

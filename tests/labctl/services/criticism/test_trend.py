@@ -63,4 +63,4 @@ def test_one_recording_has_no_drift(tmp_path: Path) -> None:
     found = lab.json("trend", "J-1")
     assert (found["drifts"], found["leaves"]) == ([], [])
     assert found["text"] == ["1 recording in time: a drift takes two, and its uncertainty three."]
-    assert "must be a number above 0" in lab.run("trend", "J-1", "--limit-dps", "-1", status=2).stderr
+    assert "give a number above 0" in lab.run("trend", "J-1", "--limit-dps", "-1", status=2).stderr
