@@ -37,14 +37,12 @@ Angle = Annotated[Number, AfterValidator(_angle)]
 class Asked(Table):
     """What is asked of the person at the bench, in words."""
 
-    place: Text = "place the units with body axis $position pointing up, against the edge, and let go"
+    place: Text = "place the units with body axis $position pointing up, against the edge, and release them"
     turn: Text = (
         "turn the units by $degrees deg $sense, seen from above, about body axis $position, which points up; "
-        "put them against the edge again and let go"
+        "put them against the edge again and release them"
     )
-    keep_still: Text = (
-        "the units have to be at rest: place them with body axis $position pointing up, against the edge, and let go"
-    )
+    keep_still: Text = "the units have to be at rest: place them with body axis $position pointing up, against the edge, and release them"
 
     def of(self, text: str, position: str, turn_deg: float = 0.0) -> str:
         """Return one of the texts for a position and an angle, deg."""

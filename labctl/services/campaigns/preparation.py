@@ -10,7 +10,6 @@ from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro
-from instruments.interfaces.table import RateTable
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
 from labctl.json_types.recordings import RawChannelJson
@@ -132,12 +131,7 @@ def prepare(
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:
-        if bench.table is not None:
-            bench.table.identify()
-        if bench.chamber is not None:
-            bench.chamber.identify()
-        if bench.table is not None and bench.table.is_moving():  # the process that drove it was killed
-            _rest(bench.table, clock)
+        _identify_at_rest(bench, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
         units = tuple(_unit(gyro, bench_file, clock, recipe) for gyro in bench.gyros.values())
         new = NewCampaign(
@@ -164,8 +158,17 @@ def prepare(
         raise
 
 
-def _rest(table: RateTable, clock: Clock) -> None:
-    if complaint := stop_table(table, clock):
+def _identify_at_rest(bench: Bench, clock: Clock) -> None:
+    """Make sure that the right table and chamber answer, as far as the bench has them, and that the table is at rest.
+
+    It may move where the process that drove it was killed. Raises InstrumentError.
+    """
+    table, chamber = bench.table, bench.chamber
+    if table is not None:
+        table.identify()
+    if chamber is not None:
+        chamber.identify()
+    if table is not None and table.is_moving() and (complaint := stop_table(table, clock)):
         raise InstrumentError(table.name, complaint)
 
 

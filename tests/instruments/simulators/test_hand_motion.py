@@ -1,4 +1,4 @@
-"""The simulated hand: how it moves, how well it meets an angle, and what it does wrong when it is told to."""
+"""The simulated hand: how it moves, how well it meets an angle, and the mistakes that its settings name."""
 
 from __future__ import annotations
 
