@@ -42,7 +42,7 @@ class Asked(Table):
         "turn the units by $degrees deg $sense, seen from above, about body axis $position, which points up; "
         "put them against the edge again and release them"
     )
-    keep_still: Text = "the units have to be at rest: place them with body axis $position pointing up, against the edge, and release them"
+    keep_still: Text = "keep the units at rest: place them with body axis $position pointing up, against the edge"
 
     def of(self, text: str, position: str, turn_deg: float = 0.0) -> str:
         """Return one of the texts for a position and an angle, deg."""

@@ -226,7 +226,7 @@ def test_movement_before_the_turn_is_told_before_anything_is_turned() -> None:
     assert there.run().state == "done"
     [refused] = there.said("turn.refused")
     assert "the unit moved during the rest before the turn" in refused
-    assert "the units have to be at rest" in there.said("operator.asked")[2]
+    assert "keep the units at rest" in there.said("operator.asked")[2]
     assert [state for _, state, _ in there.journal.closed] == ["partial", "complete", "complete", "complete"]
 
 
