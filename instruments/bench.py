@@ -29,15 +29,15 @@ LISTEN_S = 5.0
 class Bench:
     """The instruments of one bench, opened; no byte was sent to any of them yet."""
 
-    table: RateTable
-    chamber: Chamber
+    table: RateTable | None
+    chamber: Chamber | None
     gyros: dict[str, Gyro]
     unit_handler: UnitHandler
     simulation: Simulation | None = None  #: the simulated instruments of this process, where the bench has any
 
     def close(self) -> None:
         """Close every link, also after one cannot be closed; raises the first InstrumentError or OSError at the end."""
-        closers: list[Callable[[], None]] = [self.table.close, self.chamber.close]
+        closers: list[Callable[[], None]] = [each.close for each in (self.table, self.chamber) if each is not None]
         failures: list[Exception] = []
         for close in [*(gyro.stop for gyro in self.gyros.values()), *closers]:
             try:
@@ -63,8 +63,8 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
             raise WrongSimulation("simulation", str(error)) from error
     ports = Ports(clock, None if simulation is None else simulated_links(simulation, clock))
     return Bench(
-        driver_of(bench.table).make(bench.table, ports, clock),
-        driver_of(bench.chamber).make(bench.chamber, ports, clock),
+        None if bench.table is None else driver_of(bench.table).make(bench.table, ports, clock),
+        None if bench.chamber is None else driver_of(bench.chamber).make(bench.chamber, ports, clock),
         {gyro.name: driver_of(gyro).make(gyro, ports, clock) for gyro in bench.gyros},
         _unit_handler(bench, simulation, clock),
         simulation,
@@ -86,7 +86,8 @@ def checked_settings(bench: BenchFile) -> BenchFile:
 def check(bench: BenchFile, clock: Clock) -> list[tuple[str, bool, str]]:
     """Ask every instrument for its identity; nothing moves. Returns (device, whether it answered, text)."""
     opened = open_bench(bench, clock)
-    devices: dict[str, Any] = {"table": opened.table, "chamber": opened.chamber, **opened.gyros}
+    fixed = {"table": opened.table, "chamber": opened.chamber}
+    devices: dict[str, Any] = {**{name: each for name, each in fixed.items() if each is not None}, **opened.gyros}
     results = []
     try:
         for name, device in devices.items():

@@ -1,5 +1,7 @@
 """A bench file: the table, chamber and gyros of one bench, their addresses and their limits.
 
+A bench without a table or without a chamber leaves the section out; it runs the recipes that need neither.
+
 Real and simulated instruments differ in `port` and `host` only; `sim://...` leads to the simulators of `[simulation]`.
 A `driver` is the name of an installed driver. This module is below the drivers: it knows the keys that every table,
 chamber or gyro has, and keeps the others as they are; `instruments.drivers.resolution` checks them by the driver's own
@@ -106,6 +108,7 @@ class SimulationSettings(Strict):
     units: dict[str, dict[str, object]] = Field(default_factory=dict)  #: gyro name -> profile and deviations from it
     table: dict[str, object] = Field(default_factory=dict)
     chamber: dict[str, object] = Field(default_factory=dict)
+    hand: dict[str, object] = Field(default_factory=dict)  #: of the person who turns the units of a bench by hand
     hidden: dict[str, float | str] = Field(default_factory=dict)  #: effect id -> size, hidden in every unit
     control: str | None = None  #: HOST:PORT of a simulator in another process, for its unit handler
     speed: float = Field(
@@ -126,8 +129,8 @@ class BenchFile(Strict):
 
     name: str
     latitude_deg: float | None = Field(default=None, ge=-90, le=90)
-    table: SerializeAsAny[TableSettings]
-    chamber: SerializeAsAny[ChamberSettings]
+    table: SerializeAsAny[TableSettings] | None = None  #: absent: the units are turned by hand
+    chamber: SerializeAsAny[ChamberSettings] | None = None  #: absent: the units are at room temperature
     gyros: tuple[SerializeAsAny[GyroSettings], ...] = Field(min_length=1)
     simulation: SimulationSettings | None = None
     #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
@@ -164,8 +167,14 @@ class BenchFile(Strict):
     @property
     def links(self) -> list[str]:
         """Every port and host."""
-        devices = (self.table, self.chamber, *self.gyros)
+        devices = (*self.instruments.values(), *self.gyros)
         return [link for device in devices for link in (device.port, device.host) if link is not None]
+
+    @property
+    def instruments(self) -> dict[str, DeviceSettings]:
+        """The table and the chamber, those that the bench has."""
+        found = {"table": self.table, "chamber": self.chamber}
+        return {name: section for name, section in found.items() if section is not None}
 
 
 def shipped_benches() -> dict[str, Path]:

@@ -215,10 +215,14 @@ class Client:
         return self._act(campaign, "abort", ReasonRequest(reason=reason, by=by))
 
     def confirm(
-        self, campaign: int, prompt: str, *, by: str, confirmed: bool = True, reason: str = ""
+        self, campaign: int, prompt: str, *, by: str, confirmed: bool = True, again: bool = False, reason: str = ""
     ) -> CampaignResponse:
-        """Answer the question with the id `prompt`. `confirmed=False`: it cannot be done, and the campaign ends."""
-        return self._act(campaign, "confirm", ConfirmRequest(prompt=prompt, by=by, confirmed=confirmed, reason=reason))
+        """Answer the question with the id `prompt`. `confirmed=False`: it cannot be done, and the campaign ends.
+
+        `again=True`: a turn by hand did not go well and is to be asked again.
+        """
+        answer = ConfirmRequest(prompt=prompt, by=by, confirmed=confirmed and not again, again=again, reason=reason)
+        return self._act(campaign, "confirm", answer)
 
     def _act(self, campaign: int, act: str, request: Request) -> CampaignResponse:
         return CampaignResponse.model_validate(json_of(self._post(f"/api/campaigns/{campaign}/{act}", request)))

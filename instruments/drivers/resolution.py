@@ -23,14 +23,14 @@ def resolve(bench: BenchFile) -> BenchFile:
     another kind, and of each setting that its driver does not take. A plug-in is imported when a section names it.
     """
     wrong: list[InitErrorDetails] = []
-    table = _section(bench.table, ("table",), TableDriver, wrong)
-    chamber = _section(bench.chamber, ("chamber",), ChamberDriver, wrong)
+    kinds: dict[str, type[Driver]] = {"table": TableDriver, "chamber": ChamberDriver}
+    fixed = {name: _section(section, (name,), kinds[name], wrong) for name, section in bench.instruments.items()}
     gyros = [_section(gyro, ("gyros", number), GyroDriver, wrong) for number, gyro in enumerate(bench.gyros)]
     if wrong:
         raise ValidationError.from_exception_data(type(bench).__name__, wrong)
-    used = {"table": table, "chamber": chamber, **{gyro.name: gyro for gyro in bench.gyros}}
+    used = {**fixed, **{gyro.name: gyro for gyro in bench.gyros}}
     drivers = {device: _release(section.driver) for device, section in used.items()}
-    return bench.model_copy(update={"table": table, "chamber": chamber, "gyros": tuple(gyros), "drivers": drivers})
+    return bench.model_copy(update={**fixed, "gyros": tuple(gyros), "drivers": drivers})
 
 
 def driver_of(section: DeviceSettings) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 
 from instruments.errors import LinkError, RequestRejected
-from instruments.protocols.simulator_control import OK, mount_line, power_line
+from instruments.protocols.simulator_control import BUSY, IS_TURNING, OK, mount_line, power_line, turn_line
 
 #: Device name in messages.
 DEVICE = "unit handler"
@@ -17,6 +17,16 @@ class ManualUnitHandler:
     def mount(self, position: str) -> None:
         """Control nothing: a person has to turn the units. Raises RequestRejected."""
         raise RequestRejected(DEVICE, f"only a person can turn the units to {position} up; confirm when it is done")
+
+    def turn(self, position: str, turn_deg: float) -> None:
+        """Control nothing: a person has to turn the units. Raises RequestRejected."""
+        raise RequestRejected(
+            DEVICE, f"only a person can turn the units by {turn_deg:g} deg about {position}; confirm when it is done"
+        )
+
+    def is_turning(self) -> bool:
+        """Get that nothing is turned here."""
+        return False
 
     def power(self, on: bool) -> None:
         """Control nothing: a person has to switch the units. Raises RequestRejected."""
@@ -38,11 +48,20 @@ class RemoteUnitHandler:
         """Control the simulator: turn its units. Raises LinkError, RequestRejected."""
         self._request(mount_line(position))
 
+    def turn(self, position: str, turn_deg: float) -> None:
+        """Control the simulator: have its units turned by hand. Raises LinkError, RequestRejected."""
+        self._request(turn_line(position, turn_deg))
+
+    def is_turning(self) -> bool:
+        """Get whether the simulated hand still turns. Raises LinkError, RequestRejected."""
+        return self._request(IS_TURNING, OK, BUSY) == BUSY
+
     def power(self, on: bool) -> None:
         """Control the simulator: switch its units. Raises LinkError, RequestRejected."""
         self._request(power_line(on))
 
-    def _request(self, line: str) -> None:
+    def _request(self, line: str, *known: str) -> str:
+        """Send a line; returns the reply, which is one of `known`, by default `ok`."""
         try:
             with socket.create_connection(self._address, timeout=self.TIMEOUT_S) as link:
                 link.sendall(f"{line}\n".encode())
@@ -51,7 +70,8 @@ class RemoteUnitHandler:
             raise LinkError(
                 DEVICE, f"the simulator at {self._address} does not answer ({error}); start it with `labctl simulator`"
             ) from error
-        if reply != OK:
+        if reply not in (known or (OK,)):
             raise RequestRejected(
                 DEVICE, f"the simulator answered {reply!r} to {line!r}; start `labctl simulator` again"
             )
+        return reply

@@ -12,6 +12,17 @@ class UnitHandler(Protocol):
         """Control the units: turn them so that body axis `position` (x, -x, y ...) points up along the table axis."""
         ...
 
+    def turn(self, position: str, turn_deg: float) -> None:
+        """Control the units: have them turned by hand by `turn_deg` about body axis `position`, which points up.
+
+        Positive is counter-clockwise seen from above. Returns at once, while the units turn.
+        """
+        ...
+
+    def is_turning(self) -> bool:
+        """Get whether a turn by hand is still under way."""
+        ...
+
     def power(self, on: bool) -> None:
         """Control the units: switch their power on or off."""
         ...

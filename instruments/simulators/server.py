@@ -17,7 +17,7 @@ import tomli_w
 
 from instruments.bench_config import BenchFile, is_simulated_address
 from instruments.clock import Clock, ScaledClock
-from instruments.protocols.simulator_control import MOUNT, OK, POWER
+from instruments.protocols.simulator_control import BUSY, IS_TURNING, MOUNT, OK, POWER, TURN, turn_of
 from instruments.simulators.links.device import SimulatedDevice
 from instruments.simulators.links.real_ports import LOCALHOST, RealPorts
 from instruments.simulators.simulated_bench import SimulatedBench
@@ -36,7 +36,7 @@ class SimulationServer:
     def start(self) -> BenchFile:
         """Open every port; returns the bench file with the real addresses. Raises OSError, LinkError."""
         record = self._bench.model_dump(exclude_none=True)  # a bench file has no null, nor have a driver's own settings
-        devices = {"table": record["table"], "chamber": record["chamber"]}
+        devices = {name: record[name] for name in ("table", "chamber") if name in record}
         devices |= {gyro["name"]: gyro for gyro in record["gyros"]}
         for name, settings in devices.items():
             self._serve_device(name, settings)
@@ -89,6 +89,10 @@ class SimulationServer:
                 self._simulated.world.mount(now_s, argument)
             elif command == POWER:
                 self._simulated.world.power(now_s, argument == "on")
+            elif command == TURN:
+                self._simulated.world.turn_by_hand(now_s, *turn_of(argument))
+            elif command == IS_TURNING:
+                return BUSY if self._simulated.world.hand.is_turning(now_s) else OK
             else:
                 return f"unknown order {command!r}"
         return OK

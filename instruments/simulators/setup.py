@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from instruments.bench_config import BenchFile, GyroSettings
+from instruments.bench_config import BenchFile, DeviceSettings, GyroSettings
+from instruments.errors import LinkError
 from instruments.simulators.links.faults import Faults
 from instruments.simulators.physics.world import SimulatedGyro, World
 
@@ -18,6 +19,12 @@ class InstrumentSetup:
     gyro_name: str
     faults: Faults
     port_buffer_bytes: int  #: unread bytes that a serial port keeps
+
+    def instrument(self, name: str) -> DeviceSettings:
+        """Return the bench file's section "table" or "chamber"; raises LinkError where the bench has none."""
+        if (found := self.bench.instruments.get(name)) is None:
+            raise LinkError(name, f"bench {self.bench.name} has no [{name}]; add the section, or correct the address")
+        return found
 
     @property
     def gyro(self) -> GyroSettings:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Self
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from labctl.cli.output import stderr
+from labctl.cli.turn_text import turn_text
 
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse
@@ -42,5 +43,6 @@ class CampaignProgress:
 
     def update(self, answer: CampaignResponse) -> None:
         """Show where the campaign is now."""
-        step = f"{self._title} step {answer.step or 0}/{answer.steps} {answer.step_text}".strip()
+        text = turn_text(answer) or answer.step_text
+        step = f"{self._title} step {answer.step or 0}/{answer.steps} {text}".strip()
         self._progress.update(self._task, completed=answer.progress, description=step[:64].ljust(64))

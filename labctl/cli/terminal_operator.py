@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from procedures.contracts.operator import Operator, Prompt
 
 LOOK_S = 0.5
+#: What a person types who wants a turn by hand to be asked again.
+AGAIN = "again"
 
 
 class TerminalOperator:
@@ -52,18 +54,32 @@ class TerminalOperator:
     def _put(operator: HumanOperator, prompt: Prompt, note: Callable[[str], None]) -> None:
         if sys.stdin.isatty():  # an Enter from before the question is no answer to it
             termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
-        stderr.print(f"{prompt.text}. Press Enter when it is done, or type why it cannot be done.", markup=False)
+        stderr.print(f"{prompt.text}. {_how_to_answer(prompt)}", markup=False)
         line = sys.stdin.readline()
         if not line:  # end of input: no person is at the terminal
+            limit = "" if prompt.within_s is None else f" within {prompt.within_s:g} s"
+            stderr.print(f"labctl: end of input: no answer comes from here; the campaign waits{limit}", markup=False)
             return
         try:
-            if why := line.strip():
+            why = line.strip()
+            again = prompt.kind == "turn" and why.lower() == AGAIN
+            if again:
+                operator.repeat(prompt.id, os_user(), "")
+            elif why:
                 operator.decline(prompt.id, os_user(), why)
             else:
                 operator.confirm(prompt.id, os_user())
-            note(f"{prompt.id}: {f'cannot be done; {why}' if why else 'done'}; {prompt.text}")
+            said = "to be asked again" if again else f"cannot be done; {why}" if why else "done"
+            note(f"{prompt.id}: {said}; {prompt.text}")
         except (StalePrompt, StoreError) as error:
             stderr.print(f"labctl: {error}", markup=False)
+
+
+def _how_to_answer(prompt: Prompt) -> str:
+    """Say what to type, and by when."""
+    again = f", {AGAIN} to be asked for the turn again" if prompt.kind == "turn" else ""
+    limit = "" if prompt.within_s is None else f" Time limit: {prompt.within_s:g} s."
+    return f"Press Enter when it is done{again}, or type why it cannot be done.{limit}"
 
 
 def ask_bench_clear(questions: Mapping[str, str]) -> str:

@@ -14,5 +14,6 @@ class StepJson(TypedDict):
     expected_s: float
     temperature_c: NotRequired[float | None]
     rate_dps: NotRequired[float | None]
+    turn_deg: NotRequired[float | None]
     position: NotRequired[str | None]
     dataset: NotRequired[int | None]

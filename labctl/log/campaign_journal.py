@@ -100,12 +100,13 @@ class LoggedJournal:
             number = self._journal.dataset_opened(header)
         units = [self._serials.get(gyro, gyro) for gyro in header.gyros]
         self._log.info(
-            "dataset.opened", dataset=number, planned=header.step.dataset, rate_dps=header.rate_dps,
+            "dataset.opened", dataset=number, planned=header.planned, rate_dps=header.rate_dps,
             asked_dps=header.asked_dps, setpoint_c=header.setpoint_c, position=header.step.position, units=units,
+            **({} if header.turn_deg is None else {"turn_deg": header.turn_deg}),
         )  # fmt: skip
         return number
 
-    def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
+    def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float | None) -> None:
         """Record one block of one unit."""
         with self._refusals("readings", dataset=dataset, **self._unit(gyro)):
             self._journal.readings(dataset, gyro, readings, chamber_c)

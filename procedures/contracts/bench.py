@@ -11,13 +11,23 @@ from instruments.interfaces.table import RateTable
 
 
 class Bench(Protocol):
-    """The instruments of one bench, opened."""
+    """The instruments of one bench, opened. A bench on which units are turned by hand may have no table, no chamber."""
 
     @property
-    def table(self) -> RateTable: ...
+    def table(self) -> RateTable | None: ...
 
     @property
-    def chamber(self) -> Chamber: ...
+    def chamber(self) -> Chamber | None: ...
+
+    @property
+    def gyros(self) -> Mapping[str, Gyro]: ...
+
+
+class MonitoredBench(Protocol):
+    """What is watched of a bench: the chamber, where it has one, and the units that take part."""
+
+    @property
+    def air_chamber(self) -> Chamber | None: ...
 
     @property
     def gyros(self) -> Mapping[str, Gyro]: ...

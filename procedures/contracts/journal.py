@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
-from typing import Protocol
+from typing import Literal, Protocol
 
 from instruments.interfaces.gyro import Readings
 from procedures.contracts.campaign_state import CampaignState
-from procedures.contracts.steps import Acquire, StepResult
+from procedures.contracts.steps import Acquire, StepResult, Turn
 
 
 class DataSetState(StrEnum):
@@ -22,17 +22,28 @@ class DataSetState(StrEnum):
 
 @dataclass(frozen=True)
 class DataSetHeader:
-    """One fixed rate at one fixed temperature in one position, as it was really run, for all units at once."""
+    """One fixed rate at one fixed temperature in one position, as it was really run, for all units at once.
 
-    step: Acquire
+    Of a step that turns the units by hand it is a rest or the turn, by `part`.
+    """
+
+    step: Acquire | Turn
     rate_dps: float  #: the reference: steps inside the gate over gate time
     asked_dps: float
     gate_from_s: float  #: campaign time
-    gate_until_s: float
-    angle_from_deg: float  #: table angle at `gate_from_s`
-    setpoint_c: float
+    gate_until_s: float | None  #: absent: it lasts until a person says so
+    angle_from_deg: float | None  #: table angle at `gate_from_s`; absent without a table
+    setpoint_c: float | None  #: absent without a chamber
     run: int  #: powered session as it really was: the plan's, and those that a power cut added
     gyros: tuple[str, ...]  #: the units that take part, by name
+    turn_deg: float | None = None  #: by which angle the units are turned; 0 for a rest, absent for a rate of the table
+    turn_u_deg: float | None = None  #: its standard uncertainty
+    part: Literal[-1, 0, 1] = 0  #: of a turn: the rest before it, the turn, the rest after it
+
+    @property
+    def planned(self) -> int:
+        """Its number in the plan."""
+        return self.step.dataset + self.part
 
 
 @dataclass(frozen=True)
@@ -41,8 +52,8 @@ class EnvironmentSample:
 
     t_s: float  #: campaign time
     run: int
-    chamber_c: float
-    chamber_setpoint_c: float
+    chamber_c: float | None  #: absent without a chamber
+    chamber_setpoint_c: float | None
     gyro_c: dict[str, float]  #: gyro name -> its own thermometer (the mean where it has one per axis)
 
 
@@ -90,7 +101,7 @@ class Journal(Protocol):
         """Record a data set before its first reading; returns its number, unique in the campaign."""
         ...
 
-    def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
+    def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float | None) -> None:
         """Record one block of one unit, times in campaign time; durable when this returns."""
         ...
 

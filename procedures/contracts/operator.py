@@ -1,4 +1,4 @@
-"""What is asked of a person: turn the units, switch them. Every question has an id; old answers are refused."""
+"""What is asked of a person: place, turn, switch the units. Every question has an id; old answers are refused."""
 
 from __future__ import annotations
 
@@ -17,9 +17,11 @@ class Prompt:
     """One question to a person."""
 
     id: str  #: unique, so that a late answer cannot hit the next question
-    kind: Literal["mount", "power_on", "power_off"]
+    kind: Literal["mount", "power_on", "power_off", "turn"]
     text: str
-    position: str | None = None  #: where the units are to be turned
+    position: str | None = None  #: where the units are to be turned; of a turn the axis that points up
+    turn_deg: float | None = None  #: of a turn: by which angle, positive counter-clockwise seen from above
+    within_s: float | None = None  #: how long the answer is waited for; absent: without limit
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class Answer:
     confirmed: bool
     by: str
     reason: str = ""
+    again: bool = False  #: not done well: the same is to be asked again. Of a turn only
 
 
 class Operator(Protocol):
@@ -54,22 +57,33 @@ class Operator(Protocol):
 
 
 class UnitHandlerOperator:
-    """Answers at once: a unit handler carries out what is asked, as on a simulated bench."""
+    """Answers without a person: a unit handler carries out what is asked, as on a simulated bench.
+
+    All but a turn is done at once.
+    """
 
     at_once = True
 
     def __init__(self, unit_handler: UnitHandler, by: str = "simulated bench") -> None:
         self._unit_handler = unit_handler
         self._by = by
+        self._turns = False  #: whether the last question was for a turn
 
     def ask(self, prompt: Prompt) -> None:
+        self._turns = prompt.kind == "turn"
         if prompt.kind == "mount":
             assert prompt.position is not None
             self._unit_handler.mount(prompt.position)
+        elif prompt.kind == "turn":
+            assert prompt.position is not None
+            assert prompt.turn_deg is not None
+            self._unit_handler.turn(prompt.position, prompt.turn_deg)
         else:
             self._unit_handler.power(prompt.kind == "power_on")
 
     def answer(self, prompt_id: str) -> Answer | None:
+        if self._turns and self._unit_handler.is_turning():
+            return None
         return Answer(prompt_id, confirmed=True, by=self._by)
 
     def withdraw(self, prompt_id: str) -> None:  # nothing is ever left open
@@ -113,6 +127,25 @@ class HumanOperator:
     def decline(self, prompt_id: str, by: str, reason: str) -> None:
         """Say that it cannot be done; the campaign ends. Raises StalePrompt like `confirm`."""
         self._reply(Answer(prompt_id, confirmed=False, by=by, reason=reason))
+
+    def repeat(self, prompt_id: str, by: str, reason: str) -> None:
+        """Say that it did not go well and is to be asked again. Raises StalePrompt, also for what is no turn."""
+        with self._lock:
+            if self._pending is not None and self._pending.id == prompt_id and self._pending.kind != "turn":
+                raise StalePrompt(
+                    f"question {prompt_id!r} asks for no turn by hand: confirm it, or decline it; only a turn is asked "
+                    "again"
+                )
+        self._reply(Answer(prompt_id, confirmed=False, by=by, reason=reason, again=True))
+
+    def reply(self, answer: Answer) -> None:
+        """Give an answer of any kind. Raises StalePrompt like `confirm` and `repeat`."""
+        if answer.again:
+            self.repeat(answer.prompt_id, answer.by, answer.reason)
+        elif answer.confirmed:
+            self.confirm(answer.prompt_id, answer.by)
+        else:
+            self.decline(answer.prompt_id, answer.by, answer.reason or "no reason given")
 
     def _reply(self, answer: Answer) -> None:
         with self._lock:

@@ -99,6 +99,23 @@ class Acquire(StepBase):
     duration_s: float
 
 
+class Turn(StepBase):
+    """A person turns the units by a known angle: a rest, the turn, and another rest, each of them a data set.
+
+    `dataset` is the number of the turn; the rests have the numbers before and after it.
+    """
+
+    kind: Literal["turn"] = "turn"
+    dataset: int
+    position: str  #: the body axis that points up, about which the units are turned
+    run: int
+    mounting: int
+    turn_deg: float  #: positive counter-clockwise seen from above
+    turn_u_deg: float  #: its standard uncertainty
+    rest_s: float
+    within_s: float  #: from the question to the answer that it is done
+
+
 class Rest(StepBase):
     """Nothing moves for a while; the environment is recorded."""
 
@@ -113,7 +130,18 @@ class SafeState(StepBase):
 
 
 Step = Annotated[
-    PowerOn | PowerOff | Home | MeasureClock | CheckHome | Mount | MoveChamber | Soak | Acquire | Rest | SafeState,
+    PowerOn
+    | PowerOff
+    | Home
+    | MeasureClock
+    | CheckHome
+    | Mount
+    | MoveChamber
+    | Soak
+    | Acquire
+    | Turn
+    | Rest
+    | SafeState,
     Field(discriminator="kind"),
 ]
 

@@ -8,14 +8,15 @@ from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.table import RateTable
 from procedures.contracts.bench import Bench
+from procedures.contracts.errors import StepFailed
 
 
 @dataclass
 class ActiveBench:
     """A bench whose units can drop out."""
 
-    table: RateTable
-    chamber: Chamber
+    rate_table: RateTable | None
+    air_chamber: Chamber | None
     gyros: dict[str, Gyro]  #: by name; those that take part
     dropped: dict[str, str] = field(default_factory=dict)  #: unit name -> why it dropped out
 
@@ -23,6 +24,35 @@ class ActiveBench:
     def of(cls, bench: Bench) -> ActiveBench:
         """Return an opened bench with all of its units taking part."""
         return cls(bench.table, bench.chamber, dict(bench.gyros))
+
+    @property
+    def table(self) -> RateTable:
+        """The rate table, for steps that need one. Raises StepFailed."""
+        if self.rate_table is None:
+            raise StepFailed("this bench has no rate table; name one that has, or choose a recipe with [turns]")
+        return self.rate_table
+
+    @property
+    def chamber(self) -> Chamber:
+        """The chamber, for steps that need one. Raises StepFailed."""
+        if self.air_chamber is None:
+            raise StepFailed("this bench has no chamber; name one that has, or choose a recipe with [turns]")
+        return self.air_chamber
+
+    @property
+    def table_name(self) -> str:
+        """Name of the rate table in messages; empty without one."""
+        return "" if self.rate_table is None else self.rate_table.name
+
+    @property
+    def chamber_name(self) -> str:
+        """Name of the chamber in messages; empty without one."""
+        return "" if self.air_chamber is None else self.air_chamber.name
+
+    def stop_table(self) -> None:
+        """Stop the rate table, if there is one. Raises InstrumentError."""
+        if self.rate_table is not None:
+            self.rate_table.stop()
 
     def drop(self, gyro: str, reason: str) -> Gyro:
         """Let a unit take no further part; returns it."""

@@ -54,7 +54,7 @@ class Engine:
         self._recorder = CampaignRecorder(journal, clock, self._tracker, time or CampaignTime(clock))
         active = ActiveBench.of(bench)
         guards = guards or Guards(
-            plan.recipe.guards, lambda: BenchLimits.of(bench), bench.chamber.name, bench.table.name
+            plan.recipe.guards, lambda: BenchLimits.of(bench), active.chamber_name, active.table_name
         )
         monitor = BenchMonitor(active, guards, self._recorder)
         self._context = ExecutionContext(

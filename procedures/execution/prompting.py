@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import StepFailed, Unanswered
@@ -13,30 +14,35 @@ from procedures.execution.waiting import CHECK_S, pass_time
 from procedures.monitoring.event_recorder import warning
 
 
-def ask(context: ExecutionContext, prompt: Prompt) -> Answer:
+def ask(context: ExecutionContext, prompt: Prompt, meanwhile: Callable[[], None] | None = None) -> Answer:
     """Ask the operator and wait for the answer, with the environment recorded.
 
-    Raises StepFailed when the answer is no, Unanswered when none comes in time, and what `ExecutionContext.polls`
-    raises.
+    `meanwhile` is called again and again instead of waiting; it lets about a second pass.
+    Raises StepFailed when the answer is no, Unanswered when none comes in time, and what `ExecutionContext.polls` and
+    `meanwhile` raise.
     """
     context.recorder.event(Event("operator.asked", f"{prompt.text} [question {prompt.id}]"))
     context.operator.ask(prompt)
     answer = context.operator.answer(prompt.id)
     if answer is None:
-        answer = _wait_for_answer(context, prompt)
+        answer = _wait_for_answer(context, prompt, meanwhile)
+    if answer.again:
+        said = f": {answer.reason}" if answer.reason else ""
+        context.recorder.event(Event(f"operator.{prompt.kind}", f"{prompt.text}: again, says {answer.by}{said}"))
+        return answer
     if not answer.confirmed:
         raise StepFailed(f"{answer.by} declined: {prompt.text}: {answer.reason}")
     context.recorder.event(Event(f"operator.{prompt.kind}", f"{prompt.text}: confirmed by {answer.by}"))
     return answer
 
 
-def _wait_for_answer(context: ExecutionContext, prompt: Prompt) -> Answer:
+def _wait_for_answer(context: ExecutionContext, prompt: Prompt, meanwhile: Callable[[], None] | None) -> Answer:
     """Show that the campaign waits until the answer is there."""
     recorder = context.recorder
     recorder.tracker.update(prompt=prompt)
     recorder.change_state(CampaignState.WAITING, prompt.text)
     try:
-        answer = _poll_until_answered(context, prompt)
+        answer = _poll_until_answered(context, prompt, meanwhile)
     finally:
         context.operator.withdraw(prompt.id)
         recorder.tracker.update(prompt=None)
@@ -44,9 +50,9 @@ def _wait_for_answer(context: ExecutionContext, prompt: Prompt) -> Answer:
     return answer
 
 
-def _poll_until_answered(context: ExecutionContext, prompt: Prompt) -> Answer:
+def _poll_until_answered(context: ExecutionContext, prompt: Prompt, meanwhile: Callable[[], None] | None) -> Answer:
     rules, clock = context.recipe.on_failure, context.clock
-    timeout_s, remind_s = rules.operator_timeout_s, rules.operator_remind_s or math.inf
+    timeout_s, remind_s = prompt.within_s or rules.operator_timeout_s, rules.operator_remind_s or math.inf
     began_s = next_poll_s = clock.now_s()
     remind_at_s = began_s + remind_s
     while (answer := context.operator.answer(prompt.id)) is None:
@@ -56,6 +62,9 @@ def _poll_until_answered(context: ExecutionContext, prompt: Prompt) -> Answer:
             remind_at_s += remind_s
             text = f"{prompt.text} [question {prompt.id}], open since {clock.now_s() - began_s:.0f} s"
             context.recorder.event(warning("operator.reminded", text))
+        if meanwhile is not None:
+            meanwhile()
+            continue
         if clock.now_s() >= next_poll_s:
             context.poll()
             next_poll_s = clock.now_s() + POLL_S

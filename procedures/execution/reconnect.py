@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply
 from procedures.contracts.journal import Event
-from procedures.contracts.steps import Acquire, Home, MeasureClock, MoveChamber, Rest, Soak, Step
+from procedures.contracts.steps import Acquire, Home, MeasureClock, MoveChamber, Rest, Soak, Step, Turn
 from procedures.execution.context import POLL_S, ExecutionContext, raise_violation
 from procedures.execution.waiting import pass_time
 
 PAUSES_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 STANDSTILL_S = 60.0
-#: Steps that can be begun again without asking a person anew.
-REPEATABLE = (Home, MeasureClock, MoveChamber, Soak, Acquire, Rest)
+#: Steps that can be begun again without asking a person anew; a turn by hand asks anyway.
+REPEATABLE = (Home, MeasureClock, MoveChamber, Soak, Acquire, Turn, Rest)
 
 
 def is_reconnectable(context: ExecutionContext, step: Step, error: LinkError) -> bool:
@@ -22,7 +22,7 @@ def is_reconnectable(context: ExecutionContext, step: Step, error: LinkError) ->
     """
     if not isinstance(step, REPEATABLE):
         return False
-    return error.device != context.bench.table.name or not isinstance(error, NoReply | MalformedReply)
+    return error.device != context.bench.table_name or not isinstance(error, NoReply | MalformedReply)
 
 
 def reconnect(context: ExecutionContext, error: LinkError) -> None:
@@ -31,8 +31,8 @@ def reconnect(context: ExecutionContext, error: LinkError) -> None:
     Raises the error when it stays silent, GuardTripped, and InstrumentError for a table that cannot be stopped.
     """
     device = error.device
-    if device != context.bench.table.name:
-        context.bench.table.stop()  # an earlier move may still run, and a controller refuses another one meanwhile
+    if device != context.bench.table_name:
+        context.bench.stop_table()  # an earlier move may still run, and a controller refuses another one meanwhile
     context.monitor.links.change(device, "degraded", f"{error}; it is tried again, {len(PAUSES_S)} times")
     for attempt, pause_s in enumerate(PAUSES_S, start=1):
         pass_time(context, pause_s, pausing=False)
@@ -53,13 +53,13 @@ def reconnect(context: ExecutionContext, error: LinkError) -> None:
 
 def _reach(context: ExecutionContext, device: str) -> None:
     bench = context.bench
-    if device == bench.table.name:
+    if device == bench.table_name:
         bench.table.stop()
         until_s = context.clock.now_s() + STANDSTILL_S
         while bench.table.is_moving() and context.clock.now_s() < until_s:
             pass_time(context, 1.0, pausing=False)
         bench.table.home()
-    elif device == bench.chamber.name:
+    elif device == bench.chamber_name:
         bench.chamber.read()
     elif device in bench.gyros:
         bench.gyros[device].stop()

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from procedures.contracts.errors import StepFailed
 from procedures.contracts.journal import Event
 from procedures.contracts.operator import Prompt
-from procedures.contracts.steps import Acquire, Soak, Step
+from procedures.contracts.steps import Acquire, Soak, Step, Turn
 from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
@@ -52,7 +52,7 @@ def resume_campaign(
     deviation = _ChamberDeviation(plan, start_at)
     with context.monitor.listening(deviation.add):
         context.poll(read_latest=False)
-        if not any(isinstance(step, Acquire) for step in plan.steps[start_at:]):
+        if not any(isinstance(step, Acquire | Turn) for step in plan.steps[start_at:]):
             return
         if run := plan.run_at(start_at, restart.skipped):
             _switch_on(context, run + context.added_runs, restart)

@@ -34,8 +34,10 @@ def make_safe(bench: Bench, clock: Clock, pauses_s: Sequence[float] = PAUSES_S) 
 
 
 def _parts(bench: Bench, clock: Clock) -> Iterator[tuple[str, Callable[[], str | None]]]:
-    yield "table to rest", partial(stop_table, bench.table, clock)
-    yield "chamber to its safe set point", partial(_make_chamber_safe, bench.chamber)
+    if bench.table is not None:
+        yield "table to rest", partial(stop_table, bench.table, clock)
+    if bench.chamber is not None:
+        yield "chamber to its safe set point", partial(_make_chamber_safe, bench.chamber)
     for name, gyro in bench.gyros.items():
         yield f"stream of {name} closed", gyro.stop
 

@@ -23,6 +23,7 @@ from procedures.contracts.steps import (
     Soak,
 )
 from procedures.execution.acquire import acquire
+from procedures.execution.by_hand.turn import turn
 from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
@@ -99,6 +100,8 @@ def mount(context: ExecutionContext, step: Mount) -> Figures:
     """Have a person turn the units."""
     context.soaked = None
     text = f"turn the units so that body axis {step.position} points up along the table axis"
+    if (rules := context.recipe.turns) is not None:
+        text = rules.ask.of(rules.ask.place, step.position)
     ask(context, Prompt(context.new_prompt_id(), "mount", text, step.position))
     return {"mounting": float(step.mounting)}
 
@@ -246,6 +249,7 @@ HANDLERS: Mapping[str, Callable[..., Figures]] = {
     "move_chamber": move_chamber,
     "soak": soak,
     "acquire": acquire,
+    "turn": turn,
     "rest": rest,
     "safe_state": safe_state,
 }

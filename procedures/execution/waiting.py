@@ -80,7 +80,7 @@ def suspend(context: ExecutionContext, violation: GuardTripped) -> None:
     """
     rules, clock, recorder = context.recipe.guards, context.clock, context.recorder
     context.owed_soak, context.soaked = context.soaked or context.owed_soak, None
-    context.bench.table.stop()
+    context.bench.stop_table()
     recorder.event(Event("soak_owed", f"suspended: {violation}"))
     recorder.change_state(CampaignState.PAUSED, f"suspended: {violation}")
     began_s = clear_since_s = clock.now_s()

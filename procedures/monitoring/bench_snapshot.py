@@ -35,8 +35,8 @@ class BenchSnapshot:
     """The bench at one moment."""
 
     t_s: float  #: campaign time
-    chamber_c: float
-    setpoint_c: float
+    chamber_c: float | None  #: absent without a chamber
+    setpoint_c: float | None
     alarms: tuple[str, ...] = ()
     gyro_c: Mapping[str, float] = field(default_factory=dict)  #: by the units' own thermometers
     silent_s: Mapping[str, float] = field(default_factory=dict)  #: device -> time since its last answer

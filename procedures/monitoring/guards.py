@@ -101,12 +101,16 @@ def _outside(device: str, value_c: float, low_c: float, high_c: float, text: str
 
 def _chamber_limits(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     limits, margin_c = guards.limits.chamber, guards.rules.chamber_margin_c
+    if limits is None or now.chamber_c is None:
+        return iter(())
     text = "the air is beyond the limits of the chamber"
     return _outside(guards.chamber, now.chamber_c, limits.min_c - margin_c, limits.max_c + margin_c, text)
 
 
 def _unit_air(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     margin_c = guards.rules.chamber_margin_c
+    if now.chamber_c is None:
+        return
     for name, unit in guards.limits.gyros.items():
         text = f"the air is beyond what unit {name} may be exposed to"
         yield from _outside(guards.chamber, now.chamber_c, unit.min_c - margin_c, unit.max_c + margin_c, text)
@@ -120,6 +124,8 @@ def _unit_temperature(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
 
 
 def _chamber_deviation(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
+    if now.chamber_c is None or now.setpoint_c is None:
+        return
     off_c = abs(now.chamber_c - now.setpoint_c)
     if now.taking_readings and off_c > guards.rules.chamber_deviation_c:
         text = f"the air left its set point of {now.setpoint_c:g} deg C while readings were taken"
@@ -128,6 +134,8 @@ def _chamber_deviation(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
 
 def _unit_off_air(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     limit_c = guards.rules.max_gyro_off_air_c
+    if now.chamber_c is None:
+        return
     for name, temperature_c in now.gyro_c.items():
         off_c = abs(temperature_c - now.chamber_c)
         if now.taking_readings and off_c > limit_c:

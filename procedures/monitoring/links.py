@@ -18,10 +18,9 @@ class LinkStates:
         self._heard_s: dict[str, float] = {}  #: device -> campaign time
         self._broken: dict[str, LinkState] = {}
 
-    def restart(self, device: str) -> None:
-        """Note that only this device answers from now on."""
+    def restart(self) -> None:
+        """Forget when any device has answered."""
         self._heard_s = {}
-        self.heard(device)
 
     def heard(self, device: str) -> None:
         """Note that a device answered just now."""

@@ -9,7 +9,7 @@ from instruments.errors import InstrumentError, LinkError
 from instruments.interfaces.chamber import ChamberState
 from instruments.interfaces.gyro import Gyro, Readings
 from instruments.interfaces.table import Spin
-from procedures.contracts.bench import Bench
+from procedures.contracts.bench import MonitoredBench
 from procedures.contracts.journal import EnvironmentSample, Event
 from procedures.monitoring.bench_snapshot import BenchSnapshot, ReadingCounts, gyro_temperature_c
 from procedures.monitoring.event_recorder import CampaignRecorder
@@ -34,7 +34,7 @@ class BenchMonitor:
     trips. A limit that is passed is an event once, when it trips, and once more when it holds again.
     """
 
-    def __init__(self, bench: Bench, guards: Guards, recorder: CampaignRecorder) -> None:
+    def __init__(self, bench: MonitoredBench, guards: Guards, recorder: CampaignRecorder) -> None:
         self._bench = bench
         self._guards = guards
         self._recorder = recorder
@@ -51,8 +51,10 @@ class BenchMonitor:
 
     def begin(self) -> None:
         """Poll the chamber for the first time; here its silence is an error at once. Raises InstrumentError."""
-        self._chamber = self._bench.chamber.read()
-        self.links.restart(self._bench.chamber.name)
+        self.links.restart()
+        if (chamber := self._bench.air_chamber) is not None:
+            self._chamber = chamber.read()
+            self.links.heard(chamber.name)
 
     def units_powered(self, run: int) -> None:
         """Note that the units were switched on (session number) or off (0)."""
@@ -87,6 +89,16 @@ class BenchMonitor:
         """Set point of the chamber at the last poll."""
         assert self._chamber is not None
         return self._chamber.setpoint_c
+
+    @property
+    def air_c(self) -> float | None:
+        """Air temperature at the last poll; None without a chamber."""
+        return None if self._chamber is None else self._chamber.temperature_c
+
+    @property
+    def air_setpoint_c(self) -> float | None:
+        """Set point of the chamber at the last poll; None without a chamber."""
+        return None if self._chamber is None else self._chamber.setpoint_c
 
     @contextmanager
     def listening(self, listener: Listener) -> Iterator[None]:
@@ -129,14 +141,14 @@ class BenchMonitor:
         if read_latest and self.run:
             self._poll_units()
         t_s = self._recorder.t_s()
-        self._recorder.tracker.update(
-            t_s, chamber_c=self.chamber_c, setpoint_c=self.setpoint_c, gyro_c=dict(self._gyro_c)
-        )
+        chamber_c, setpoint_c = self.air_c, self.air_setpoint_c
+        self._recorder.tracker.update(t_s, chamber_c=chamber_c, setpoint_c=setpoint_c, gyro_c=dict(self._gyro_c))
         if air_heard:
-            sample = EnvironmentSample(t_s, self.run, self.chamber_c, self.setpoint_c, dict(self._gyro_c))
+            sample = EnvironmentSample(t_s, self.run, chamber_c, setpoint_c, dict(self._gyro_c))
             self._recorder.journal.environment(sample)
-            for listener in self._listeners:
-                listener(t_s, self.chamber_c, self._gyro_c)
+            if chamber_c is not None:
+                for listener in self._listeners:
+                    listener(t_s, chamber_c, self._gyro_c)
         return self.check_guards()
 
     def check_guards(self) -> list[GuardViolation]:
@@ -155,13 +167,12 @@ class BenchMonitor:
         return violations
 
     def _snapshot(self) -> BenchSnapshot:
-        assert self._chamber is not None
         t_s = self._recorder.t_s()
         return BenchSnapshot(
             t_s=t_s,
-            chamber_c=self._chamber.temperature_c,
-            setpoint_c=self._chamber.setpoint_c,
-            alarms=self._chamber.alarms,
+            chamber_c=self.air_c,
+            setpoint_c=self.air_setpoint_c,
+            alarms=() if self._chamber is None else self._chamber.alarms,
             gyro_c=self._gyro_c,
             silent_s=self.links.silent_s(t_s),
             taking_readings=self._taking_readings,
@@ -171,10 +182,12 @@ class BenchMonitor:
         )
 
     def _poll_chamber(self) -> bool:
-        """Read the chamber; returns whether it answered."""
-        name = self._bench.chamber.name
+        """Read the chamber; returns whether it answered. Without one the units are all of the environment."""
+        if (chamber := self._bench.air_chamber) is None:
+            return True
+        name = chamber.name
         try:
-            self._chamber = self._bench.chamber.read()
+            self._chamber = chamber.read()
         except LinkError as error:
             self._note_silence(name, error)
             return False

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
-from typing import Any
+from typing import Any, Literal
 
 from instruments.clock import Clock
 from procedures.contracts.campaign_state import CampaignState
@@ -15,6 +15,18 @@ from procedures.contracts.operator import Prompt
 from procedures.monitoring.live_output import LiveOutput
 from procedures.monitoring.step_text import describe_step
 from procedures.planning.plan import Plan
+
+
+@dataclass(frozen=True)
+class TurnProgress:
+    """A turn by hand at one moment."""
+
+    position: str  #: the axis that points up
+    asked_deg: float  #: positive counter-clockwise seen from above
+    phase: Literal["rest", "turn"]  #: what the units are to do now
+    attempt: int  #: from 1
+    came_deg: Mapping[str, float] = field(default_factory=dict)  #: unit -> what has come out so far
+    refused: str = ""  #: why the attempt before was refused
 
 
 @dataclass(frozen=True)
@@ -34,6 +46,7 @@ class Progress:
     gyro_c: Mapping[str, float] = field(default_factory=dict)
     rate_dps: float = 0.0
     prompt: Prompt | None = None  #: the question that waits for a person
+    turn: TurnProgress | None = None  #: the turn by hand that is under way
     links: Mapping[str, str] = field(default_factory=dict)  #: devices that are not well: degraded or lost
     dropped: Mapping[str, str] = field(default_factory=dict)  #: units that take no further part, and why
     last_error: str = ""

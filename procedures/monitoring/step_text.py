@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 from procedures.contracts.steps import (
     Acquire,
     CheckHome,
@@ -12,32 +15,30 @@ from procedures.contracts.steps import (
     PowerOff,
     PowerOn,
     Rest,
+    SafeState,
     Soak,
     Step,
+    Turn,
 )
 
 
 def describe_step(step: Step, datasets: int) -> str:
     """Return what a step does, with its values; `datasets` is the number of data sets of the plan."""
-    text = "safe state"
-    match step:
-        case Acquire():
-            where = f"at {step.temperature_c:g} deg C, {step.position} up"
-            text = f"data set {step.dataset} of {datasets}: {step.rate_dps:+g} deg/s {where}"
-        case Soak():
-            text = f"soak at {step.temperature_c:g} deg C for {step.hold_s / 60:g} min"
-        case MoveChamber():
-            text = f"chamber to {step.temperature_c:g} deg C"
-        case Mount():
-            text = f"turn the units: {step.position} up"
-        case PowerOn() | PowerOff():
-            text = f"switch the units {'on' if isinstance(step, PowerOn) else 'off'}, session {step.run}"
-        case Home():
-            text = "home the table"
-        case MeasureClock():
-            text = f"measure the step clock of the table at {step.rate_dps:g} deg/s"
-        case CheckHome():
-            text = f"look for missed steps at {step.temperature_c:g} deg C"
-        case Rest():
-            text = f"rest for {step.duration_s:g} s"
-    return text
+    text = _TEXTS[type(step)](step)
+    return f"data set {step.dataset} of {datasets}: {text}" if isinstance(step, Acquire | Turn) else text
+
+
+_TEXTS: Mapping[type[Step], Callable[[Any], str]] = {
+    Acquire: lambda step: f"{step.rate_dps:+g} deg/s at {step.temperature_c:g} deg C, {step.position} up",
+    Turn: lambda step: f"{step.turn_deg:+g} deg by hand, {step.position} up",
+    Soak: lambda step: f"soak at {step.temperature_c:g} deg C for {step.hold_s / 60:g} min",
+    MoveChamber: lambda step: f"chamber to {step.temperature_c:g} deg C",
+    Mount: lambda step: f"turn the units: {step.position} up",
+    PowerOn: lambda step: f"switch the units on, session {step.run}",
+    PowerOff: lambda step: f"switch the units off, session {step.run}",
+    Home: lambda _: "home the table",
+    MeasureClock: lambda step: f"measure the step clock of the table at {step.rate_dps:g} deg/s",
+    CheckHome: lambda step: f"look for missed steps at {step.temperature_c:g} deg C",
+    Rest: lambda step: f"rest for {step.duration_s:g} s",
+    SafeState: lambda _: "safe state",
+}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from procedures.contracts.bench import Bench
 from procedures.contracts.errors import PlanRefused
 from procedures.recipe.recipe import Recipe
 
+NEEDS = "Name a bench with both, or choose a recipe with [turns], such as by-hand, which needs neither."
 ADVICE = "Change the recipe, or plan with --clip to leave these points out."
 
 
@@ -20,8 +22,8 @@ ADVICE = "Change the recipe, or plan with --clip to leave these points out."
 class BenchLimits:
     """What the table, the chamber and every unit may be asked for."""
 
-    table: TableLimits
-    chamber: ChamberLimits
+    table: TableLimits | None  #: absent for a bench without one, and so below
+    chamber: ChamberLimits | None
     gyros: Mapping[str, GyroLimits]
     achievable_dps: Callable[[float], float] | None = None  #: the rate a table would really run (step quantisation)
 
@@ -29,18 +31,34 @@ class BenchLimits:
     def of(cls, bench: Bench) -> BenchLimits:
         """Return the limits of an opened bench."""
         units = {name: gyro.limits for name, gyro in bench.gyros.items()}
-        return cls(bench.table.limits, bench.chamber.limits, units, bench.table.achievable_dps)
+        chamber = None if bench.chamber is None else bench.chamber.limits
+        if bench.table is None:
+            return cls(None, chamber, units)
+        return cls(bench.table.limits, chamber, units, bench.table.achievable_dps)
+
+    @property
+    def max_acceleration_dps2(self) -> float:
+        """Largest acceleration of the table, deg/s^2; infinite without one."""
+        return math.inf if self.table is None else self.table.max_acceleration_dps2
+
+    @property
+    def ramp_c_per_min(self) -> float:
+        """Fastest ramp of the chamber's air; infinite without one."""
+        return math.inf if self.chamber is None else self.chamber.ramp_c_per_min
 
     def rate_complaint(self, rate_dps: float, max_error_fraction: float) -> str | None:
         """Return why the table or a unit cannot do a rate, or None."""
         complaints = [
             f"the {limit:g} deg/s of {owner}"
-            for owner, limit in [("the table", self.table.max_rate_dps), *_unit_rates(self.gyros)]
+            for owner, limit in [*self._table_rate(), *_unit_rates(self.gyros)]
             if abs(rate_dps) > limit
         ]
         if complaints:
             return "beyond " + " and ".join(complaints)
         return self._quantisation_complaint(rate_dps, max_error_fraction)
+
+    def _table_rate(self) -> list[tuple[str, float]]:
+        return [] if self.table is None else [("the table", self.table.max_rate_dps)]
 
     def _quantisation_complaint(self, rate_dps: float, max_error_fraction: float) -> str | None:
         if self.achievable_dps is None or rate_dps == 0:
@@ -55,7 +73,7 @@ class BenchLimits:
 
     def temperature_complaint(self, temperature_c: float) -> str | None:
         """Return why the chamber or a unit cannot stand a temperature, or None."""
-        ranges = [("the chamber", self.chamber.min_c, self.chamber.max_c)]
+        ranges = [] if self.chamber is None else [("the chamber", self.chamber.min_c, self.chamber.max_c)]
         ranges += [(f"unit {name}", unit.min_c, unit.max_c) for name, unit in self.gyros.items()]
         complaints = [
             f"the {low:g} to {high:g} deg C of {owner}"
@@ -73,12 +91,25 @@ def _unit_rates(gyros: Mapping[str, GyroLimits]) -> list[tuple[str, float]]:
     return [(f"unit {name}", unit.max_rate_dps) for name, unit in gyros.items()]
 
 
+def missing_instruments(recipe: Recipe, limits: BenchLimits) -> tuple[str, ...]:
+    """Return which instruments a recipe needs and the bench does not have, each in words."""
+    if recipe.turns is not None:
+        return ()
+    table = () if limits.table is not None else ("rates_dps: it needs a rate table, and the bench has none",)
+    chamber = () if limits.chamber is not None else ("temperatures_c: it needs a chamber, and the bench has none",)
+    return (*table, *chamber)
+
+
 def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Recipe, tuple[str, ...]]:
     """Return the recipe as this bench can run it, and what was left out.
 
     Raises PlanRefused naming every point beyond a limit; with `clip` only when a needed list would become empty or the
     temperature at which units are handled is out of reach.
     """
+    if missing := missing_instruments(recipe, limits):
+        raise PlanRefused(recipe.name, missing, NEEDS)
+    if recipe.turns is not None:
+        return recipe, ()
     values = recipe.model_dump()
     beyond: list[str] = []
     empty: list[str] = []

@@ -23,9 +23,11 @@ from procedures.contracts.steps import (
     SafeState,
     Soak,
     Step,
+    Turn,
 )
 from procedures.planning.limits import BenchLimits, fit_to_bench
 from procedures.planning.step_writer import write_steps
+from procedures.planning.turn_steps import DATA_SETS_OF_TURN
 from procedures.recipe.recipe import Recipe
 
 MOST_DATASETS = 100_000  #: half a year of data sets of two minutes
@@ -50,7 +52,8 @@ class Plan(BaseModel):
     @property
     def datasets(self) -> int:
         """How many data sets the plan takes."""
-        return sum(isinstance(step, Acquire) for step in self.steps)
+        turns = sum(isinstance(step, Turn) for step in self.steps)
+        return sum(isinstance(step, Acquire) for step in self.steps) + DATA_SETS_OF_TURN * turns
 
     @property
     def schedule_hash(self) -> str:
@@ -72,7 +75,7 @@ class Plan(BaseModel):
         For resuming a campaign in the middle. The mounting is unchanged, so no Mount is among them. What the
         step does itself is not done before it: no temperature before one that sets another.
         """
-        if index >= len(self.steps) or isinstance(self.steps[index], SafeState):
+        if index >= len(self.steps) or isinstance(self.steps[index], SafeState) or not self._drives:
             return ()
         before = self.steps[:index]
         home: tuple[Step, ...] = (Home(), *(step for step in before if isinstance(step, MeasureClock)))
@@ -92,6 +95,11 @@ class Plan(BaseModel):
                 break
         return (*home, *(each for each in (move, soak) if each is not None))
 
+    @property
+    def _drives(self) -> bool:
+        """Whether a table and a chamber are driven."""
+        return any(isinstance(step, Home | MoveChamber) for step in self.steps)
+
     def mounted_at(self, index: int) -> str | None:
         """Return the position in which the units are before step `index`; None when they have not been turned yet."""
         mounts = [step.position for step in self.steps[:index] if isinstance(step, Mount)]
@@ -105,12 +113,14 @@ class Plan(BaseModel):
         mount = self.steps[index]
         assert isinstance(mount, Mount)
         of_it = [
-            n for n, step in enumerate(self.steps) if isinstance(step, Acquire) and step.mounting == mount.mounting
+            n
+            for n, step in enumerate(self.steps)
+            if isinstance(step, Acquire | Turn) and step.mounting == mount.mounting
         ]
         end = max(of_it, default=index)
-        later = next((step for step in self.steps[end + 1 :] if isinstance(step, PowerOn | Acquire)), None)
-        kinds: tuple[type, ...] = (Acquire, CheckHome, Soak, MoveChamber, Rest)
-        kinds = kinds if isinstance(later, Acquire) else (*kinds, PowerOn, PowerOff)
+        later = next((step for step in self.steps[end + 1 :] if isinstance(step, PowerOn | Acquire | Turn)), None)
+        kinds: tuple[type, ...] = (Acquire, Turn, CheckHome, Soak, MoveChamber, Rest)
+        kinds = kinds if isinstance(later, Acquire | Turn) else (*kinds, PowerOn, PowerOff)
         return tuple(n for n in range(index + 1, end + 1) if isinstance(self.steps[n], kinds))
 
     def run_at(self, index: int, skipped: frozenset[int] = frozenset()) -> int:
@@ -146,6 +156,8 @@ def _refuse_endless(recipe: Recipe) -> None:
         asked += len(recipe.positions) * len(recipe.inverted.temperatures_c) * len(recipe.inverted.rates_dps)
     if recipe.power_cycle is not None:
         asked += recipe.power_cycle.count * len(recipe.power_cycle.rates_dps)
+    if recipe.turns is not None:
+        asked = DATA_SETS_OF_TURN * len(recipe.positions) * len(recipe.turns.turns_deg) * recipe.turns.repeats
     if asked > MOST_DATASETS:
         text = f"about {asked} data sets, where a campaign has at most {MOST_DATASETS}"
         raise PlanRefused(recipe.name, [text], "Ask for fewer rates, temperatures or repeats.")

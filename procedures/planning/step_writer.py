@@ -19,6 +19,7 @@ from procedures.contracts.steps import (
 )
 from procedures.planning.limits import BenchLimits
 from procedures.planning.point_order import Level, MountingBlock, order_points
+from procedures.planning.turn_steps import turn_steps
 from procedures.recipe.recipe import Recipe
 
 # What is expected of things that have no limit to compute with; only the forecast hangs on them.
@@ -32,6 +33,8 @@ MOUNTING_S = 600.0  #: a person walks up, turns the units and confirms
 
 def write_steps(recipe: Recipe, limits: BenchLimits) -> tuple[Step, ...]:
     """Return the steps of a recipe that fits its bench, in order."""
+    if recipe.turns is not None:
+        return tuple(turn_steps(recipe, recipe.turns))
     writer = _StepWriter(recipe, limits)
     writer.write()
     return tuple(writer.steps)
@@ -67,15 +70,16 @@ class _StepWriter:
     def measure_clock(self) -> None:
         """Measure the step clock at the largest rate of the recipe, where the table does that."""
         rate_dps = max((abs(rate) for rate in self.recipe.rates_dps), default=0.0)
-        longer_s = self.limits.table.clock_run_s
-        if longer_s and rate_dps:
-            ramps_s = 4 * rate_dps / self.limits.table.max_acceleration_dps2
-            expected_s = 2 * CLOCK_SHORT_S + longer_s + ramps_s
+        table = self.limits.table
+        if table is not None and table.clock_run_s and rate_dps:
+            ramps_s = 4 * rate_dps / table.max_acceleration_dps2
+            expected_s = 2 * CLOCK_SHORT_S + table.clock_run_s + ramps_s
             self.steps.append(MeasureClock(rate_dps=rate_dps, short_s=CLOCK_SHORT_S, expected_s=expected_s))
 
     def check_home(self, level: Level) -> None:
         """Look for missed steps, where the table does that and turns at this level."""
-        if self.limits.table.checks_home and any(level.rates_dps):
+        table = self.limits.table
+        if table is not None and table.checks_home and any(level.rates_dps):
             self.steps.append(CheckHome(temperature_c=level.temperature_c, expected_s=CHECK_S))
 
     def mount(self, block: MountingBlock) -> None:
@@ -101,7 +105,7 @@ class _StepWriter:
     def move_chamber(self, temperature_c: float) -> None:
         rules = self.recipe.soak
         way_c = abs(temperature_c - self.air_c)
-        expected_s = 60.0 * way_c / self.limits.chamber.ramp_c_per_min
+        expected_s = 60.0 * way_c / self.limits.ramp_c_per_min
         if way_c > rules.band_c:
             expected_s += CHAMBER_SETTLING_S
         self.air_c = temperature_c
@@ -133,7 +137,7 @@ class _StepWriter:
             self.datasets += 1
             real_dps = self.limits.real_rate_dps(rate_dps)
             duration_s = planned_duration_s(self.recipe, real_dps)
-            ramps_s = 2 * abs(real_dps) / self.limits.table.max_acceleration_dps2
+            ramps_s = 2 * abs(real_dps) / self.limits.max_acceleration_dps2
             self.steps.append(
                 Acquire(
                     dataset=self.datasets,

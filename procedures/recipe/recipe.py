@@ -8,7 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from instruments.toml_documents import listed, parse_toml, read_toml_text, shown
 from procedures.contracts.errors import RecipeError
@@ -28,19 +29,31 @@ from procedures.recipe.rules import (
     Table,
     Whole,
 )
+from procedures.recipe.turns import TurnRules
 
 #: A key that is not known is shown up to here.
 LONGEST_KEY = 80
 
 
+#: What a recipe of turns by hand has no use for: no table and no chamber is driven.
+_OF_RATES = (
+    "temperatures_c", "rates_dps", "order", "temperature_order", "rate_order", "repeats", "soak", "acquire",
+    "replicates", "inverted", "power_cycle", "profiles",
+)  # fmt: skip
+
+
 class Recipe(Table):
-    """Which temperatures, rates and positions, in which order, and how carefully."""
+    """Which temperatures, rates and positions, in which order, and how carefully.
+
+    With `turns` a person turns the units by hand in each position, and neither a table nor a chamber is needed.
+    """
 
     format: Literal["labctl-recipe/1"] = "labctl-recipe/1"
     name: str = Field(min_length=1)
     description: str = ""
-    temperatures_c: tuple[Number, ...] = Field(min_length=1)
-    rates_dps: tuple[Number, ...] = Field(min_length=1)
+    turns: TurnRules | None = None  #: instead of temperatures and rates
+    temperatures_c: tuple[Number, ...]
+    rates_dps: tuple[Number, ...]
     positions: tuple[Position, ...] = Field(min_length=1)  #: body axis along the table axis, up
     order: Literal["position-major", "temperature-major"] = "position-major"
     #: "up_down": every second temperature on the way up, the others on the way down
@@ -59,6 +72,26 @@ class Recipe(Table):
     guards: GuardRules = GuardRules()
     on_failure: OnFailure = OnFailure()
     resume: ResumeRules = ResumeRules()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_rates(cls, given: Any) -> Any:
+        """Give a recipe of turns no rates and no temperatures."""
+        if isinstance(given, dict) and given.get("turns") is not None:
+            return {"temperatures_c": (), "rates_dps": (), **given}
+        return given
+
+    @field_validator(*_OF_RATES)
+    @classmethod
+    def _of_rates(cls, value: object, info: ValidationInfo) -> object:
+        """Refuse what a recipe of turns has no use for, and a recipe of rates without any."""
+        listed = info.field_name in {"temperatures_c", "rates_dps"}
+        if info.data.get("turns") is not None:
+            if value != (() if listed else cls.model_fields[info.field_name or ""].default):
+                raise ValueError("it is for a table and a chamber; a recipe with [turns] drives neither: remove it")
+        elif listed and "turns" in info.data and not value:
+            raise PydanticCustomError("too_short", "Tuple should have at least 1 item after validation, not 0")
+        return value
 
 
 def shipped_recipes() -> dict[str, Path]:

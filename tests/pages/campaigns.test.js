@@ -39,6 +39,7 @@ const timeline = {
   expected_s: [600, 100, 100],
   temperature_c: [20, 20, 20],
   rate_dps: [null, 10, -10],
+  turn_deg: [null, null, null],
   position: ["x", "x", "-x"],
   dataset: [null, 1, 2],
 };

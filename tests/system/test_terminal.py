@@ -28,6 +28,7 @@ class Terminal:
         self.ours, theirs = pty.openpty()
         self.stdin = os.fdopen(theirs, encoding="utf-8")
         self._answer = answer
+        self.shown: list[str] = []
         monkeypatch.setattr("sys.stdin", self.stdin)
         monkeypatch.setattr(terminal_operator.stderr, "print", self._shown)
 
@@ -35,6 +36,7 @@ class Terminal:
         os.write(self.ours, text.encode())
 
     def _shown(self, text: str, **_: Any) -> None:
+        self.shown.append(text)
         if "Press Enter" in text:
             self.type(self._answer)
 
@@ -62,6 +64,22 @@ def test_an_enter_from_before_the_question_is_no_answer_to_it(terminal: Callable
     assert answer is not None
     assert (answer.confirmed, answer.reason, answer.by) == (False, "the key is missing", os_user())
     assert "cannot be done; the key is missing" in noted[0]
+
+
+def test_a_turn_may_be_wanted_again_and_says_its_time_limit(
+    terminal: Callable[[str], Terminal],
+) -> None:
+    typing = terminal("Again\n")
+    operator, noted = HumanOperator(), []
+    turn = Prompt("q2", "turn", "turn by 360 deg", "x", 360.0, within_s=300.0)
+    operator.ask(turn)
+    TerminalOperator._put(operator, turn, noted.append)
+    answer = operator.answer("q2")
+    assert answer is not None
+    assert (answer.confirmed, answer.again) == (False, True)
+    assert noted == ["q2: to be asked again; turn by 360 deg"]
+    assert "again to be asked for the turn again" in typing.shown[0]
+    assert "Time limit: 300 s." in typing.shown[0]
 
 
 def test_an_answer_is_noted_in_the_name_of_whoever_gave_the_command(terminal: Callable[[str], Terminal]) -> None:

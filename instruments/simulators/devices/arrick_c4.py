@@ -32,7 +32,7 @@ class SimulatedC4:
     """A C4 controller with one motor, on the world's table."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
-        table = part_of(setup.bench.table, ArrickC4Settings)
+        table = part_of(setup.instrument("table"), ArrickC4Settings)
         self._world, self._faults = setup.world, setup.faults
         self._byte_s = BITS_PER_BYTE / table.baudrate
         self._clock_hz = table.step_clock_hz

@@ -17,6 +17,14 @@ class SimulatedUnitHandler:
         """Control the world: turn its units."""
         self._world.mount(self._clock.now_s(), position)
 
+    def turn(self, position: str, turn_deg: float) -> None:
+        """Control the world: have its units turned by its hand."""
+        self._world.turn_by_hand(self._clock.now_s(), position, turn_deg)
+
+    def is_turning(self) -> bool:
+        """Get whether the hand still turns."""
+        return self._world.hand.is_turning(self._clock.now_s())
+
     def power(self, on: bool) -> None:
         """Control the world: switch its units on or off."""
         self._world.power(self._clock.now_s(), on)

@@ -17,7 +17,7 @@ class SimulatedF4(ModbusDevice):
     """Signed counts with implied decimals; the settings of its front panel are attributes."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
-        chamber = part_of(setup.bench.chamber, WatlowSettings)
+        chamber = part_of(setup.instrument("chamber"), WatlowSettings)
         self._world = setup.world
         self.model = f4.MODEL_F4
         self.decimals = 1

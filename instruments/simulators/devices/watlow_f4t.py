@@ -23,7 +23,7 @@ class SimulatedF4T(ModbusDevice):
     """Low word first unless the bench file says otherwise; the settings of its front panel are attributes."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
-        chamber = part_of(setup.bench.chamber, WatlowSettings)
+        chamber = part_of(setup.instrument("chamber"), WatlowSettings)
         self._world = setup.world
         self._order: WordOrder = chamber.word_order
         part = str(setup.world.settings.chamber.get("part_number", PART_NUMBER))

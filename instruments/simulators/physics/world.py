@@ -16,6 +16,7 @@ from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
 from instruments.simulators.hidden import HiddenEffect, State, hidden_effects
 from instruments.simulators.physics.ambient import humidity_pct, supply_wander_v
 from instruments.simulators.physics.earth import BodyFrame, EarthRotation
+from instruments.simulators.physics.hand_motion import HandMotion
 from instruments.simulators.physics.instability import BiasInstability
 from instruments.simulators.physics.motion import TableMotion
 from instruments.simulators.physics.profile_motion import ProfileMotion
@@ -23,6 +24,9 @@ from instruments.simulators.physics.thermal import Body, Heat
 from instruments.simulators.physics.unit_profiles import UnitTruth, make_unit, usual_rate_hz
 
 Array = NDArray[np.float64]
+
+#: Of the table and the chamber that a bench does not have: neither ever moves.
+USUAL_STEPS_PER_TURN, USUAL_RAMP_C_PER_MIN = 1600, 1.67
 
 
 @dataclass(frozen=True)
@@ -52,10 +56,11 @@ class World:
         latitude_deg = settings.latitude_deg if settings.latitude_deg is not None else bench.latitude_deg
         self._earth = EarthRotation(latitude_deg, self.north_deg)
         self.table = TableMotion(
-            bench.table.steps_per_turn,
+            USUAL_STEPS_PER_TURN if bench.table is None else bench.table.steps_per_turn,
             step_error_deg=number(settings.table, "step_error_deg", 0.0225),
             gear_error_deg=number(settings.table, "gear_error_deg", 0.0),
         )
+        self.hand = HandMotion(settings.hand, self.table, [settings.seed, settings.noise_seed, zlib.crc32(b"hand")])
         self._profile: ProfileMotion | None = None
         self._encoder_noise_deg = number(settings.table, "encoder_noise_deg", 0.0)
         self._encoder_late_s = number(settings.table, "encoder_late_s", 0.0)
@@ -70,7 +75,7 @@ class World:
         }
         self.heat = Heat(
             start_c,
-            bench.chamber.ramp_c_per_min,
+            USUAL_RAMP_C_PER_MIN if bench.chamber is None else bench.chamber.ramp_c_per_min,
             number(settings.chamber, "air_tau_s", 180.0),
             bodies,
             number(settings.chamber, "noise_c", 0.02),
@@ -97,9 +102,11 @@ class World:
         self._profile = None
 
     @property
-    def motion(self) -> TableMotion | ProfileMotion:
-        """What moves the units: the stepper, or a course of rates that the table follows."""
-        return self._profile or self.table
+    def motion(self) -> TableMotion | ProfileMotion | HandMotion:
+        """What moves the units: the stepper, a course of rates that the table follows, or a hand."""
+        if self._profile is not None:
+            return self._profile
+        return self.hand if self.hand.has_turned else self.table
 
     def encoder_rates_dps(self, t_s: Array, period_s: float) -> Array:
         """Return the mean rates by the table's encoder over the periods that end at times (n,) s, in one row.
@@ -120,6 +127,10 @@ class World:
         """Turn every unit so that body axis `position` points up along the table axis."""
         self.position = position
         self.mounting += 1
+
+    def turn_by_hand(self, t_s: float, position: str, turn_deg: float) -> None:
+        """Have the hand turn every unit by an angle, deg, about body axis `position`, which points up."""
+        self.position = self.hand.turn(t_s, position, turn_deg)
 
     def power(self, t_s: float, on: bool) -> None:
         """Switch the power of every unit."""

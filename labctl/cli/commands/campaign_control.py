@@ -11,6 +11,7 @@ from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json
 from labctl.cli.output import console, print_json
 from labctl.cli.printing.campaigns import print_campaign, print_end
+from labctl.cli.turn_text import turn_text
 
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse
@@ -38,7 +39,7 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
     from labctl.cli.progress_bar import CampaignProgress
     from labctl.services.commands.open import current_status
 
-    clock, asked, fault = SystemClock(), "", ""
+    clock, asked, fault, turned = SystemClock(), "", "", ""
     with one_clear_line(), CampaignProgress(quiet=as_json) as progress:
         while True:
             answer = current_status(database, campaign)
@@ -46,6 +47,9 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
             if not as_json and answer.prompt is not None and answer.prompt.id != asked:
                 asked = answer.prompt.id
                 console.print(f"question {asked}: {answer.prompt.text}", style="yellow", markup=False)
+            if not as_json and (text := turn_text(answer)) and text != turned:
+                turned = text
+                console.print(text, markup=False)
             if not as_json and answer.last_error and answer.last_error != fault:
                 fault = answer.last_error
                 console.print(f"fault: {fault}", style="red", markup=False)
@@ -154,11 +158,15 @@ def confirm(
     decline: Annotated[
         str | None, typer.Option("--decline", metavar="WHY", help="It cannot be done; the campaign ends.")
     ] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Of a turn by hand: it did not go well and is to be asked again.")
+    ] = False,
     by: By = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
     """Answer a campaign's question: done, or cannot be done. An answer to an older question is refused."""
+    from labctl.errors import BadInput
     from labctl.services.commands.open import current_status, execute
     from labctl.services.commands.registry import CONFIRM_PROMPT
     from labctl.services.commands.requests import ToCampaign
@@ -166,7 +174,11 @@ def confirm(
 
     with one_clear_line():
         wanted = campaign if campaign is not None else current_status(database, None).id
-        request = ConfirmRequest(prompt=prompt, by=person(by), confirmed=decline is None, reason=decline or "")
+        if again and decline is not None:
+            raise BadInput("--again and --decline answer the same question; give one of them")
+        request = ConfirmRequest(
+            prompt=prompt, by=person(by), confirmed=decline is None and not again, again=again, reason=decline or ""
+        )
         answer = execute(database, CONFIRM_PROMPT, ToCampaign(wanted, request))
     print_json(answer) if as_json else print_campaign(answer)
 

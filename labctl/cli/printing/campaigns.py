@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from labctl.cli.output import console, format_number, print_json, table
+from labctl.cli.turn_text import turn_text
 from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 
 if TYPE_CHECKING:
@@ -85,8 +86,7 @@ def print_campaign(answer: CampaignResponse) -> None:
             f"  chamber {format_number(answer.chamber_c)} deg C, gyro {format_number(answer.gyro_c)} deg C, "
             f"table {format_number(answer.rate_dps)} deg/s"
         )
-    if answer.prompt is not None:
-        console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow", markup=False)
+    _print_question(answer)
     if answer.wish is not None:
         console.print(f"  {answer.wish} was requested and will be carried out", style="yellow", markup=False)
     for device, state in answer.links.items():
@@ -100,6 +100,14 @@ def print_campaign(answer: CampaignResponse) -> None:
     _print_advice(answer)
     for serial, recording in answer.recordings.items():
         console.print(f"  recording {recording}: {serial}", markup=False)
+
+
+def _print_question(answer: CampaignResponse) -> None:
+    """Print what a person is asked, and how far a turn by hand has come."""
+    if text := turn_text(answer):
+        console.print(f"  {text}", markup=False)
+    if answer.prompt is not None:
+        console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow", markup=False)
 
 
 def _print_advice(answer: CampaignResponse) -> None:

@@ -31,7 +31,9 @@ def shipped() -> list[ShippedBench]:
     for name, path in shipped_benches().items():
         bench = load_bench(str(path))
         units = ", ".join(f"{gyro.serial} ({gyro.driver})" for gyro in bench.gyros)
-        found.append(ShippedBench(name=name, text=f"{bench.table.driver}, {bench.chamber.driver}, {units}"))
+        found.append(
+            ShippedBench(name=name, text=", ".join([*(each.driver for each in bench.instruments.values()), units]))
+        )
     return found
 
 

@@ -36,9 +36,18 @@ class Confirming(Protocol):
         ...
 
 
+#: What a check is about: without it there is nothing to be confirmed.
+ABOUT: Mapping[BenchCheck, str] = {"chamber_clear": "chamber", "table_free": "table", "limiter_on": "chamber"}
+
+
 def start_questions(bench: BenchFile) -> dict[str, str]:
-    """Return what a person is asked before a campaign starts on a bench: check -> question; nothing if simulated."""
-    return {} if bench.is_simulated else {check: QUESTIONS[check] for check in BENCH_CHECKS}
+    """Return what a person is asked before a campaign starts on a bench: check -> question.
+
+    Nothing for a simulated bench, and for one without table and chamber: nothing moves or heats there by itself.
+    """
+    if bench.is_simulated:
+        return {}
+    return {check: QUESTIONS[check] for check in BENCH_CHECKS if ABOUT[check] in bench.instruments}
 
 
 def confirmation_text(bench: BenchFile, request: Confirming) -> str:
@@ -46,9 +55,9 @@ def confirmation_text(bench: BenchFile, request: Confirming) -> str:
 
     Raises StartNotConfirmed.
     """
-    if bench.is_simulated:
-        return ""
     questions = start_questions(bench)
+    if not questions:
+        return ""
     by = request.confirmed_by.strip()
     missing = {check: text for check, text in questions.items() if not by or check not in request.checks}
     if missing:
@@ -59,4 +68,4 @@ def confirmation_text(bench: BenchFile, request: Confirming) -> str:
             " and `checks`, or name the person with --clear-confirmed-by NAME",
             missing,
         )
-    return f"{', '.join(STATEMENTS[check] for check in BENCH_CHECKS)}: confirmed by {by}"
+    return f"{', '.join(STATEMENTS[check] for check in BENCH_CHECKS if check in questions)}: confirmed by {by}"

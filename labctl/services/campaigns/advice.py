@@ -59,6 +59,11 @@ FAILURES: tuple[Failure, ...] = (
         f"Remove what prevents it, {RESUME} and answer its question.",
     ),
     Failure(
+        r"^the turn by .* was refused \d+ times",
+        "A turn by hand was refused again and again.",
+        f"Compare what came out with what was asked, check axis, sense and unit, {RESUME} and turn again.",
+    ),
+    Failure(
         r"(?:\w+ answered|no answer) within",
         "The bench's question was not answered in time.",
         f"Choose a time when a person is at the bench, {RESUME} and answer its question.",

@@ -33,7 +33,7 @@ from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.control import Control
 from procedures.contracts.errors import StalePrompt
-from procedures.contracts.operator import HumanOperator
+from procedures.contracts.operator import Answer, HumanOperator
 from procedures.execution.signals import ignore_signals
 from procedures.monitoring.progress import Progress
 
@@ -198,10 +198,7 @@ class BenchRunner:
             raise StalePrompt(
                 f"question {request.prompt!r} is not asked: this bench turns its units itself; send no answer"
             )
-        if request.confirmed:
-            operator.confirm(request.prompt, request.by)
-        else:
-            operator.decline(request.prompt, request.by, request.reason or "no reason given")
+        operator.reply(Answer(request.prompt, request.confirmed, request.by, request.reason, request.again))
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     def _running(self, campaign: int) -> CampaignJob:

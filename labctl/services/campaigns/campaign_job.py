@@ -28,5 +28,6 @@ class CampaignJob:
 
     def stop_if_stuck(self) -> None:
         """Stop the table from here where the engine does not see an abort because it waits for its database."""
-        if not self.control.is_heard(HEARD_WITHIN_S):
-            self.lending.stop(self.prepared.bench.table, self.prepared.clock, STUCK_S)
+        table = self.prepared.bench.table
+        if table is not None and not self.control.is_heard(HEARD_WITHIN_S):
+            self.lending.stop(table, self.prepared.clock, STUCK_S)

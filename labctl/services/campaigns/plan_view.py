@@ -18,6 +18,7 @@ from labctl.services.schemas.plans import (
     StepState,
 )
 from labctl.store import StepRow, Store
+from procedures.planning.turn_steps import DATA_SETS_OF_TURN
 from procedures.recipe.recipe import Recipe
 
 
@@ -36,7 +37,8 @@ def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
     return CampaignPlanResponse(
         campaign=campaign, recipe=row.recipe_name, text=_text(row.recipe), bench=row.bench_name, state=row.state,
         schedule_hash=row.schedule_hash, steps=len(steps),
-        datasets=sum(number is not None for number in columns.dataset), expected_s=row.expected_s,
+        datasets=sum(DATA_SETS_OF_TURN if step.kind == "turn" else 1 for step in steps if "dataset" in step.body),
+        expected_s=row.expected_s,
         timeline=timeline,
     )  # fmt: skip
 

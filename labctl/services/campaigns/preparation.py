@@ -131,15 +131,12 @@ def prepare(
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:
-        bench.table.identify()
-        bench.chamber.identify()
-        if bench.table.is_moving():  # the process that drove it was killed, and a move continues
-            _rest(bench, clock)
+        _identify_at_rest(bench, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
         identities = {name: gyro.identify() for name, gyro in bench.gyros.items()}
         said = {name: dict(found.reported) for name, found in identities.items() if found.reported}
         bench_file = bench_file.model_copy(update={"reported": said})
-        units = tuple(_unit(gyro, identities[name], bench_file, clock) for name, gyro in bench.gyros.items())
+        units = tuple(_unit(gyro, identities[name], bench_file, clock, recipe) for name, gyro in bench.gyros.items())
         new = NewCampaign(
             recipe_name=recipe.name,
             recipe=plan.recipe.model_dump(mode="json"),
@@ -164,12 +161,21 @@ def prepare(
         raise
 
 
-def _rest(bench: Bench, clock: Clock) -> None:
-    if complaint := stop_table(bench.table, clock):
-        raise InstrumentError(bench.table.name, complaint)
+def _identify_at_rest(bench: Bench, clock: Clock) -> None:
+    """Make sure that the right table and chamber answer, as far as the bench has them, and that the table is at rest.
+
+    It may move where the process that drove it was killed. Raises InstrumentError.
+    """
+    table, chamber = bench.table, bench.chamber
+    if table is not None:
+        table.identify()
+    if chamber is not None:
+        chamber.identify()
+    if table is not None and table.is_moving() and (complaint := stop_table(table, clock)):
+        raise InstrumentError(table.name, complaint)
 
 
-def _unit(gyro: Gyro, identity: GyroIdentity, bench: BenchFile, clock: Clock) -> NewUnit:
+def _unit(gyro: Gyro, identity: GyroIdentity, bench: BenchFile, clock: Clock, recipe: Recipe) -> NewUnit:
     latitude = bench.latitude_deg
     info = RecordingInfo.model_validate(
         {
@@ -177,6 +183,8 @@ def _unit(gyro: Gyro, identity: GyroIdentity, bench: BenchFile, clock: Clock) ->
             "model": identity.model,
             "axes": gyro.axes,
             "kind": "samples",
+            "motion": "rates" if recipe.turns is None else "turns",
+            "turn_common_u": None if recipe.turns is None else recipe.turns.common_u,
             "started_at": clock.utc(),
             "latitude_deg": latitude,
             "sample_rate_hz": gyro.sample_rate_hz,

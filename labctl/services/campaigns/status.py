@@ -18,6 +18,7 @@ from labctl.services.schemas.campaigns import (
     EventResponse,
     OutputResponse,
     PromptResponse,
+    TurnResponse,
 )
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
 from procedures.contracts.campaign_state import ENDED, CampaignState
@@ -50,6 +51,7 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
         last_error=progress.last_error or None,
         wish=None if request is None or state in ENDED else _open_request(request, state),
         prompt=None if prompt is None else PromptResponse(**asdict(prompt)),
+        turn=None if progress.turn is None else TurnResponse(**asdict(progress.turn)),
         links=dict(progress.links),
         dropped=dict(progress.dropped),
         started_at=row.started_at,

@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo
 
 from instruments.bench_config import BenchFile
 from labctl.services.schemas.plans import AttendanceResponse
-from procedures.contracts.steps import Mount, PowerOff, PowerOn
+from procedures.contracts.steps import Mount, PowerOff, PowerOn, Turn
 from procedures.planning.plan import Plan
 
 #: Prompts that follow each other within this are one visit, s.
@@ -31,7 +31,7 @@ def visits_s(plan: Plan, bench: BenchFile) -> list[float]:
     visits: list[float] = []
     start_s, last_s = 0.0, -math.inf
     for step in plan.steps:
-        if isinstance(step, PowerOn | PowerOff | Mount):
+        if isinstance(step, PowerOn | PowerOff | Mount | Turn):
             if start_s - last_s > ONE_VISIT_S:
                 visits.append(start_s)
             last_s = start_s

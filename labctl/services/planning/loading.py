@@ -21,7 +21,7 @@ from labctl.errors import BadBench
 from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.schemas.plans import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
-from procedures.planning.limits import BenchLimits
+from procedures.planning.limits import BenchLimits, missing_instruments
 from procedures.planning.plan import Plan, make_plan
 from procedures.recipe.recipe import Recipe, parse_recipe, read_recipe, shipped_recipes
 
@@ -57,6 +57,8 @@ def own_text(source: str) -> str:
 def recipe_document(recipe: Recipe) -> dict[str, JsonValue]:
     """Return a recipe as a recipe file says it: what it leaves as usual is left out."""
     document = recipe.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    if recipe.turns is not None:
+        document = {key: value for key, value in document.items() if value != []}  # it has no rates
     return {"format": "labctl-recipe/1", "name": recipe.name, **document}
 
 
@@ -93,14 +95,18 @@ def limits_of(bench: BenchFile) -> BenchLimits:
     """Return what a bench's instruments may be asked for, from its file alone."""
     table, chamber = bench.table, bench.chamber
     return BenchLimits(
-        TableLimits(
+        None
+        if table is None
+        else TableLimits(
             table.max_rate_dps,
             table.acceleration_dps2,
             360.0 / table.steps_per_turn,
             clock_run_s=getattr(table, "clock_run_s", 0.0),  # keys of a driver's own model
             checks_home=getattr(table, "check_home", False),
         ),
-        ChamberLimits(chamber.min_c, chamber.max_c, USUAL_RESOLUTION_C, chamber.ramp_c_per_min),
+        None
+        if chamber is None
+        else ChamberLimits(chamber.min_c, chamber.max_c, USUAL_RESOLUTION_C, chamber.ramp_c_per_min),
         {gyro.name: GyroLimits(gyro.max_rate_dps, gyro.min_c, gyro.max_c) for gyro in bench.gyros},
     )
 
@@ -117,7 +123,7 @@ def bench_for(recipe: Recipe) -> str:
     for name, path in shipped_benches().items():
         bench = load_bench(str(path))
         recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
-        if bench.is_simulated and axes <= recorded:
+        if bench.is_simulated and axes <= recorded and not missing_instruments(recipe, limits_of(bench)):
             fitting.append((not _can_do(recipe, bench), len(recorded), -bench.gyros[0].max_rate_dps, name))
     if not fitting:
         raise BadBench(

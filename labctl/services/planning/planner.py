@@ -42,6 +42,7 @@ def _recipe(name: str, text: str, bench: BenchFile | None) -> RecipeResponse:
     remark = _lacking(recipe.positions, on)
     said: dict[str, Any] = {
         "name": name, "description": recipe.description, "text": text, "bench": on.name, "remark": remark,
+        "by_hand": recipe.turns is not None,
     }  # fmt: skip
     try:
         plan = make_plan(recipe, limits_of(on))

@@ -36,6 +36,7 @@ def timeline_columns(steps: Sequence[StepJson]) -> TimelineColumns:
         expected_s=[step["expected_s"] for step in steps],
         temperature_c=temperature_c,
         rate_dps=[step.get("rate_dps") for step in steps],
+        turn_deg=[step.get("turn_deg") for step in steps],
         position=position,
         dataset=[step.get("dataset") for step in steps],
     )

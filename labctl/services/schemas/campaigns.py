@@ -95,6 +95,7 @@ class ConfirmRequest(Request):
     prompt: str = Field(min_length=1)
     by: str = Field(min_length=1, max_length=200)
     confirmed: bool = Field(default=True, description="False: it cannot be done, and the campaign ends.")
+    again: bool = Field(default=False, description="Of a turn by hand: it did not go well and is to be asked again.")
     reason: str = ""
 
 
@@ -115,6 +116,25 @@ class PromptResponse(ResponseModel):
     kind: str
     text: str
     position: str | None = None
+    turn_deg: float | None = Field(
+        default=None, description="Of a turn by hand: its angle, positive counter-clockwise seen from above."
+    )
+    within_s: float | None = Field(
+        default=None, description="How long the answer is waited for, by the campaign's clock; null: no limit."
+    )
+
+
+class TurnResponse(ResponseModel):
+    """The turn by hand that is under way."""
+
+    position: str = Field(description="The body axis that points up, about which the units are turned.")
+    asked_deg: float = Field(description="Positive counter-clockwise seen from above.")
+    phase: Literal["rest", "turn"] = Field(description="What the units are to do now.")
+    attempt: int = Field(description="From 1; a turn that was refused is asked again.")
+    came_deg: dict[str, float] = Field(
+        default_factory=dict, description="Unit -> what has come out so far, by its nominal scale factor."
+    )
+    refused: str = Field(default="", description="Why the attempt before was refused; empty for the first.")
 
 
 class OutputResponse(ResponseModel):
@@ -167,6 +187,7 @@ class CampaignResponse(ResponseModel):
     last_error: str | None = None
     wish: Literal["pause", "abort"] | None = Field(default=None, description="Requested, and not yet carried out.")
     prompt: PromptResponse | None = Field(default=None, description="The question that waits for a person.")
+    turn: TurnResponse | None = Field(default=None, description="Of a campaign that runs here: the turn by hand, now.")
     links: dict[str, str] = Field(default_factory=dict, description="Instruments that answer late or not at all.")
     dropped: dict[str, str] = Field(default_factory=dict, description="Units that take no further part: name -> why.")
     abandoned: bool = Field(default=False, description="No process runs it any more, and it has no end.")

@@ -93,6 +93,7 @@ class RecipeResponse(ResponseModel):
     expected_s: float | None = None
     refused: str | None = Field(default=None, description="Why this bench cannot do it; then there are no figures.")
     remark: str = Field(default="", description="Objections to it although the bench can do it.")
+    by_hand: bool = Field(default=False, description="A person turns the units; no table and no chamber is driven.")
 
 
 class TimelineColumns(ResponseModel):
@@ -104,6 +105,9 @@ class TimelineColumns(ResponseModel):
     expected_s: list[float]
     temperature_c: list[float | None] = Field(description="Set point in force; null: none was set yet.")
     rate_dps: list[float | None] = Field(description="Of data sets; null: the table is at rest.")
+    turn_deg: list[float | None] = Field(
+        description="Of turns by hand, positive counter-clockwise seen from above; null: no turn."
+    )
     position: list[str | None] = Field(description="In which the units are; null: as they were found.")
     dataset: list[int | None]
 

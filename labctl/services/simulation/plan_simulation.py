@@ -27,6 +27,11 @@ ENVIRONMENT_S = 10.0
 
 def simulate(plan: Plan, bench: BenchFile, gyro: GyroSettings) -> Recording:
     """Return the recording that a plan gives in the simulated world, one row per reading. Raises BadInput."""
+    if plan.recipe.turns is not None or bench.table is None or bench.chamber is None:
+        raise BadInput(
+            f"recipe {plan.recipe.name} on bench {bench.name}: turns by hand are not simulated from the plan alone; "
+            "`labctl campaign start` carries them out on a simulated bench, such as by-hand-sim"
+        )
     try:
         walk = _Walk(plan, bench, gyro)
     except ValueError as error:
@@ -46,6 +51,9 @@ class _Walk:
         self._period = 1.0 / self._unit.sample_rate_hz
         self._t = 0.0
         self._power_on_s: float | None = None
+        assert bench.table is not None
+        assert bench.chamber is not None
+        self._table = bench.table
         self._run, self._setpoint = 0, bench.chamber.safe_c
         self._parts: list[dict[str, NDArray[np.generic]]] = []
         self._environment: list[tuple[float, int, float, float, float]] = []
@@ -97,7 +105,7 @@ class _Walk:
         """Let the table follow a course of rates, and read it by its encoder."""
         times = np.arange(0.0, profile.duration_s + profile.step_s / 2, profile.step_s)
         rates = np.array([profile.rate_dps(min(t, profile.duration_s)) for t in times.tolist()])
-        fastest, most = float(np.abs(rates).max()), self._bench.table.max_rate_dps
+        fastest, most = float(np.abs(rates).max()), self._table.max_rate_dps
         if fastest > most:
             raise BadInput(
                 f"recipe {self._plan.recipe.name}: a {profile.kind} goes to {fastest:g} deg/s, the table of bench "
@@ -115,18 +123,16 @@ class _Walk:
 
     def _lead(self, rate_dps: float, step_s: float) -> NDArray[np.float64]:
         """Return the rates from rest to a rate, (k,) deg/s."""
-        steps = int(np.ceil(abs(rate_dps) / self._bench.table.acceleration_dps2 / step_s)) + 1
+        steps = int(np.ceil(abs(rate_dps) / self._table.acceleration_dps2 / step_s)) + 1
         return np.linspace(0.0, rate_dps, steps, endpoint=False)
 
     def _take(self, step: Acquire) -> None:
         table, step_deg = self._world.table, self._world.table.step_deg
         achieved, steady_from = 0.0, self._t
         if step.rate_dps:
-            run = plan_move(
-                part_of(self._bench.table, StepperSettings), step.rate_dps, step.settle_s + step.duration_s + 1.0
-            )
+            run = plan_move(part_of(self._table, StepperSettings), step.rate_dps, step.settle_s + step.duration_s + 1.0)
             achieved = float(np.copysign(run.step_hz * step_deg, step.rate_dps))
-            end_s = table.start(self._t, run.steps, run.step_hz, self._bench.table.acceleration_dps2)
+            end_s = table.start(self._t, run.steps, run.step_hz, self._table.acceleration_dps2)
             steady_from += run.ramp_s
         else:
             end_s = self._t + step.settle_s + step.duration_s

@@ -31,6 +31,8 @@ from procedures.execution.signals import defer_signals
 
 #: Made once: a statement that is built anew for every second of a campaign costs more than writing it.
 _ADD_ENVIRONMENT = sa.insert(tables.environment)
+#: Of a turn by hand: what is known at its end, and the column of the readings that says it.
+KNOWN_LATE = {"table_rate_dps": "table_rate_dps", "gate_until_s": "t_s"}
 
 
 class StoreJournal:
@@ -136,7 +138,9 @@ class StoreJournal:
                         "gate_until_s": header.gate_until_s,
                         "power_on_s": self._power_on_s,
                         "n": 0,
-                        "planned": s.dataset,
+                        "turn_deg": header.turn_deg,
+                        "turn_u_deg": header.turn_u_deg,
+                        "planned": header.planned,
                     }
                     for recording in (self._recordings[gyro] for gyro in header.gyros)
                 ],
@@ -144,7 +148,7 @@ class StoreJournal:
         return number
 
     @outlasting
-    def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
+    def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float | None) -> None:
         """Record one block of one unit; times are campaign time."""
         if not len(readings) and not readings.lost and not readings.damaged:
             return
@@ -206,17 +210,19 @@ class StoreJournal:
         d, b = tables.data_sets, tables.sample_blocks
         this = (d.c.recording_id == recording, d.c.number == dataset)
         n = 0
+        turned: dict[str, float] = {}
         if raw is not None:
             valid = raw["valid"] != 0
             n = int(valid.sum())
             head = connection.execute(sa.select(d).where(*this)).mappings().one()
-            means = means_rows(
-                recording, dataset, scaled(raw, self._channels[gyro], cast(DataSetHead, dict(head))), valid
-            )
+            columns = scaled(raw, self._channels[gyro], cast(DataSetHead, dict(head)))
+            if head["turn_deg"] is not None:  # how long it took is known only now
+                turned = {name: float(columns[key][-1].item()) for name, key in KNOWN_LATE.items()}
+            means = means_rows(recording, dataset, columns, valid)
             connection.execute(sa.insert(tables.data_set_means), means)
             connection.execute(sa.delete(b).where(b.c.recording_id == recording, b.c.number == dataset))
             write_block(connection, recording, dataset, 0, sample_codec.pack(raw, sample_codec.FINAL))
-        connection.execute(sa.update(d).where(*this).values(state=state.value, reason=reason, n=n))
+        connection.execute(sa.update(d).where(*this).values(state=state.value, reason=reason, n=n, **turned))
 
     @outlasting
     def environment(self, sample: EnvironmentSample) -> None:
@@ -264,10 +270,12 @@ class StoreJournal:
         )
 
 
-def _columns(readings: Readings, chamber_c: float) -> dict[str, NDArray[np.generic]]:
-    return {
+def _columns(readings: Readings, chamber_c: float | None) -> dict[str, NDArray[np.generic]]:
+    columns: dict[str, NDArray[np.generic]] = {
         "t_ns": np.rint(readings.t_s * 1e9).astype(np.int64),
         **readings.raw,
         "valid": readings.valid.astype(np.int64),
-        "chamber_mc": np.full(len(readings), round(chamber_c * 1e3), dtype=np.int64),
     }
+    if chamber_c is not None:
+        columns["chamber_mc"] = np.full(len(readings), round(chamber_c * 1e3), dtype=np.int64)
+    return columns

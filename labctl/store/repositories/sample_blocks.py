@@ -38,9 +38,11 @@ class DataSetHead(TypedDict):
     run: int
     mounting: int
     table_rate_dps: float
-    table_angle_deg: float
+    table_angle_deg: float | None
     gate_from_s: float
     power_on_s: float | None
+    turn_deg: float | None
+    turn_u_deg: float | None
 
 
 def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[np.generic]]]:
@@ -83,8 +85,11 @@ def scaled(
         "run": np.full(n, head["run"], dtype=np.int64),
         "mounting": np.full(n, head["mounting"], dtype=np.int64),
         "table_rate_dps": np.full(n, head["table_rate_dps"]),
-        "table_angle_deg": head["table_angle_deg"] + head["table_rate_dps"] * (t_s - head["gate_from_s"]),
     }
+    if head["table_angle_deg"] is not None:
+        columns["table_angle_deg"] = head["table_angle_deg"] + head["table_rate_dps"] * (t_s - head["gate_from_s"])
+    if head["turn_deg"] is not None:
+        columns |= _turned(head["turn_deg"], head["turn_u_deg"] or 0.0, t_s[raw["valid"] != 0], n)
     if head["power_on_s"] is not None:
         columns["power_s"] = t_s - head["power_on_s"]
     for channel in channels:
@@ -92,9 +97,21 @@ def scaled(
     per_axis = [_floats(columns[f"temperature_{a}_c"]) for a in "xyz" if f"temperature_{a}_c" in columns]
     if "temperature_c" not in columns and per_axis:
         columns["temperature_c"] = np.mean(per_axis, axis=0)
-    columns["chamber_c"] = _floats(raw["chamber_mc"]) / 1e3
+    if "chamber_mc" in raw:
+        columns["chamber_c"] = _floats(raw["chamber_mc"]) / 1e3
     columns["valid"] = raw["valid"]
     return columns
+
+
+def _turned(turn_deg: float, turn_u_deg: float, valid_s: NDArray[np.float64], n: int) -> dict[str, NDArray[np.generic]]:
+    """Return the columns, (n,), of a turn by hand or a rest beside it; `valid_s` are the times of its valid readings.
+
+    The rate is the mean over the turn: the angle over the time from the first valid reading to the last.
+    """
+    duration_s = float(valid_s[-1] - valid_s[0]) if len(valid_s) > 1 else 0.0
+    rate_dps = turn_deg / duration_s if duration_s > 0 else 0.0
+    said = {"table_rate_dps": rate_dps, "turn_deg": turn_deg, "turn_u_deg": turn_u_deg}
+    return {name: np.full(n, value) for name, value in said.items()}
 
 
 def _floats(values: NDArray[np.generic]) -> NDArray[np.float64]:

@@ -44,6 +44,8 @@ data_sets = sa.Table(
     sa.Column("n", sa.Integer, nullable=False, default=0),
     sa.Column("lost", sa.Integer, nullable=False, default=0),
     sa.Column("damaged", sa.Integer, nullable=False, default=0),
+    sa.Column("turn_deg", sa.Float),  #: of a turn by hand, 0 of a rest beside it; absent for a rate of a table
+    sa.Column("turn_u_deg", sa.Float),
     sa.Column("planned", sa.Integer),  #: its number in the plan: one that is redone has the same again
 )
 

@@ -37,6 +37,7 @@ export type LogPreview = Schema<"LogPreview">;
 export type Output = Schema<"OutputResponse">;
 export type Plan = Schema<"PlannedResponse">;
 export type Prompt = Schema<"PromptResponse">;
+export type Turn = Schema<"TurnResponse">;
 export type Recipe = Schema<"RecipeResponse">;
 export type RecordingRow = Schema<"RecordingResponse">;
 export type ResidualColumns = Schema<"ResidualColumns">;

@@ -59,3 +59,18 @@ def test_a_hand_does_at_once_what_is_asked(rig: Any) -> None:
         assert answer is not None
         assert answer.confirmed
     assert rig.trace == ["hand.mount -x", "hand.power True", "hand.power False"]
+
+
+def test_only_a_turn_is_asked_again() -> None:
+    person = HumanOperator()
+    person.ask(FIRST)
+    with pytest.raises(StalePrompt, match="asks for no turn by hand: confirm it, or decline it"):
+        person.repeat("1", by="Ada", reason="")
+    assert person.pending == FIRST
+    person.ask(Prompt("3", "turn", "turn", "x", 360.0))
+    person.repeat("3", by="Ada", reason="slipped")
+    answer = person.answer("3")
+    assert answer is not None
+    assert (answer.confirmed, answer.again, answer.reason) == (False, True, "slipped")
+    with pytest.raises(StalePrompt, match="no longer asked"):
+        person.repeat("3", by="Ada", reason="late")

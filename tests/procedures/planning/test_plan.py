@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from instruments.errors import LimitError
 from instruments.interfaces.gyro import GyroLimits
 from procedures.contracts.errors import PlanRefused
-from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, SafeState, Soak
+from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, SafeState, Soak, Turn
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
 from procedures.planning.point_order import level_rates, order_points, temperature_sequence
@@ -44,7 +44,9 @@ def test_every_shipped_recipe_plans_on_a_bench_that_suits_it(name: str, limits: 
     plan = make_plan(read_recipe(name), limits)
     assert plan.clipped == ()
     assert isinstance(plan.steps[-1], SafeState)
-    assert [step.dataset for step in acquires(plan)] == list(range(1, plan.datasets + 1))
+    turns = [step for step in plan.steps if isinstance(step, Turn)]
+    numbers = [*(step.dataset for step in acquires(plan)), *(s.dataset + part for s in turns for part in (-1, 0, 1))]
+    assert numbers == list(range(1, plan.datasets + 1))
 
 
 @pytest.mark.parametrize(("name", "datasets", "hours"), [("table1-x-table2", 630, 42), ("yang-23-rates", 690, 43)])
@@ -322,3 +324,42 @@ def test_replicates_add_and_never_drop(rates: list[float], zero_at: set[str], ag
 
 def test_a_schedule_is_the_same_however_often_it_is_asked_for() -> None:
     assert order_points(read_recipe("informative")) == order_points(read_recipe("informative"))
+
+
+def by_hand(**changes: Any) -> Recipe:
+    values: dict[str, Any] = {"name": "h", "positions": ["x", "-x"], "turns": {"turns_deg": [360, -720], "repeats": 2}}
+    return Recipe.model_validate(values | changes)
+
+
+def test_a_recipe_of_turns_drives_no_table_and_no_chamber(limits: BenchLimits) -> None:
+    alone = replace(limits, table=None, chamber=None)
+    plan = make_plan(by_hand(), alone)
+    assert kinds(plan) == {"mount": 2, "power_on": 1, "turn": 8, "safe_state": 1}
+    turns = [step for step in plan.steps if isinstance(step, Turn)]
+    assert [(step.position, step.turn_deg) for step in turns[:5]] == [
+        ("x", 360), ("x", -720), ("x", 360), ("x", -720), ("-x", 360),
+    ]  # fmt: skip
+    assert [step.dataset for step in turns[:3]] == [2, 5, 8]
+    assert plan.datasets == 24
+    assert turns[1].expected_s > turns[0].expected_s
+    assert make_plan(by_hand(), limits).steps == plan.steps
+    # a turn that is asked again after an interruption needs no home and no temperature before it
+    assert plan.lead_in(3) == ()
+    assert plan.left_out_with(0) == (2, 3, 4, 5)
+
+
+def test_what_needs_a_table_or_a_chamber_says_which_is_missing(limits: BenchLimits) -> None:
+    with pytest.raises(PlanRefused) as refused:
+        make_plan(recipe(), replace(limits, table=None, chamber=None))
+    assert refused.value.offenders == (
+        "rates_dps: it needs a rate table, and the bench has none",
+        "temperatures_c: it needs a chamber, and the bench has none",
+    )
+    assert "choose a recipe with [turns], such as by-hand, which needs neither" in str(refused.value)
+    with pytest.raises(PlanRefused, match="needs a chamber"):
+        make_plan(recipe(), replace(limits, chamber=None), clip=True)
+
+
+def test_turns_without_end_are_refused(limits: BenchLimits) -> None:
+    with pytest.raises(PlanRefused, match="about 120000 data sets"):
+        make_plan(by_hand(turns={"turns_deg": [360], "repeats": 20_000}), limits)

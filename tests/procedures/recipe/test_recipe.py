@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from procedures.contracts.errors import RecipeError
-from procedures.recipe.recipe import parse_recipe, read_recipe, shipped_recipes
+from procedures.recipe.recipe import Recipe, parse_recipe, read_recipe, shipped_recipes
 
 GOOD = 'name = "a"\ntemperatures_c = [20]\nrates_dps = [0, 10]\npositions = ["z"]\n'
 
@@ -23,6 +23,7 @@ def test_what_ships() -> None:
         "informative",
         "short",
         "sweeps",
+        "by-hand",
     }
 
 
@@ -116,3 +117,39 @@ def test_a_folder_and_a_binary_file_are_no_recipes(tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(RecipeError, match="cannot be read"):
         read_recipe(tmp_path / "x.toml")
+
+
+def by_hand(more: str = "turns_deg = [360]", top: str = "") -> str:
+    return f'name = "h"\npositions = ["x", "-y"]\n{top}\n[turns]\n{more}\n'
+
+
+def test_a_recipe_of_turns_has_neither_rates_nor_temperatures() -> None:
+    recipe = parse_recipe(by_hand())
+    assert (recipe.rates_dps, recipe.temperatures_c) == ((), ())
+    assert recipe.turns is not None
+    assert (recipe.turns.u_deg, recipe.turns.within_s, recipe.turns.tolerance) == (1.0, 300.0, 0.1)
+    assert Recipe.model_validate(recipe.model_dump(mode="json")) == recipe  # as it is written down and read again
+    asked = recipe.turns.ask
+    assert "by 720 deg clockwise, seen from above, about body axis -y" in asked.of(asked.turn, "-y", -720.0)
+    assert "axis -y" in asked.of(asked.place, "-y")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (by_hand(top="rates_dps = [1]"), "'rates_dps': value error, it is for a table and a chamber"),
+        (by_hand(top="repeats = 2"), "'repeats': value error, it is for a table and a chamber"),
+        (by_hand(top="soak = { hold_s = 1 }"), "'soak': value error, it is for a table and a chamber"),
+        (by_hand("turns_deg = []"), "'turns.turns_deg': tuple should have at least 1 item"),
+        (by_hand("turns_deg = [0]"), "'turns.turns_deg.0': value error, a turn has more than 0 and at most 36000 deg"),
+        (by_hand("turns_deg = [360]\nask.turn = 'go $far'"), "$far is unknown; known are $axis, $degrees"),
+        (by_hand("turns_deg = [360]\nask.turn = '5 $'"), "a $ stands alone"),
+        (GOOD.replace("[20]", "[]"), "'temperatures_c': tuple should have at least 1 item"),
+    ],
+)
+def test_what_is_wrong_with_turns_is_one_line(text: str, said: str) -> None:
+    with pytest.raises(RecipeError) as refused:
+        parse_recipe(text)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert str(refused.value).count("'") < 12  # one complaint, without those that only follow from it

@@ -159,6 +159,24 @@ export const resumeButton = (campaign, { whole = false, kind = "primary" } = {})
  * @param {Prompt} prompt
  */
 export const answerButtons = (campaign, prompt) => [
+  ...(prompt.kind === "turn" ? turnButtons(campaign, prompt) : [doneButton(campaign, prompt)]),
+  button("Cannot be done", async () => {
+    const answers = await askOperator("It cannot be done?", [operatorNameField(), { name: "reason", label: "Why" }], {
+      text: "The campaign ends, in the safe state.",
+      confirm: "It cannot be done",
+      kind: "danger",
+    });
+    if (!answers) return;
+    const body = { prompt: prompt.id, by: answers.by, reason: answers.reason, confirmed: false };
+    await post("/api/campaigns/{campaign}/confirm", { path: { campaign }, body });
+  }),
+];
+
+/**
+ * @param {number} campaign
+ * @param {Prompt} prompt
+ */
+const doneButton = (campaign, prompt) =>
   button(
     "Done",
     async () => {
@@ -171,18 +189,25 @@ export const answerButtons = (campaign, prompt) => [
       await post("/api/campaigns/{campaign}/confirm", { path: { campaign }, body });
     },
     { kind: "primary" },
-  ),
-  button("Cannot be done", async () => {
-    const answers = await askOperator("It cannot be done?", [operatorNameField(), { name: "reason", label: "Why" }], {
-      text: "The campaign ends, in the safe state.",
-      confirm: "It cannot be done",
-      kind: "danger",
-    });
-    if (!answers) return;
-    const body = { prompt: prompt.id, by: answers.by, reason: answers.reason, confirmed: false };
+  );
+
+/**
+ * A turn by hand is answered at once: a person who turns a dozen times is asked for the name only the first time.
+ * @param {number} campaign
+ * @param {Prompt} prompt
+ */
+function turnButtons(campaign, prompt) {
+  /** @param {boolean} again */
+  const answer = (again) => async () => {
+    const by =
+      localStorage.getItem(OPERATOR_NAME_KEY) ||
+      (await askOperator("Who turns the unit?", [operatorNameField()], { confirm: "Answer" }))?.by;
+    if (!by) return;
+    const body = { prompt: prompt.id, by, confirmed: !again, again };
     await post("/api/campaigns/{campaign}/confirm", { path: { campaign }, body });
-  }),
-];
+  };
+  return [button("Done", answer(false), { kind: "primary" }), button("Turn again", answer(true))];
+}
 
 /**
  * Confirm by inspection that a bench is safe whose safe state was not confirmed.

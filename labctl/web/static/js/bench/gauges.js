@@ -69,14 +69,15 @@ export function gauges(timeline) {
   const chamber = gauge("Chamber", "deg C", low, high, 2);
   const gyro = gauge("Gyro", "deg C", low, high, 2);
   const rate = gauge("Table rate", "deg/s", -most, most, 3);
-  const element = h("div", { class: "gauges" }, chamber, gyro, rate);
+  const driven = timeline.kind.includes("home"); // a bench on which units are turned by hand has neither
+  const element = h("div", { class: "gauges" }, driven ? [chamber, gyro, rate] : gyro);
   /**
    * @param {Numeric} value
    * @param {Numeric} target
    */
   const apart = (value, target) => {
     if (!isNumber(value)) return "no reading yet";
-    if (!isNumber(target)) return "no set point yet";
+    if (!isNumber(target)) return driven ? "no set point yet" : "by its own thermometer";
     const off = `${Math.abs(value - target).toFixed(2)} K ${value > target ? "above" : "below"}`;
     return `set point ${plainNumber(target)} deg C, ${Math.abs(value - target) < 0.005 ? "there" : off}`;
   };

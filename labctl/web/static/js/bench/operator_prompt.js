@@ -1,6 +1,7 @@
 // Operator prompt: the open question of a campaign, with a drawing of the position to mount.
 
 import { h, svg } from "../core/elements.js";
+import { duration } from "../core/format.js";
 import { answerButtons } from "./actions.js";
 
 /** @import { Prompt } from "../../../types/api.js" */
@@ -152,12 +153,23 @@ export function mountingDrawing(position) {
   );
 }
 
+/** @param {Prompt} prompt */
+function heading({ kind, position, turn_deg: angle }) {
+  if (kind === "mount") return `Turn the unit: ${position} up`;
+  if (kind === "turn") return `Turn by ${angle} deg about ${position}, ${position} up`;
+  return "The campaign has a question";
+}
+
 /**
- * The card of an open question.
+ * The card of an open question. `hasTable`: whether a table stands still meanwhile.
  * @param {number} campaign
  * @param {Prompt} prompt
+ * @param {boolean} hasTable
  */
-export function operatorPrompt(campaign, prompt) {
+export function operatorPrompt(campaign, prompt, hasTable) {
+  const limit = prompt.within_s
+    ? ` Without an answer within ${duration(prompt.within_s)} the campaign ends; it can be resumed.`
+    : "";
   return h(
     "section",
     { class: "card prompt", role: "alert", "aria-label": "A question for you" },
@@ -165,9 +177,9 @@ export function operatorPrompt(campaign, prompt) {
     h(
       "div",
       { class: "stack" },
-      h("h2", {}, prompt.kind === "mount" ? `Turn the unit: ${prompt.position} up` : "The campaign has a question"),
+      h("h2", {}, heading(prompt)),
       h("p", {}, `${prompt.text[0].toUpperCase()}${prompt.text.slice(1)}.`),
-      h("p", { class: "muted" }, "The table is at rest and waits for you."),
+      h("p", { class: "muted" }, `${hasTable ? "The table is at rest and waits for you." : ""}${limit}`.trim()),
       h("div", { class: "row" }, answerButtons(campaign, prompt)),
     ),
   );

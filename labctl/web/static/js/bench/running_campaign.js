@@ -16,6 +16,7 @@ import { gauges } from "./gauges.js";
 import { liveOutput } from "./live_output.js";
 import { campaignHistory, remainingSeconds, appendStatus } from "./campaign_history.js";
 import { operatorPrompt } from "./operator_prompt.js";
+import { turnNow } from "./turn_now.js";
 import { lastDataset } from "./last_dataset.js";
 import { historyPlot } from "./history_plot.js";
 
@@ -40,6 +41,8 @@ export function runningCampaign(status, plan, { signal, over }) {
     h("div", { class: "stack", "aria-live": "polite" }),
   ];
   const dials = gauges(timeline);
+  const turn = turnNow();
+  const hasTable = timeline.kind.includes("home");
   const [historyFigure, outputCard, datasetCard, events] = [
     historyPlot(history),
     liveOutput(status.id),
@@ -69,10 +72,11 @@ export function runningCampaign(status, plan, { signal, over }) {
     appendStatus(history, now, setpoint());
     historyFigure.onStatus();
     outputCard.onStatus(now);
+    turn.onStatus(now);
     datasetCard.onStatus(now);
     if (now.prompt?.id !== asked) {
       asked = now.prompt?.id;
-      setChildren(prompt, now.prompt ? operatorPrompt(now.id, now.prompt) : null);
+      setChildren(prompt, now.prompt ? operatorPrompt(now.id, now.prompt, hasTable) : null);
     }
     setChildren(warningList, warnings(now));
     if (hasEnded(now)) over();
@@ -118,6 +122,7 @@ export function runningCampaign(status, plan, { signal, over }) {
     bar,
     connection,
     prompt,
+    turn,
     warningList,
     dials,
     h(

@@ -37,6 +37,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
     const unit_s = (timeline.start_s.at(-1) ?? 0) + (timeline.expected_s.at(-1) ?? 0) > HOURS_FROM_S ? 3600 : 60;
     const steps = planSteps(timeline, unit_s);
     const sets = steps.filter((step) => step.dataset !== null);
+    const byHand = sets.length > 0 && sets.every((step) => step.kind === "turn");
     const narrow = window.innerWidth < 760;
     const marks = STATES.flatMap(([state, shade]) => {
       const here = sets.filter((step) => step.state === state);
@@ -51,7 +52,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
         customdata: here.map((step) => step.dataset),
         text: here.map(
           (step) =>
-            `data set ${step.dataset}: ${plainNumber(step.rate)} deg/s at ${plainNumber(step.warm)} deg C, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`,
+            `data set ${step.dataset}: ${byHand ? `${plainNumber(step.turn)} deg by hand` : `${plainNumber(step.rate)} deg/s at ${plainNumber(step.warm)} deg C`}, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`,
         ),
         hovertemplate: "%{text}<extra></extra>",
         selected: { marker: { opacity: 1 } },
@@ -61,7 +62,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
         {
           ...common,
           y: here.map((step) => step.warm),
-          showlegend: live,
+          showlegend: live && !byHand,
           marker: {
             symbol: "line-ns",
             size: 11,
@@ -71,9 +72,9 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
         },
         {
           ...common,
-          y: here.map((step) => step.rate),
+          y: here.map((step) => (byHand ? step.turn : step.rate)),
           yaxis: "y2",
-          showlegend: false,
+          showlegend: live && byHand,
           marker: {
             size: sets.length > 200 ? 4 : 5.5,
             color: fill,
@@ -156,8 +157,10 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
           anchor: "y2",
           range: [-0.01 * end, Math.max(end, (now_s || 0) / unit_s) * 1.01],
         },
-        yaxis: { title: { text: "set point, deg C" }, domain: [0.46, 1] },
-        yaxis2: { title: { text: "rate, deg/s" }, domain: [0, 0.38], anchor: "x" },
+        yaxis: byHand ? { visible: false } : { title: { text: "set point, deg C" }, domain: [0.46, 1] },
+        yaxis2: byHand
+          ? { title: { text: "turn, deg" }, domain: [0, 1], anchor: "x" }
+          : { title: { text: "rate, deg/s" }, domain: [0, 0.38], anchor: "x" },
       },
     };
   };

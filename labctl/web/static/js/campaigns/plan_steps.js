@@ -23,6 +23,7 @@ export function planSteps(timeline, unit_s) {
       until: until / unit_s,
       warm: timeline.temperature_c[k],
       rate: timeline.rate_dps[k],
+      turn: timeline.turn_deg[k],
       position: timeline.position[k],
       dataset: timeline.dataset[k],
       state: timeline.state?.[k] ?? "to come",

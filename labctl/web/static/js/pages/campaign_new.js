@@ -19,6 +19,10 @@ import { visibilityReport } from "../campaigns/visibility.js";
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
+/** What is known of turns by hand without walking through the plan. */
+const TURNS_TELL =
+  "Turns by hand tell bias, scale factor, misalignment and g-sensitivity; nothing that depends on the rate or on the temperature.";
+
 /** @param {PageContext} context */
 export async function page({ query, signal }) {
   const [all, benches, catalogue] = await Promise.all([
@@ -52,6 +56,10 @@ export async function page({ query, signal }) {
       const answer = await post("/api/plans", { body: { recipe: source(), clip }, signal: given });
       setChildren(planned, planCard(answer, bench));
       starting.look();
+      if (answer.timeline.kind.includes("turn")) {
+        setChildren(found, h("p", { class: "muted" }, TURNS_TELL));
+        return;
+      }
     } catch (error) {
       if (isAbort(error)) return;
       setChildren(planned, refusalCard(error));
@@ -143,12 +151,14 @@ export async function page({ query, signal }) {
 }
 
 /**
- * The shortest campaign that the bench can run.
+ * The shortest campaign that the bench can run; one of turns by hand where it has no table.
  * @param {readonly Recipe[]} all
  */
 function shortestRecipe(all) {
   const able = all.filter((each) => !each.refused && !each.remark);
-  return able.sort((a, b) => (a.expected_s ?? 0) - (b.expected_s ?? 0))[0] ?? all[0];
+  return (
+    able.sort((a, b) => Number(a.by_hand) - Number(b.by_hand) || (a.expected_s ?? 0) - (b.expected_s ?? 0))[0] ?? all[0]
+  );
 }
 
 /**

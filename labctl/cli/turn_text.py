@@ -1,0 +1,19 @@
+"""A turn by hand in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.campaigns import CampaignResponse
+
+
+def turn_text(answer: CampaignResponse) -> str:
+    """Say how far a turn by hand has come; empty where none is under way."""
+    turn = answer.turn
+    if turn is None:
+        return ""
+    if turn.phase == "rest":
+        return f"keep the unit still, {turn.position} up"
+    came = ", ".join(f"{deg:.0f}" for deg in turn.came_deg.values()) or "nothing"
+    return f"so far {came} deg of {turn.asked_deg:g} about {turn.position}"
