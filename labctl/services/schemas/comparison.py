@@ -25,7 +25,8 @@ class ModelLines(ResponseModel):
 class ComparisonColumns(ResponseModel):
     """One row per data set (or piece of a long one) and output axis, as lists of equal length."""
 
-    dataset: list[int] = Field(default_factory=list)
+    recording: list[int] = Field(default_factory=list, description="Number of the recording.")
+    dataset: list[int] = Field(default_factory=list, description="Number of the data set in its recording.")
     axis: list[str] = Field(default_factory=list, description="The output axis.")
     position: list[str] = Field(default_factory=list, description="The body axis that lay along the table axis.")
     table_rate_dps: list[float] = Field(default_factory=list)
@@ -52,6 +53,7 @@ class ComparisonResponse(ResponseModel):
     serial: str
     version: int
     recording: int
+    recordings: list[int] = Field(default_factory=list, description="All recordings; `recording` is the newest.")
     fitted_to: int | None = Field(description="The recording that the version was fitted to.")
     source: str = Field(description="Which model all numbers here come from, in words.")
     held: dict[str, float] = Field(description="Other channels that the lines need: their means in this recording.")
