@@ -15,7 +15,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.trend_line import LEAST_POINTS, TrendLine, trend_line
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, verify
+from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, expected_dps, verify
 from labctl.services.criticism.versions import version_of
 from labctl.services.schemas.units import (
     AppliedVersion,
@@ -71,9 +71,7 @@ def _start(row: RecordingRow) -> datetime:
 
 
 def _stated(row: CalibrationRecord) -> float | None:
-    error = row.answer["error"]
-    known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"]) if figure]
-    return LARGEST_RATIO * max(known) if known else None
+    return LARGEST_RATIO * expected if (expected := expected_dps(row)) else None
 
 
 def _point(

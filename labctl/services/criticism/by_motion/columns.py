@@ -15,7 +15,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.services.schemas.motions import ProfileColumns, RestColumns, TurnColumns
 
 #: Rows of one axis that a picture of a profile takes.
-MOST_ROWS = 4000
+MOST_ROWS = 6000
 #: axis -> (m,) corrected minus true rate, deg/s; None without a version.
 Errors = Mapping[str, Array] | None
 Rows = dict[str, list[Any]]

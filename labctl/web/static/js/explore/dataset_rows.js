@@ -12,7 +12,8 @@ import { count, plainNumber } from "../core/format.js";
 const columnsOf = (criticism) => /** @type {Required<NonNullable<Viewed["views"]["sets"]>>} */ (criticism.views.sets);
 
 /**
- * Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length.
+ * Return {n, dataset, recording, own, position, channels: {name: []}, residual, score} of one axis; lists of equal length.
+ * Of several recordings `dataset` counts through all of them, `recording` and `own` say which it is.
  * @param {Viewed} criticism
  * @param {string} axis
  */
@@ -21,12 +22,22 @@ export function datasetRows(criticism, axis) {
   return {
     n: sets.dataset.length,
     dataset: sets.dataset,
+    recording: sets.recording ?? null,
+    own: sets.own_dataset ?? sets.dataset,
     position: sets.position,
     channels: sets.channels,
     residual: sets.residual_dps[axis],
     score: sets.over_floor[axis],
   };
 }
+
+/**
+ * A data set in words: of several recordings also which.
+ * @param {{ recording: readonly number[] | null, own: readonly number[] }} rows
+ * @param {number} k
+ */
+export const setText = ({ recording, own }, k) =>
+  recording ? `recording ${recording[k]}, data set ${own[k]}` : `data set ${own[k]}`;
 
 /** @param {Viewed} criticism */
 export const axisNames = (criticism) => Object.keys(criticism.views.sets?.residual_dps ?? {});
@@ -43,12 +54,16 @@ export function shownText(criticism) {
 /**
  * The values of an axis in the order of the criticism's data sets.
  * @param {{ criticism: Viewed, axis: string }} state
- * @param {Pick<Preview["residuals"], "dataset" | "axis" | "residual_dps">} columns
+ * @param {Pick<Preview["residuals"], "dataset" | "axis" | "residual_dps"> & Partial<Pick<Preview["residuals"], "recording">>} columns
  * @param {"residual_dps"} name
  */
 export function inDatasetOrder(state, columns, name) {
-  const values = new Map(columns.dataset.map((set, k) => [`${set} ${columns.axis[k]}`, columns[name][k]]));
-  return datasetRows(state.criticism, state.axis).dataset.map((set) => values.get(`${set} ${state.axis}`) ?? null);
+  const rows = datasetRows(state.criticism, state.axis);
+  const of = rows.recording ? columns.recording : undefined; // a single recording needs no number
+  const values = new Map(
+    columns.dataset.map((set, k) => [`${of?.[k] ?? ""} ${set} ${columns.axis[k]}`, columns[name][k]]),
+  );
+  return rows.own.map((set, k) => values.get(`${rows.recording?.[k] ?? ""} ${set} ${state.axis}`) ?? null);
 }
 
 /**
