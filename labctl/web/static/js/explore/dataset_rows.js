@@ -13,7 +13,8 @@ const columnsOf = (criticism) => /** @type {Required<NonNullable<Viewed["views"]
 
 /**
  * Return {n, dataset, recording, own, position, channels: {name: []}, residual, score} of one axis; lists of equal length.
- * Of several recordings `dataset` counts through all of them, `recording` and `own` say which it is.
+ * Of several recordings `dataset` counts through all of them, `recording` and `own` say which it is; of one long data
+ * set (`pieces`) it counts its pieces.
  * @param {Viewed} criticism
  * @param {string} axis
  */
@@ -21,8 +22,9 @@ export function datasetRows(criticism, axis) {
   const sets = columnsOf(criticism);
   return {
     n: sets.dataset.length,
-    dataset: sets.dataset,
+    dataset: isOneInPieces(sets) ? sets.dataset.map((_, k) => k + 1) : sets.dataset,
     recording: sets.recording ?? null,
+    pieces: isOneInPieces(sets),
     own: sets.own_dataset ?? sets.dataset,
     position: sets.position,
     channels: sets.channels,
@@ -32,12 +34,20 @@ export function datasetRows(criticism, axis) {
 }
 
 /**
- * A data set in words: of several recordings also which.
- * @param {{ recording: readonly number[] | null, own: readonly number[] }} rows
+ * Whether all rows are pieces of one data set, as of a unit at rest through a loop of the temperature.
+ * @param {{ dataset: readonly number[], recording?: readonly number[] }} sets
+ */
+const isOneInPieces = ({ dataset, recording }) => !recording && dataset.length > 1 && new Set(dataset).size === 1;
+
+/**
+ * A data set in words: of several recordings also which, of one long data set which piece.
+ * @param {{ recording: readonly number[] | null, own: readonly number[], dataset: readonly number[], pieces: boolean }} rows
  * @param {number} k
  */
-export const setText = ({ recording, own }, k) =>
-  recording ? `recording ${recording[k]}, data set ${own[k]}` : `data set ${own[k]}`;
+export function setText({ recording, own, dataset, pieces }, k) {
+  if (recording) return `recording ${recording[k]}, data set ${own[k]}`;
+  return pieces ? `data set ${own[k]}, piece ${dataset[k]}` : `data set ${own[k]}`;
+}
 
 /** @param {Viewed} criticism */
 export const axisNames = (criticism) => Object.keys(criticism.views.sets?.residual_dps ?? {});
@@ -60,10 +70,26 @@ export function shownText(criticism) {
 export function inDatasetOrder(state, columns, name) {
   const rows = datasetRows(state.criticism, state.axis);
   const of = rows.recording ? columns.recording : undefined; // a single recording needs no number
-  const values = new Map(
-    columns.dataset.map((set, k) => [`${of?.[k] ?? ""} ${set} ${columns.axis[k]}`, columns[name][k]]),
-  );
-  return rows.own.map((set, k) => values.get(`${rows.recording?.[k] ?? ""} ${set} ${state.axis}`) ?? null);
+  /** @type {Map<string, number[]>} */
+  const values = new Map(); // a long data set is in several pieces, in the same order in both
+  columns.dataset.forEach((set, k) => {
+    if (columns.axis[k] !== state.axis) return;
+    const key = `${of?.[k] ?? ""} ${set}`;
+    const found = values.get(key);
+    if (found) found.push(columns[name][k]);
+    else values.set(key, [columns[name][k]]);
+  });
+  const isThinned = shownText(state.criticism) !== null;
+  /** @type {Map<string, number>} */
+  const taken = new Map();
+  return rows.own.map((set, k) => {
+    const key = `${rows.recording?.[k] ?? ""} ${set}`;
+    const found = values.get(key) ?? [];
+    if (found.length < 2) return found[0] ?? null;
+    const place = taken.get(key) ?? 0;
+    taken.set(key, place + 1);
+    return isThinned ? null : (found[place] ?? null); // of pieces that are thinned nothing says which is which
+  });
 }
 
 /**

@@ -24,7 +24,7 @@ export function fitForm(serial, chosen, motion, text) {
   let model = models[0];
   return h(
     "div",
-    { class: "row", style: "align-items: end" },
+    { class: "row", style: "align-items: end; min-width: 0" },
     selectField(
       "Model",
       models.map((each) => option(each.id, each.text)),

@@ -68,12 +68,21 @@ export function residualDiagnostics(state) {
     h(
       "p",
       { class: "muted small" },
-      `Judged: the model of version ${state.version} refitted to ${recordingsText(state)}, so that the residual is what the model cannot describe. The version without refitting is under Compare.`,
+      `Judged: the model of version ${state.version} refitted to ${recordingsText(state)}, so that the residual is what the model cannot describe. The version without refitting is under Compare.${piecesText(state)}`,
     ),
     picture,
     h("div", { class: "columns", style: "--column-min: 19rem" }, against),
     list,
   );
+}
+
+/**
+ * What a dot is, where it is no data set.
+ * @param {ExploreState} state
+ */
+function piecesText(state) {
+  const { pieces, n } = selectedRows(state);
+  return pieces ? ` Each dot is the mean of one of ${n} pieces of the recording's one data set.` : "";
 }
 
 /**

@@ -88,7 +88,7 @@ export function poseFigures(found) {
     ),
     table(
       [
-        { title: "Move, s", cell: (k) => turn[k] },
+        { title: "Move, s", cell: (k) => h("span", { class: "nowrap" }, turn[k]) },
         { title: "Accelerometer, deg", number: true, cell: (k) => number(poses.accelerometer_deg[k], 5) },
         { title: "Gyro, deg", number: true, cell: (k) => number(poses.gyro_deg[k], 5) },
         {
