@@ -43,32 +43,38 @@ def of_axis(found: dict[str, Any], axis: str) -> dict[str, np.ndarray]:
 
 
 def test_at_rest_the_bias_is_that_of_the_readings_and_the_model_that_of_the_file(client: TestClient) -> None:
-    recording = at_rest(("x", "z"), lag_s=LAG_S)
+    recording = at_rest(("z",), lag_s=LAG_S)
     plain, found = by_motion(client, recording, effects=["bias", "bias_temperature:2", "thermal_lag"])
     assert all(value is None for value in plain["rest"]["modelled_dps"])
     document, _ = service_of(client).store.calibrations.document("REST-1", 1)
     running = Compensator(read_calibration(document))
-    corrected = np.array([
-        running.step(list(row), float(warm), t_s=float(t))[0]
-        for t, warm, *row in zip(
-            *(recording.columns[name] for name in ("t_s", "temperature_c", "gyro_x", "gyro_z")), strict=True
-        )
-    ])  # fmt: skip
-    for place, axis in enumerate("xz"):
-        rows = of_axis(found, axis)
-        assert (found["rows"], found["of"], len(rows["t_s"])) == (160, 160, 160)
-        t_s, output = np.asarray(recording.columns["t_s"]), np.asarray(recording.columns[f"gyro_{axis}"])
-        middle = np.searchsorted(t_s, rows["t_s"])
-        of_minute = np.array([output[k - 60 : k + 60].mean() for k in middle])
-        assert rows["bias_dps"] == pytest.approx(of_minute, abs=2e-4)
-        assert np.median(rows["u_dps"].astype(float)) == pytest.approx(NOISE_DPS / np.sqrt(120), rel=0.1)
-        subtracted = np.array([(output - corrected[:, place])[k - 60 : k + 60].mean() for k in middle])
-        assert rows["modelled_dps"] == pytest.approx(subtracted, abs=5e-4)
-        assert rows["residual_dps"].astype(float) == pytest.approx(rows["bias_dps"] - rows["modelled_dps"])
-        minutes = rows["t_s"] / 60
-        warming = (minutes % 80 < 40)[np.abs(minutes % 40 - 20) < 19]
-        assert ((rows["leg"] == "heating")[np.abs(minutes % 40 - 20) < 19] == warming).all()
-        assert set(rows["leg"]) == {"heating", "cooling"}
+    t_s, output = np.asarray(recording.columns["t_s"]), np.asarray(recording.columns["gyro_z"])
+    warm = np.asarray(recording.columns["temperature_c"])
+    samples = zip(output.tolist(), warm.tolist(), t_s.tolist(), strict=True)
+    corrected = np.array([running.step([each], c, t_s=t)[0][0] for each, c, t in samples])
+    rows = of_axis(found, "z")
+    assert (found["rows"], found["of"], len(rows["t_s"])) == (160, 160, 160)
+    middle = np.searchsorted(t_s, rows["t_s"])
+    assert rows["bias_dps"] == pytest.approx(np.array([output[k - 60 : k + 60].mean() for k in middle]), abs=2e-4)
+    assert np.median(rows["u_dps"].astype(float)) == pytest.approx(NOISE_DPS / np.sqrt(120), rel=0.1)
+    subtracted = np.array([(output - corrected)[k - 60 : k + 60].mean() for k in middle])
+    assert rows["modelled_dps"] == pytest.approx(subtracted, abs=5e-4)
+    assert rows["residual_dps"].astype(float) == pytest.approx(rows["bias_dps"] - rows["modelled_dps"])
+    minutes = rows["t_s"] / 60
+    inside = np.abs(minutes % 40 - 20) < 19  # where the legs meet a minute is of either
+    assert ((rows["leg"] == "heating")[inside] == (minutes % 80 < 40)[inside]).all()
+    assert set(rows["leg"]) == {"heating", "cooling"}
+    check_memory(client.get("/api/units/REST-1/calibrations/1").json())
+
+
+def check_memory(version: dict[str, Any]) -> None:
+    """The version says what follows the temperature in use, and how well one leg is predicted from the other."""
+    (follower,) = version["remembers"]
+    assert (follower["kind"], follower["unit"], version["left_out"]) == ("lag", "s", [])
+    assert follower["parameter"] == pytest.approx(LAG_S, rel=0.1)
+    assert follower["size"]["z"] == pytest.approx(2e-3, rel=0.1)
+    legs = {(leg["fitted"], leg["tested"]): leg["rms_dps"] for leg in version["error"]["heldout_by_leg"]}
+    assert legs["heating", "cooling"] == pytest.approx(NOISE_DPS / np.sqrt(120), rel=0.5)
 
 
 def test_without_a_thermometer_there_is_time_and_no_leg(client: TestClient) -> None:
@@ -144,6 +150,11 @@ def test_a_move_in_poses_has_the_angle_that_was_simulated(client: TestClient) ->
     # of small angles the two components square to gravity, which a verification pools
     pooled = np.sqrt(np.mean((poses["residual_deg"] / seconds) ** 2) / 2)
     assert pooled == pytest.approx(verified["rms_dps"], rel=1e-3)
+    by_hand = f"/api/units/{recording.info.serial}/calibrations/1"
+    left = client.get(by_hand).json()["left_out"]
+    assert [each["effect"] for each in left] == ["g_sensitivity", "cross_g_sensitivity"]
+    used = client.get(f"{by_hand}/uncertainty", params={"rate_dps": 10, "temperature_c": 25}).json()
+    assert used["axes"]["x"]["unknown"]["model"].startswith("turns between rests have no rate of their own")
 
 
 def test_a_recording_at_constant_rates_is_refused_in_one_sentence(client: TestClient) -> None:
@@ -155,22 +166,3 @@ def test_a_recording_at_constant_rates_is_refused_in_one_sentence(client: TestCl
     )
     (row,) = client.get("/api/recordings").json()
     assert row["motion"] == "rates"
-
-
-def test_a_version_says_what_it_remembers_and_what_it_does_not_export(client: TestClient, tmp_path: Path) -> None:
-    by_motion(client, at_rest(("z",), lag_s=LAG_S), effects=["bias", "bias_temperature:2", "thermal_lag"])
-    version = client.get("/api/units/REST-1/calibrations/1").json()
-    (follower,) = version["remembers"]
-    assert (follower["kind"], follower["unit"]) == ("lag", "s")
-    assert follower["parameter"] == pytest.approx(LAG_S, rel=0.1)
-    assert follower["size"]["z"] == pytest.approx(2e-3, rel=0.1)
-    assert version["left_out"] == []
-    legs = {(leg["fitted"], leg["tested"]): leg["rms_dps"] for leg in version["error"]["heldout_by_leg"]}
-    assert legs["heating", "cooling"] == pytest.approx(NOISE_DPS / np.sqrt(120), rel=0.5)
-    recording, _ = simulate_session(1, Session(rests=16))
-    by_motion(client, recording, model="poses")
-    by_hand = f"/api/units/{recording.info.serial}/calibrations/1"
-    left = client.get(by_hand).json()["left_out"]
-    assert [each["effect"] for each in left] == ["g_sensitivity", "cross_g_sensitivity"]
-    used = client.get(f"{by_hand}/uncertainty", params={"rate_dps": 10, "temperature_c": 25}).json()
-    assert used["axes"]["x"]["unknown"]["model"].startswith("turns between rests have no rate of their own")

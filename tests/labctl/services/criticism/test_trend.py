@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from datetime import datetime
 from pathlib import Path
 
@@ -28,8 +29,14 @@ def lab_over_years(folder: Path, years: int) -> Lab:
     return lab
 
 
-def test_the_drift_of_a_unit_is_found_with_its_uncertainty_and_when_it_leaves_its_limit(tmp_path: Path) -> None:
-    lab = lab_over_years(tmp_path, 5)
+@pytest.fixture(scope="module")
+def five_years(tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    """Return a lab over five years; nothing is added to it."""
+    return lab_over_years(tmp_path_factory.mktemp("five-years"), 5)
+
+
+def test_the_drift_of_a_unit_is_found_with_its_uncertainty_and_when_it_leaves_its_limit(five_years: Lab) -> None:
+    lab = five_years
     found = lab.json("trend", "J-1", "--limit-dps", "0.15")
     assert (found["version"], found["limit_dps"]) == (1, 0.15)
     first, *later = found["points"]
@@ -53,8 +60,8 @@ def test_the_drift_of_a_unit_is_found_with_its_uncertainty_and_when_it_leaves_it
     assert "Axis z, scale_factor: no drift beyond repeatability" in said
 
 
-def test_the_line_and_its_interval_go_on_beyond_the_limit(tmp_path: Path) -> None:
-    lab = lab_over_years(tmp_path, 5)
+def test_the_line_and_its_interval_go_on_beyond_the_limit(five_years: Lab) -> None:
+    lab = five_years
     with open_client(lab.database) as client:
         answer = client.get("/api/units/J-1/trend", params={"version": 1, "limit_dps": 0.15})
         assert answer.status_code == 200
@@ -77,8 +84,8 @@ def test_the_line_and_its_interval_go_on_beyond_the_limit(tmp_path: Path) -> Non
     assert at[-1] > datetime.fromisoformat(leaves["expected"])
 
 
-def test_a_bias_that_is_outside_its_limit_is_said_to_be_outside_already(tmp_path: Path) -> None:
-    lab = lab_over_years(tmp_path, 5)
+def test_a_bias_that_is_outside_its_limit_is_said_to_be_outside_already(five_years: Lab, tmp_path: Path) -> None:
+    lab = Lab(shutil.copytree(five_years.folder, tmp_path / "lab"))
     found = lab.json("trend", "J-1", "--limit-dps", "0.03")
     assert [each["outside"] for each in found["leaves"]] == [True]
     assert "Axis z: the bias is outside 0.03 deg/s at the newest recording already." in found["text"]
