@@ -12,11 +12,10 @@ import pytest
 from labctl.recording import Recording, read_recording
 from labctl.recording.checks import checked
 from studies.poses_simulation import Session, simulate_session
-from tests.helpers.browser import NARROW, Service, settled
+from tests.helpers.browser import NARROW, Service, figure, settled
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.profiles import profile_recording, sweep
 from tests.helpers.rest import at_rest
-from tests.web.test_figures import figure
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -63,7 +62,10 @@ def test_at_rest_both_legs_are_drawn_and_the_map_is_not(service: Service, visit:
     assert fails.get_by_label("Residual against").first.input_value() == "temperature_c"
     page.get_by_role("region", name="Which effects are missing").get_by_role("button", name="Draw").first.click()
     drawn = figure(page, "Residual against a channel")
-    page.wait_for_function("() => [...document.querySelectorAll('.plot')].some((p) => p.data?.length === 2)")
+    expect(page.get_by_text("Diamonds in the pictures above")).to_be_visible()
+    page.wait_for_function(
+        """() => document.querySelector('.plot[aria-label^="Residual against a channel"]').data.length === 2"""
+    )
     explained = named(figure(page, "Residual against a channel"))["explained"]
     assert np.std(explained["y"]) > 0.5 * np.std(drawn["data"][0]["y"])  # the lag is nearly all of the residual
     unit = visit("/units/REST-1")
@@ -110,4 +112,4 @@ def test_turns_profiles_and_poses_are_drawn_as_they_are(service: Service, visit:
         settled(page)
         wide = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
         assert page.evaluate(wide) == 0
-        expect(page.get_by_text("Table rate")).to_have_count(0)
+        expect(page.get_by_text("Table rate", exact=True)).to_have_count(0)

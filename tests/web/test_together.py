@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from labctl.recording import Recording
-from tests.helpers.browser import Service
+from tests.helpers.browser import Service, figure
 from tests.helpers.joint_recordings import EFFECTS, recordings
-from tests.web.test_figures import figure
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

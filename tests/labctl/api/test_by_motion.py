@@ -162,7 +162,8 @@ def test_a_recording_at_constant_rates_is_refused_in_one_sentence(client: TestCl
     refused = client.get(f"/api/recordings/{number}/motion")
     assert refused.status_code == 400
     assert refused.json()["detail"] == (
-        f"recording {number} has one rate in each data set (motion = 'rates'); its comparison has its numbers"
+        f"recording {number} has one rate in each data set (motion = 'rates'); "
+        "ask for its comparison with a version instead"
     )
     (row,) = client.get("/api/recordings").json()
     assert row["motion"] == "rates"

@@ -12,7 +12,7 @@ from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.numeric.arrays import Array
-from labctl.services.schemas.motions import ProfileColumns, RestColumns, TurnColumns
+from labctl.services.schemas.comparison import ProfileColumns, RestColumns, TurnColumns
 
 #: Rows of one axis that a picture of a profile takes.
 MOST_ROWS = 6000

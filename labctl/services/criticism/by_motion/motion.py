@@ -20,7 +20,7 @@ from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_poses import correction_of
 from labctl.services.criticism.verification.of_version import applied_errors
 from labctl.services.recordings.loading import motion_of, newest_row, source_of
-from labctl.services.schemas.motions import AxisResponse, MotionResponse, PoseColumns
+from labctl.services.schemas.comparison import AxisResponse, MotionResponse, PoseColumns
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 
@@ -44,7 +44,8 @@ def _compared(store: Store, row: RecordingRow, version: CalibrationRecord | None
     motion = motion_of(row)
     if motion == "rates" or row.kind == "coefficients":
         raise BadInput(
-            f"recording {row.id} has one rate in each data set (motion = {motion!r}); its comparison has its numbers"
+            f"recording {row.id} has one rate in each data set (motion = {motion!r}); ask for its comparison with a "
+            "version instead"
         )
     compute(UNNAMED)
     calibration = None if version is None else read_calibration(version.document)
