@@ -48,7 +48,7 @@ def read_toml_text(path: Path) -> str:
     with path.open("rb") as file:
         content = file.read(MOST_BYTES + 1)
     if len(content) > MOST_BYTES:
-        raise tomllib.TOMLDecodeError(f"larger than {MOST_BYTES} bytes, which is all that is read of such a file")
+        raise tomllib.TOMLDecodeError(f"larger than {MOST_BYTES} bytes, the limit for such a file")
     return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -82,4 +82,6 @@ def _refuse_deep(text: str) -> None:
         if brackets > DEEPEST or parts >= DEEPEST:
             line = text.count("\n", 0, token.start()) + 1
             what = "brackets stand" if brackets > DEEPEST else "a key has parts"
-            raise tomllib.TOMLDecodeError(f"line {line}: {what} more than {DEEPEST} deep; nothing here is nested so")
+            raise tomllib.TOMLDecodeError(
+                f"line {line}: {what} more than {DEEPEST} deep; no file of labctl is nested as deeply; correct it"
+            )

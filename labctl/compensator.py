@@ -210,7 +210,9 @@ class Compensator:
             found = self.compensate(raw, temperature_c)
             return found.rate_dps[0], bool(found.outside[0])
         if t_s is None or temperature_c is None:
-            raise BadInput(f"{self.calibration.serial}: its model remembers temperatures; give t_s and temperature_c")
+            raise BadInput(
+                f"{self.calibration.serial}: its model depends on earlier temperatures; give t_s and temperature_c"
+            )
         if self._running.last_s is not None and t_s < self._running.last_s:
             raise BadInput(
                 f"t_s = {t_s:.9g} s is before the last sample's {self._running.last_s:.9g} s; give samples in order of "

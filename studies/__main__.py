@@ -20,6 +20,7 @@ STUDIES = (
     "process_pairs",
     "faults",
     "attacks",
+    "endurance",
     "log_size",
 )
 

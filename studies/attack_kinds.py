@@ -18,6 +18,8 @@ from pathlib import Path
 
 import httpx
 
+from labctl.services.recordings.examples import example
+
 #: Everything that is asked has to be answered within this, s.
 WITHIN_S = 60.0
 FILES = ("recording.toml", "points.csv")
@@ -37,10 +39,24 @@ class Target:
         self.address = (host, int(port))
         self.http = httpx.Client(base_url=self.url, timeout=WITHIN_S)
 
+    def fit_example(self) -> None:
+        """Import a recording and fit it: what the criticisms are of."""
+        folder = example("osu-fog")
+        files = [("files", (name, (folder / name).read_bytes())) for name in FILES]
+        self.http.post("/api/recordings", files=files).raise_for_status()
+        self.http.post("/api/units/OSU-FOG-2024/calibrations", json={"model": "ojeda2000"}).raise_for_status()
+
+    def memory_mib(self, process: str) -> float:
+        """Return the memory that a process has now, MiB."""
+        return self._status_mib(process, "VmRSS")
+
     def largest_mib(self, process: str) -> float:
         """Return the most memory that a process has had, MiB."""
+        return self._status_mib(process, "VmHWM")
+
+    def _status_mib(self, process: str, name: str) -> float:
         status = Path(f"/proc/{self.pids[process]}/status").read_text()
-        return int(status.partition("VmHWM:")[2].split()[0]) / 1024
+        return int(status.partition(f"{name}:")[2].split()[0]) / 1024
 
     def close(self) -> None:
         """End the service."""

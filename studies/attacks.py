@@ -19,8 +19,7 @@ from typing import Any
 import httpx
 import numpy as np
 
-from labctl.services.recordings.examples import example
-from studies.attack_kinds import ATTACKS, FILES, WITHIN_S, Target
+from studies.attack_kinds import ATTACKS, WITHIN_S, Target
 
 ABORTS = int(os.environ.get("LABCTL_STUDY_ABORTS", "20"))
 LOOK_S = 0.05
@@ -101,7 +100,8 @@ def _monitor(target: Target, seen: Seen, over: threading.Event) -> None:
             seen.health_s = max(seen.health_s, time.monotonic() - begun_s)
 
 
-def _lost(database: Path) -> int:
+def lost_readings(database: Path) -> int:
+    """Return how many readings the campaigns of a database lost."""
     with sqlite3.connect(f"file:{database}?mode=ro", uri=True) as connection:
         found = connection.execute("select coalesce(sum(lost), 0) from data_sets").fetchone()
     return int(found[0])
@@ -114,16 +114,12 @@ def run(names: tuple[str, ...] = tuple(ATTACKS)) -> str:
         with tempfile.TemporaryDirectory() as folder:
             target = Target(Path(folder))
             try:
-                folder_of_example = example("osu-fog")
-                files = [("files", (name, (folder_of_example / name).read_bytes())) for name in FILES]
-                target.http.post("/api/recordings", files=files).raise_for_status()
-                fit = {"model": "ojeda2000"}
-                target.http.post("/api/units/OSU-FOG-2024/calibrations", json=fit).raise_for_status()
+                target.fit_example()
                 seen = measure(target, ATTACKS[name](target), number)
                 p50, p99 = np.percentile(seen.answer_s, [50, 99])
                 lines.append(
                     f"{name:18}{len(seen.answer_s):6}  {p50:8.3f} / {p99:.3f} / {max(seen.answer_s):.3f}"
-                    f"{max(seen.safe_s):16.2f}{seen.health_s:10.2f}{seen.heard_s:9.1f}{_lost(target.database):6}"
+                    f"{max(seen.safe_s):16.2f}{seen.health_s:10.2f}{seen.heard_s:9.1f}{lost_readings(target.database):6}"
                     f"{seen.refused:9}  {target.largest_mib('bench'):.0f} / {target.largest_mib('web'):.0f}"
                 )
                 print(lines[-1], flush=True)

@@ -39,7 +39,7 @@ class RefusedRegister(RequestRejected):
     """A Modbus exception reply; `code` is its number."""
 
     def __init__(self, device: str, what: str, code: int) -> None:
-        reason = EXCEPTIONS.get(code, "for no reason that is known")
+        reason = EXCEPTIONS.get(code, "without giving a reason")
         super().__init__(device, f"refused to {what}: Modbus exception {code}, {reason}")
         self.code = code
 

@@ -9,7 +9,7 @@ from labctl.fitting.models.memory import Memory
 from labctl.fitting.numeric.arrays import Array
 
 BODY = """
-/* What remembers: {count} followers of the temperature, of a thermal lag (time constant, s) or a hysteresis (width of a
+/* State: {count} filters of the temperature, of a thermal lag (time constant, s) or a hysteresis (width of a
  * play, K). Call {name}_begin once, and {name}_step for every sample in order of time, t_s in s; the unit is taken to
  * have rested at its first temperature. A temperature that goes straight from sample to sample is followed exactly,
  * however far they are apart. {name}_correct alone is right where the temperature has not changed for long, but for the

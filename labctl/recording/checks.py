@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
+from labctl.recording.coefficient_forms import check_coefficients
 from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, needed
 from labctl.recording.constant_rate import rate_change
 from labctl.recording.data_set_limits import refuse_large_numbers, refuse_too_many_data_sets
@@ -42,6 +43,7 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
         _squarable(path, name, values, columns.get("valid"))
     refuse_large_numbers(path, columns)
     if info.kind == "coefficients":
+        check_coefficients(path, info, columns)
         return columns
     refuse_too_many_data_sets(path, info, columns)
     if "t_s" in columns:

@@ -46,7 +46,7 @@ COLUMNS = (
         "number",
         "deg C",
         "the gyro's own thermometer",
-        frozenset({"samples", "points", "coefficients"}),
+        _BOTH,
         frozenset({"rates"}),
     ),
     *(Column(f"temperature_{a}_c", "number", "deg C", f"thermometer of axis {a}") for a in "xyz"),
@@ -67,8 +67,8 @@ COLUMNS = (
         for a in "xyz"
     ),
     Column("n", "integer", "", "number of readings behind a mean"),
-    Column("scale_factor", "number", "output unit per deg/s", "scale factor", frozenset({"coefficients"})),
-    Column("offset", "number", "output unit", "output at rest", frozenset({"coefficients"})),
+    Column("scale_factor", "number", "output unit per deg/s", "scale factor"),
+    Column("offset", "number", "output unit", "output at rest"),
     Column("axis", "text", "", "axis of a row of coefficients"),
 )
 
@@ -80,7 +80,7 @@ POSITIONED: frozenset[Motion] = frozenset({"rates", "turns", "profile"})
 def needed(info: RecordingInfo) -> list[str]:
     """Return the names of the columns that a recording of this kind, motion and these axes must have."""
     if info.kind == "coefficients":
-        return [column.name for column in COLUMNS if info.kind in column.needed_for]
+        return []  # its form says
     names = [
         column.name
         for column in COLUMNS

@@ -108,7 +108,7 @@ class LocalBench:
         try:
             row = self._store.benches.get(bench)
         except StoreError as error:
-            return BenchLeft(f"whether bench {bench} is safe cannot be read ({error}); inspect it", unconfirmed=True)
+            return BenchLeft(f"the safe state of bench {bench} cannot be read ({error}); inspect it", unconfirmed=True)
         if row is not None and row.unconfirmed:
             return BenchLeft(describe_bench(row), row.is_unconfirmed)
         return BenchLeft(describe_safe_state(bench, "") if runner.used else f"bench {bench} was not used")

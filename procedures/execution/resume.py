@@ -129,6 +129,6 @@ def _soak_unless_held(
         _repeat(context, soak, start_at, carry_out)
         return
     context.soaked = soak
-    gap = f"unwatched for {restart.gap_s:.0f} s"
+    gap = f"without supervision for {restart.gap_s:.0f} s"
     text = f"{gap}, the air never further than {deviation_c:.2f} deg C off: no soak is needed"
     context.recorder.event(Event("soak_holds", text, value=restart.gap_s, limit=limit_s, unit="s"))

@@ -75,7 +75,7 @@ class StepExecutor:
             self._recorder.event(
                 warning(
                     "soak_again",
-                    f"soaked again: {owed.temperature_c:g} deg C was left, or the unit's temperature is uncertain",
+                    f"soaking again: {owed.temperature_c:g} deg C was left, or the unit's temperature is uncertain",
                 )
             )
             self.carry_out(owed)

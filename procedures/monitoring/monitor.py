@@ -196,4 +196,4 @@ class BenchMonitor:
 
     def _note_silence(self, device: str, error: InstrumentError) -> None:
         self._gyro_c.pop(device, None)
-        self.links.change(device, "degraded", f"{error}; asked again at the next look")
+        self.links.change(device, "degraded", f"{error}; asked again at the next check")

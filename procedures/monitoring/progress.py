@@ -106,4 +106,6 @@ class ProgressTracker:
         except Exception as error:  # noqa: BLE001  an observer must never stop a bench: it is dropped, and the progress says so
             self._observer = None
             with self._lock:
-                self._progress = replace(self._progress, last_error=f"the observer failed and was dropped: {error}")
+                self._progress = replace(
+                    self._progress, last_error=f"a subscriber to the progress failed and was removed: {error}"
+                )

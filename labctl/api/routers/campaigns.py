@@ -97,7 +97,10 @@ def confirm(campaign: int, request: ConfirmRequest, service: ServiceDep) -> Camp
     summary="Follow a campaign",
     response_class=EventStream,
     responses={
-        200: {"model": EventResponse | CampaignResponse, "description": "Of `progress` a campaign, else an event."}
+        200: {
+            "model": EventResponse | CampaignResponse,
+            "description": "A campaign for `progress`, otherwise an event.",
+        }
     },
 )
 async def events(

@@ -21,7 +21,7 @@ def health(service: ServiceDep, request: Request) -> HealthResponse | PulseRespo
     return service.health() if request.state.caller is not None else service.pulse()
 
 
-@router.get("/health/heartbeat", summary="Sign of life of the service")
+@router.get("/health/heartbeat", summary="Whether the service answers")
 async def heartbeat(service: ServiceDep) -> HeartbeatResponse:
     """Whether the service answers: what every open page asks once a second.
 

@@ -37,7 +37,9 @@ from labctl.services.schemas.recordings import (
 )
 
 MapField = Annotated[str, Form(max_length=1 << 20, description="Map of the columns, as JSON or TOML; empty: proposed.")]
-ImporterField = Annotated[str, Form(max_length=100, description="Importer; empty: the one that is surest.")]
+ImporterField = Annotated[
+    str, Form(max_length=100, description="Importer; empty: the one that recognises the file best.")
+]
 OptionField = Annotated[list[str] | None, Form(max_length=20, description="Options of the importer, as KEY=VALUE.")]
 ModifiedField = Annotated[
     float | None, Form(ge=0, le=4e12, description="When the file was last written, ms since 1970.")

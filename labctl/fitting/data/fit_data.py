@@ -147,7 +147,8 @@ def fit_data_of(recording: Recording, covered: Covered | None = None) -> FitData
     """
     if recording.info.kind == "coefficients":
         raise BadInput(
-            f"{recording.info.serial}: the recording is a table of coefficients; fit it with --model weiss1995"
+            f"{recording.info.serial}: the recording is a table of coefficients and holds no readings; name a "
+            "recording of readings or means"
         )
     refuse_poses(recording.info)
     points = to_points(recording)

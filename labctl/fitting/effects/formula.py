@@ -183,7 +183,7 @@ def read_formulas(lines: Sequence[str]) -> list[Formula]:
 def checked_formulas(written: list[Formula]) -> list[Formula]:
     """Return the formulas of one request; raises BadInput for too many, and for two of one name."""
     if len(written) > MOST_FORMULAS:
-        raise BadInput(f"more than {MOST_FORMULAS} formulas, which is all that is compared at once; leave some out")
+        raise BadInput(f"more than {MOST_FORMULAS} formulas, the limit of one comparison; leave some out")
     names = [each.id for each in written]
     for name in names:
         if names.count(name) > 1:

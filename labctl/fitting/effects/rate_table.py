@@ -63,7 +63,7 @@ class MagneticSensitivity(_OncePerTurn):
 
     id = "magnetic_sensitivity"
     term = "Magnetic sensitivity"
-    sentence = "The magnetic field of the place changes the bias once per turn."
+    sentence = "The local magnetic field changes the bias once per turn."
     origin: ClassVar[Origin] = "environment"
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.005), "piezo": (0.0, 0.05)}
     aliases = ("earth_rate_tilt", "table_tilt")

@@ -63,7 +63,7 @@ class TimeDelay(_Responding):
 
     id = "time_delay"
     term = "Time delay (latency)"
-    sentence = "The output is that of a moment ago: while the rate changes it is off by delay times acceleration."
+    sentence = "The output is delayed: while the rate changes, it is off by the delay times the angular acceleration."
     name = DELAY
     parameters = (Parameter("delay_s", "s", 2e-4, 0.1, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.03), "piezo": (0.0, 0.03)}
@@ -76,7 +76,7 @@ class Bandwidth(_Responding):
 
     id = "bandwidth"
     term = "Bandwidth (first-order response)"
-    sentence = "The output follows a change of the rate like a first-order filter: late, and less the faster it is."
+    sentence = "The output follows the rate like a first-order low-pass filter: fast changes are delayed and reduced."
     name = TIME_CONSTANT
     parameters = (Parameter("time_constant_s", "s", 2e-4, 0.1, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.05)}

@@ -178,7 +178,9 @@ class ThermometerError(Effect):
 
     id = "thermometer_error"
     term = "Thermometer error"
-    sentence = "The thermometer is off; while calibrating this hides in the temperature terms, in use it does not."
+    sentence = (
+        "The thermometer reads wrong: the temperature terms of the calibration absorb this, but in use it is an error."
+    )
     by_temperature = True
     origin: ClassVar[Origin] = "bench"
     rows: ClassVar[Rows] = "all"

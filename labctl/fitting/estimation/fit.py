@@ -14,12 +14,12 @@ from labctl.fitting.data.temperature.channel import is_chambers
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
-from labctl.fitting.estimation.coefficient_tables import from_coefficients
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held_out import held_out_errors
 from labctl.fitting.estimation.held_out_legs import errors_by_leg
 from labctl.fitting.estimation.joint.findings import joint_findings
 from labctl.fitting.estimation.of_poses import of_poses
+from labctl.fitting.estimation.published.tables import from_coefficients
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.estimation.shapes import with_shapes
@@ -45,8 +45,8 @@ def fit(
     preset = preset_for(model, effects or [])
     if recording.info.motion == "poses" or preset.name == POSES:
         return of_poses(recording, model, effects or [])
-    if recording.info.kind == "coefficients" and preset.name == "weiss1995":
-        return from_coefficients(recording)
+    if recording.info.kind == "coefficients":
+        return from_coefficients(recording, model, effects or [])
     data = fit_data_of(recording, covered)
     return fit_preset(data, with_shapes(data, preset))
 

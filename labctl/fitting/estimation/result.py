@@ -38,13 +38,12 @@ class FitResult:
     residual_dps: Mapping[str, Array] = field(default_factory=dict)  #: axis -> (m,) corrected minus true rate, deg/s
     poses: PosesJson | None = None  #: what a calibration by hand says beside its coefficients
     left_out_dps: Mapping[str, float] = field(default_factory=dict)  #: effect that is not exported -> its RMS, deg/s
+    joint: JointJson | None = None  #: what several recordings say together; None for a single one
 
     def exported(self) -> tuple[FittedModel, list[LeftOut]]:
         """Return the part of the model that belongs to the unit, and what was left out, with its size."""
         model, left_out = self.fitted.exported()
         return model, [{**one, "rms_dps": self.left_out_dps.get(one["effect"])} for one in left_out]
-
-    joint: JointJson | None = None  #: what several recordings say together; None for a single one
 
     def to_json(self) -> FitResultJson:
         """Return what `labctl fit --json` gives of the model, besides serial and version."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.estimation.axis_design import axis_design
+from labctl.fitting.estimation.published.tables import models_of
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.models.presets import POSES, preset_for
 from labctl.fitting.numeric.least_squares import rank_of
@@ -24,7 +25,7 @@ def suggested_model(points: Recording) -> str:
     Raises NotEnoughData where there is not one complete data set.
     """
     if points.info.kind == "coefficients":
-        return "weiss1995"
+        return models_of(points)[0]
     if points.info.motion == POSES:
         return POSES
     data = fit_data_of(points)

@@ -30,7 +30,9 @@ class AxisFit:
 
     @property
     def u(self) -> NDArray[np.float64]:
-        """Standard uncertainties, (k, m); NaN where there were no more data than coefficients."""
+        """Standard uncertainties, (k, m); NaN without more data than coefficients, or where a table states none."""
+        if not np.any(self.covariance):
+            return np.full(self.values.shape, np.nan)
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(self.values.shape)
 
     def u_of(self, name: str) -> float:

@@ -21,7 +21,7 @@ def read_map(path: Path) -> ColumnMap:
     try:
         text = read_toml_text(path)
     except OSError as error:
-        raise BadInput(f"--map {path}: {error.strerror or error}; name a file that is there") from error
+        raise BadInput(f"--map {path}: {error.strerror or error}; name an existing file") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise BadInput(f"--map {path}: not TOML: {error}; correct the map") from error
     return parse_map(text, f"--map {path}")

@@ -173,14 +173,14 @@ def _info(
     taken = sorted(_TAKEN & set(column_map.info))
     if taken:
         problems.add(
-            f"[info] {taken[0]}: this key stands at the top of a map, or is found by itself; leave it out here"
+            f"[info] {taken[0]}: this key belongs at the top level of a map, or comes from the file; leave it out here"
         )
         return None
     started = column_map.started_at or times.started_at or table.started_at
     noted = [str(column_map.info.get("notes") or table.facts.get("notes") or "")]
     if started is None:
         started = _modified(table)
-        noted.append("started_at is when the file was written: nothing in it says more")
+        noted.append("started_at is the time at which the file was last written; the file states no start time")
     head = {
         **{key: value for key, value in table.facts.items() if key not in _TAKEN},
         **column_map.info,

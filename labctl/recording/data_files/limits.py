@@ -33,7 +33,7 @@ class Space:
         if self._left < 0:
             raise BadRecording(
                 f"{self._path}: column {column[:80]!r}: the file's values take more than "
-                f"{MOST_VALUES * VALUE_BYTES / 1e6:g} MB, all that one file may; {_ADVICE}, or shorten its texts"
+                f"{MOST_VALUES * VALUE_BYTES / 1e6:g} MB, the limit of one file; {_ADVICE}, or shorten its texts"
             )
 
 

@@ -30,8 +30,8 @@ def encoding_of(path: Path, head: bytes) -> str:
     for position, byte in enumerate(head):
         if byte < 32 and byte not in _ALLOWED:
             raise BadRecording(
-                f"{path}: byte {position + 1} is {byte:#04x}, which no text has: a binary file that no installed "
-                "importer knows; export it as CSV, or install the package of an importer that reads it"
+                f"{path}: byte {position + 1} is {byte:#04x}, which does not occur in text: a binary file "
+                "that no installed importer reads; export it as CSV, or install the package of an importer of it"
             )
     try:
         codecs.getincrementaldecoder("utf-8-sig")().decode(head)

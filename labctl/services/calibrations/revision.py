@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -164,9 +165,7 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
                 f"effect {effect_id!r} is not in version {row.version}; choose one of {', '.join(model.effect_ids)}"
             )
     written = read_formulas(request.formula)
-    if len(request.add) > len(CATALOGUE):
-        raise BadInput(f"{len(request.add)} effects to add; give at most {len(CATALOGUE)}")
-    wanted = [*(parse_term(text) for text in request.add), *(Term(f.id, formula=f.text) for f in written)]
+    wanted = [*_terms(request.add), *(Term(f.id, formula=f.text) for f in written)]
     if not wanted and not request.remove:
         raise BadInput("give the change: --add EFFECT, --remove EFFECT or --formula 'name: expression'")
     _refuse_what_changes_nothing(wanted, model, request, row.version)
@@ -175,6 +174,16 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     before = fit_preset(context, changed(model))
     after = fit_preset(context, with_shapes(context, changed(model, add, tuple(request.remove)), all_of_them=bool(add)))
     return _Change(row, measured, before, after)
+
+
+def _terms(texts: Sequence[str]) -> list[Term]:
+    """Return the effects to add. Raises BadInput for one that is unknown or given twice."""
+    terms = [parse_term(text) for text in texts]
+    counts = Counter(term.effect for term in terms)
+    repeated = next((effect for effect, count in counts.items() if count > 1), None)
+    if repeated is not None:
+        raise BadInput(f"effect {repeated!r} is given {counts[repeated]} times in one change; give it once")
+    return terms
 
 
 def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:

@@ -94,7 +94,9 @@ def prepare_resume(
     gap_s = t_s - standing.last_t_s
     added = standing.added_runs + int(new_session)
     power = "the power failed meanwhile" if lost else "the units stayed on"
-    reason = f"resumed by {request.by} after {gap_s:.0f} s unwatched; {power}{_other_drivers(row, bench_file)}"
+    reason = (
+        f"resumed by {request.by} after {gap_s:.0f} s without supervision; {power}{_other_drivers(row, bench_file)}"
+    )
     bench = opened or open_bench(bench_file, clock)
     try:
         _mark_resumed(store, row, standing, Resumption(t_s, clock.utc(), reason, added, new_session, boot_id()))

@@ -88,7 +88,7 @@ def surest(path: Path) -> str:
         if path.is_file():
             known = ", ".join(f"{name}: {importer.title}" for name, importer in IMPORTERS.all().items())
             raise BadRecording(
-                f"{path}: no installed importer knows this file (there are {known}); install the package of one that "
+                f"{path}: no installed importer reads this file (there are {known}); install the package of one that "
                 "does, or name one with --format"
             )
         return INTERCHANGE
@@ -134,12 +134,12 @@ def log_with_map(path: Path, name: str | None, options: Mapping[str, str], colum
     chosen = name or surest(path)
     importer, given = _importer_and_options(chosen, options)
     if not isinstance(importer, TableImporter):
-        raise BadInput(f"{path}: importer {chosen} knows its columns by itself; import it with `labctl import`")
+        raise BadInput(f"{path}: importer {chosen} determines the columns itself; import it with `labctl import`")
     return mapped_file(chosen, importer, path, given, column_map)
 
 
 def _no_map(name: str) -> BadInput:
-    return BadInput(f"--map: importer {name} knows its columns by itself; leave the map out")
+    return BadInput(f"--map: importer {name} determines the columns itself; leave the map out")
 
 
 def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Importer[Any] | TableImporter[Any], Any]:

@@ -38,7 +38,7 @@ class KeyRequest(Request):
     """A key to make."""
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._@-]{0,99}$")] = Field(
-        description="Whose it is: the name that the audit trail will show. Used once."
+        description="Owner's name, shown in the audit trail; each name is used once."
     )
     role: Role
 
@@ -66,7 +66,7 @@ class AuditResponse(ResponseModel):
     who: str
     action: str
     subject: str
-    detail: dict[str, JsonValue] = Field(description="What belongs to the act; its keys depend on `action`.")
+    detail: dict[str, JsonValue] = Field(description="Details of the action; the keys depend on `action`.")
     hash: str
 
 

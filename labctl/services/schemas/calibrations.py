@@ -226,7 +226,9 @@ class VersionFacts(ResponseModel):
 
     created_at: datetime
     in_force: bool
-    due: datetime | None = Field(default=None, description="Until when it is in force as certified; null: no date.")
+    due: datetime | None = Field(
+        default=None, description="Date until which the certification is valid; null: no date."
+    )
     certification: CertificationResponse | None = Field(
         description="The newest act on this version; null: there was none."
     )

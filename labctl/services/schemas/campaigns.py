@@ -134,7 +134,7 @@ class AdviceResponse(ResponseModel):
 
     happened: str
     done: str = Field(description="What labctl did.")
-    next: str = Field(description="What the operator has to do next.")
+    next: str = Field(description="What the operator must do next.")
 
 
 class DriverResponse(ResponseModel):
@@ -167,7 +167,7 @@ class CampaignResponse(ResponseModel):
     last_error: str | None = None
     wish: Literal["pause", "abort"] | None = Field(default=None, description="Requested, and not yet carried out.")
     prompt: PromptResponse | None = Field(default=None, description="The question that waits for a person.")
-    links: dict[str, str] = Field(default_factory=dict, description="Instruments that are degraded or lost.")
+    links: dict[str, str] = Field(default_factory=dict, description="Instruments that answer late or not at all.")
     dropped: dict[str, str] = Field(default_factory=dict, description="Units that take no further part: name -> why.")
     abandoned: bool = Field(default=False, description="No process runs it any more, and it has no end.")
     started_at: datetime | None = None

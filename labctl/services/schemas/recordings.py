@@ -170,7 +170,7 @@ class AllanResponse(ResponseModel):
     axes: dict[str, AllanJson] = Field(
         description="tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K."
     )
-    datasheet: dict[str, float] = Field(default_factory=dict, description="What the maker promises, if it is known.")
+    datasheet: dict[str, float] = Field(default_factory=dict, description="Figures of the data sheet, if it is known.")
 
 
 class LogColumn(ResponseModel):
@@ -205,7 +205,7 @@ class LogPreview(ResponseModel):
 
     file: str
     importer: str
-    title: str = Field(description="What the format is called.")
+    title: str = Field(description="Title of the format.")
     rows: int
     columns: list[LogColumn]
     first_rows: list[list[str]]

@@ -33,7 +33,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Sign of life of the service
+         * Whether the service answers
          * @description Whether the service answers: what every open page asks once a second.
          *
          *     No key is asked for and no database is read. `heard_s`, where present: seconds since the last answer of the
@@ -1268,7 +1268,7 @@ export interface components {
             done: string;
             /**
              * Next
-             * @description What the operator has to do next.
+             * @description What the operator must do next.
              */
             next: string;
         };
@@ -1323,7 +1323,7 @@ export interface components {
             };
             /**
              * Datasheet
-             * @description What the maker promises, if it is known.
+             * @description Figures of the data sheet, if it is known.
              */
             datasheet: {
                 [key: string]: number;
@@ -1475,7 +1475,7 @@ export interface components {
             subject: string;
             /**
              * Detail
-             * @description What belongs to the act; its keys depend on `action`.
+             * @description Details of the action; the keys depend on `action`.
              */
             detail: {
                 [key: string]: components["schemas"]["JsonValue"];
@@ -1759,7 +1759,7 @@ export interface components {
             column_map?: string;
             /**
              * Importer
-             * @description Importer; empty: the one that is surest.
+             * @description Importer; empty: the one that recognises the file best.
              * @default
              */
             importer?: string;
@@ -1791,7 +1791,7 @@ export interface components {
             column_map?: string;
             /**
              * Importer
-             * @description Importer; empty: the one that is surest.
+             * @description Importer; empty: the one that recognises the file best.
              * @default
              */
             importer?: string;
@@ -1981,7 +1981,7 @@ export interface components {
             prompt: components["schemas"]["PromptResponse"] | null;
             /**
              * Links
-             * @description Instruments that are degraded or lost.
+             * @description Instruments that answer late or not at all.
              */
             links: {
                 [key: string]: string;
@@ -3398,7 +3398,7 @@ export interface components {
             in_force: boolean;
             /**
              * Due
-             * @description Until when it is in force as certified; null: no date.
+             * @description Date until which the certification is valid; null: no date.
              */
             due: string | null;
             /** @description The newest act on this version; null: there was none. */
@@ -3439,7 +3439,7 @@ export interface components {
         KeyRequest: {
             /**
              * Name
-             * @description Whose it is: the name that the audit trail will show. Used once.
+             * @description Owner's name, shown in the audit trail; each name is used once.
              */
             name: string;
             role: components["schemas"]["Role"];
@@ -3652,7 +3652,7 @@ export interface components {
             importer: string;
             /**
              * Title
-             * @description What the format is called.
+             * @description Title of the format.
              */
             title: string;
             /** Rows */
@@ -5618,7 +5618,7 @@ export interface components {
             in_force: boolean;
             /**
              * Due
-             * @description Until when it is in force as certified; null: no date.
+             * @description Date until which the certification is valid; null: no date.
              */
             due: string | null;
             /** @description The newest act on this version; null: there was none. */
@@ -6973,7 +6973,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Of `progress` a campaign, else an event. */
+            /** @description A campaign for `progress`, otherwise an event. */
             200: {
                 headers: {
                     [name: string]: unknown;

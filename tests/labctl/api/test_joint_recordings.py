@@ -37,7 +37,7 @@ def test_several_recordings_in_bodies_and_queries(unit: TestClient) -> None:
     assert rows["recording"] == [1] * 45 + [2] * 45
     assert rows["dataset"] == 2 * list(range(1, 46))
     alone = unit.get(f"{UNIT}/calibrations/1/residuals", params={"recording": 1}).json()["columns"]
-    assert alone["recording"] == [1] * len(alone["dataset"]) == [1] * 45
+    assert (alone["recording"], len(alone["dataset"])) == ([1] * 45, 45)
     changed = unit.post(f"{UNIT}/calibrations/1/improve", json={"add": ["scale_factor_even"], **several})
     assert changed.json()["recordings"] == [1, 2]
     assert unit.get(f"{UNIT}/calibrations/1/assessment").json()["verdict_recording"] == 2

@@ -179,4 +179,4 @@ def test_a_request_has_at_most_20_formulas(client: TestClient) -> None:
     assert [answer.status_code for answer in asked] == [400] * 4
     assert all("more than 20 formulas" in answer.json()["detail"] for answer in asked)
     answer = client.post(f"{version}/preview", json={"add": ["dead_band"] * 40})
-    assert (answer.status_code, "the catalogue has" in answer.json()["detail"]) == (400, True)
+    assert (answer.status_code, "is given 40 times" in answer.json()["detail"]) == (400, True)

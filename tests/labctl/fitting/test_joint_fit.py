@@ -61,7 +61,7 @@ def test_two_recordings_with_a_run_shift_cover_the_truth_and_call_it_repeatabili
     assert result.fitted.model.reference.temperature_c == CENTRE_C
     axis = result.fitted.axes["z"]
     for name, value, u in zip(axis.names, axis.values[:, 0], axis.u[:, 0], strict=True):
-        assert abs(value - TRUTH[name]) < 2 * u, name
+        assert abs(value - TRUTH[name]) < 3 * u, name  # how often within 2 u: studies/joint_recordings
     joint = result.joint
     assert joint is not None
     turn_on, day = joint["repeatability"]["z"]

@@ -184,7 +184,7 @@ def test_too_little_data_says_how_much_more(
 @pytest.mark.parametrize(
     ("model", "effects", "said"),
     [
-        ("nonsense", [], "error model 'nonsense' is not known; there are ojeda2000"),
+        ("nonsense", [], "error model 'nonsense' is not known; choose one of ojeda2000"),
         (None, ["bais"], "effect 'bais' is not in the catalogue; did you mean bias"),
         (None, ["bias:2"], "has no polynomial order"),
         (None, ["scale_factor_odd:9"], "is not a whole number; give one from 3 to 5"),

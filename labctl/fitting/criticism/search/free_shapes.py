@@ -49,7 +49,7 @@ def channels_of_free_shape(
     `first` is the comparison without the terms, `beside` the one with them and their discrepancy in its base, at whose
     scatter all are weighed. Terms that are exact need no discrepancy.
     """
-    report_stage(f"weighing {', '.join(term.effect for term in terms) or 'channels'} against free shapes")
+    report_stage(f"comparing {', '.join(term.effect for term in terms) or 'channels'} with free shapes")
     model = with_steady(first, terms)
     named: float = 0.0
     free: dict[tuple[str, ...], float] = {}

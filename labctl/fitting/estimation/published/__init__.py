@@ -1,0 +1,1 @@
+"""Calibrations from published tables of coefficients instead of readings."""
