@@ -89,14 +89,12 @@ def prepare_resume(
         request.power is None and (new_world or power_failed(standing.boot_id, boot_id()))
     )
     new_session = lost and plan.run_at(standing.start_at, standing.skipped) > 0
-    since_s = (clock.utc() - row.started_at).total_seconds() if row.started_at else 0.0
-    t_s = max(standing.last_t_s, since_s)
+    t_s = max(standing.last_t_s, (clock.utc() - row.started_at).total_seconds() if row.started_at else 0.0)
     gap_s = t_s - standing.last_t_s
     added = standing.added_runs + int(new_session)
     power = "the power failed meanwhile" if lost else "the units stayed on"
-    reason = (
-        f"resumed by {request.by} after {gap_s:.0f} s without supervision; {power}{_other_drivers(row, bench_file)}"
-    )
+    changed = _other_drivers(row, bench_file)
+    reason = f"resumed by {request.by} after {gap_s:.0f} s without supervision; {power}{changed}"
     bench = opened or open_bench(bench_file, clock)
     try:
         _mark_resumed(store, row, standing, Resumption(t_s, clock.utc(), reason, added, new_session, boot_id()))
