@@ -18,6 +18,8 @@ class DataSetColumns(TypedDict):
     of: NotRequired[int]
     timed: NotRequired[bool]
     dataset: NotRequired[list[int]]
+    recording: NotRequired[list[int]]  #: of several recordings, the number of the data set's
+    own_dataset: NotRequired[list[int]]  #: and the number that the data set has there
     position: NotRequired[list[str]]
     run: NotRequired[list[int]]
     channels: NotRequired[dict[str, Numbers]]

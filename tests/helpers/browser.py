@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import threading
 from collections.abc import Callable
@@ -33,6 +34,14 @@ PATIENCE_MS = 45_000
 REQUEST_S = 120.0
 #: For requests that run when the service stops, whole seconds.
 GRACE_S = 20
+
+#: The traces and the layout of a figure as Plotly has them, with typed arrays as lists.
+READ = """name => {
+  const plot = [...document.querySelectorAll(".plot")].find((each) => each.getAttribute("aria-label").startsWith(name));
+  if (!plot?.data) return null;
+  const plain = (key, value) => (ArrayBuffer.isView(value) ? [...value] : value);
+  return JSON.stringify({data: plot.data, layout: plot.layout}, plain);
+}"""
 
 
 class Server(uvicorn.Server):
@@ -132,3 +141,12 @@ def settled(page: Page) -> None:
     """Wait until the page has what it asked for."""
     page.wait_for_selector("main h1")
     page.wait_for_function("() => !document.querySelector('main[aria-busy], .busy')")
+
+
+def figure(page: Page, name: str) -> dict[str, Any]:
+    """Return what a figure of the page shows, once it is drawn."""
+    plot = page.locator(f'.plot[aria-label^="{name}"]').first
+    plot.scroll_into_view_if_needed()
+    page.wait_for_function(f"name => ({READ})(name) !== null", arg=name)
+    found: dict[str, Any] = json.loads(page.evaluate(READ, name))
+    return found

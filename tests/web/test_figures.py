@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 
 from labctl.plots.temperature_scale import TEMPERATURE_SCALE
-from tests.helpers.browser import NARROW, Service
+from tests.helpers.browser import NARROW, Service, figure
 from tests.helpers.rounding_cases import CASES
 from tests.helpers.simulated_recordings import three_axes
 
@@ -18,14 +17,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 pytestmark = pytest.mark.timeout(400)
-
-#: The traces and the layout of a figure as Plotly has them, with typed arrays as lists.
-READ = """name => {
-  const plot = [...document.querySelectorAll(".plot")].find((each) => each.getAttribute("aria-label").startsWith(name));
-  if (!plot?.data) return null;
-  const plain = (key, value) => (ArrayBuffer.isView(value) ? [...value] : value);
-  return JSON.stringify({data: plot.data, layout: plot.layout}, plain);
-}"""
 
 
 @pytest.fixture
@@ -36,15 +27,6 @@ def unit(service: Service) -> str:
     service.post(f"/api/units/{recording.info.serial}/calibrations", {"model": "yang2018"})
     service.get(f"/api/units/{recording.info.serial}/calibrations/1/criticism")  # kept: the page need not wait for it
     return recording.info.serial
-
-
-def figure(page: Page, name: str) -> dict[str, Any]:
-    """Return what a figure of the page shows, once it is drawn."""
-    plot = page.locator(f'.plot[aria-label^="{name}"]').first
-    plot.scroll_into_view_if_needed()
-    page.wait_for_function(f"name => ({READ})(name) !== null", arg=name)
-    found: dict[str, Any] = json.loads(page.evaluate(READ, name))
-    return found
 
 
 def opened(visit: Callable[..., Page], unit: str, view: str, **dress: Any) -> Page:

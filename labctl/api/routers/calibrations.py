@@ -212,10 +212,14 @@ async def comparison(
     version: int,
     service: ServiceDep,
     recording: RecordingNumber = None,
+    recordings: RecordingNumbers = None,
     other_unit: OtherUnit = False,
 ) -> ComparisonResponse:
     """Measured and modelled error, data set by data set, and the version's model as lines; nothing is refitted."""
-    return await while_connected(request, service, compare_version, serial, version, recording, other_unit=other_unit)
+    return await while_connected(
+        request, service, compare_version, serial, version, recording, recordings=tuple(recordings or ()),
+        other_unit=other_unit,
+    )  # fmt: skip
 
 
 @router.get("/calibrations/{version}/surface", summary="The modelled error over rate and temperature")

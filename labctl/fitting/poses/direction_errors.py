@@ -24,6 +24,11 @@ class MoveErrors:
 
     rate_dps: NDArray[np.float64]  #: (m, 2) two components square to gravity, divided by the move's duration
     by_axis_dps: NDArray[np.float64]  #: (m, 3) the same about the body axes; what is about the vertical is not seen
+    t_s: NDArray[np.float64]  #: (m, 2) begin and end of each move
+    accelerometer_deg: Array  #: (m,) by how much gravity's direction moved in the body, by the accelerometer
+    gyro_deg: Array  #: (m,) the same by the integrated rates
+    residual_deg: Array  #: (m,) angle between gravity's direction at the end by the rates and by the accelerometer
+    left_out: tuple[str, ...]  #: moves that cannot be used: when, and why
     outside: NDArray[np.bool_]  #: (m,) whether a reading lay outside what the correction is valid for
 
 
@@ -40,10 +45,11 @@ def move_errors(recording: Recording, correct: Correct) -> MoveErrors:
     rests = find_rests(readings)
     accelerometer = calibrate_accelerometer(readings, rests)
     true, outside = correct(readings.gyro_dps)
-    moves = moves_between(readings, rests, true)
-    moves = moves.take(moves.usable)
-    found = uncorrected_errors(moves, accelerometer)
-    there = accelerometer.up[moves.before + 1]
+    every = moves_between(readings, rests, true)
+    moves = every.take(every.usable)
+    before, there = accelerometer.up[moves.before], accelerometer.up[moves.before + 1]
+    seen = gravity_at_end(moves, accelerometer)
+    found = _square_to(there, seen - there)
     # a small rotation by r turns gravity by r x up, so r = up x what gravity is off by
     about = np.asarray(np.cross(there, np.einsum("mc,mca->ma", found, tangents(there))), dtype=np.float64)
     counted = np.concatenate([[0], np.cumsum(outside)])
@@ -51,16 +57,39 @@ def move_errors(recording: Recording, correct: Correct) -> MoveErrors:
     return MoveErrors(
         per_second(found, moves.duration_s),
         per_second(about, moves.duration_s),
+        moves.t_s,
+        angle_between_deg(before, there),
+        angle_between_deg(before, seen),
+        angle_between_deg(there, seen),
+        tuple(
+            f"move from {t[0]:.4g} to {t[1]:.4g} s: {why}"
+            for t, why in zip(every.t_s, every.why_not, strict=True)
+            if why
+        ),
         counted[within[:, 1] + 1] > counted[within[:, 0]],
     )
 
 
 def uncorrected_errors(moves: Moves, accelerometer: Accelerometer) -> NDArray[np.float64]:
     """Return the errors of gravity's direction by the moves' rates as they are, (m, 2) rad."""
-    rotations = integrate(np.radians(moves.rate_dps), moves.step_s, moves.share, np.zeros((3, 3)))
     there = accelerometer.up[moves.before + 1]
-    seen = seen_at_end(accelerometer.up[moves.before], rotations.matrix)
-    return np.asarray(np.einsum("mca,ma->mc", tangents(there), seen - there))
+    return _square_to(there, gravity_at_end(moves, accelerometer) - there)
+
+
+def gravity_at_end(moves: Moves, accelerometer: Accelerometer) -> NDArray[np.float64]:
+    """Return gravity's direction in the body at the end of each move by its rates as they are, (m, 3)."""
+    rotations = integrate(np.radians(moves.rate_dps), moves.step_s, moves.share, np.zeros((3, 3)))
+    return seen_at_end(accelerometer.up[moves.before], rotations.matrix)
+
+
+def angle_between_deg(first: NDArray[np.float64], second: NDArray[np.float64]) -> Array:
+    """Return the angles between directions (m, 3) of length 1, (m,) deg; exact also near 0 and 180 deg (Kahan 2006)."""
+    apart, along = np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1)
+    return np.asarray(np.degrees(2 * np.arctan2(apart, along)))
+
+
+def _square_to(there: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.einsum("mca,ma->mc", tangents(there), error))
 
 
 def per_second(angle: NDArray[np.float64], seconds: Array) -> NDArray[np.float64]:

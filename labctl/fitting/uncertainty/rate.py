@@ -11,6 +11,7 @@ import numpy as np
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.presets import POSES
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.use import AxisEvidence, combined_dps
 
@@ -22,6 +23,7 @@ LARGEST = 1e5
 PUBLISHED = "published coefficients state none"
 NO_DATA_SETS = "published coefficients have no data sets that could show it"
 NOT_KEPT = "the version was made by an older labctl, which did not store it: fit it again"
+BY_HAND = "turns between rests have no rate of their own that could show it; measure the unit on a table as well"
 NO_POWER_ON = "one power-on was recorded, and neither a data sheet nor a static record states the repeatability"
 #: Step of the numerical derivative of the error along the rate, deg/s.
 STEP_DPS = 0.01
@@ -78,6 +80,7 @@ def _of_axis(
     coefficients = _of_coefficients(fitted, axis, rate_dps, temperature_c)
     beyond = evidence.model_error.at(rate_dps, temperature_c) if evidence else None
     repeatability = evidence.repeatability if evidence else None
+    model = fitted.model.name
     later = repeatability.u_dps if repeatability else None
     same_run, combined = combined_dps(coefficients, beyond), combined_dps(coefficients, beyond, later)
     if combined is not None and repeatability is not None:
@@ -90,17 +93,17 @@ def _of_axis(
         same_run,
         combined,
         None if combined is None else COVERAGE * combined,
-        {part: why for part, why in _unknown(coefficients, evidence, rate_dps, temperature_c).items() if why},
+        {part: why for part, why in _unknown(coefficients, evidence, model, rate_dps, temperature_c).items() if why},
     )
 
 
 def _unknown(
-    coefficients_dps: float | None, evidence: AxisEvidence | None, rate_dps: float, temperature_c: float
+    coefficients_dps: float | None, evidence: AxisEvidence | None, model: str, rate_dps: float, temperature_c: float
 ) -> dict[str, str | None]:
     """Return part -> why it is unknown, in words; None for a part that is known."""
     published = coefficients_dps is None
     if evidence is None:
-        lacking = NO_DATA_SETS if published else NOT_KEPT
+        lacking = NO_DATA_SETS if published else BY_HAND if model == POSES else NOT_KEPT
         return {"coefficients": PUBLISHED if published else None, "model": lacking, "repeatability": lacking}
     return {
         "coefficients": PUBLISHED if published else None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 
-from labctl.calibration import build_calibration
+from labctl.calibration import build_calibration, read_calibration
 from labctl.exports import export_calibration
 from labctl.fitting import fit
 from labctl.fitting.effects.response import IDS
@@ -14,6 +14,7 @@ from labctl.json_types.models import KeptFit
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
+from labctl.services.calibrations.remembered import remembered_by
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.recordings.inspection import as_json, refuse_wrong, warning_of
 from labctl.services.recordings.loading import chosen_rows
@@ -104,10 +105,12 @@ def one_version(store: Store, serial: str, version: int) -> VersionResponse | Im
     row = store.calibrations.get(store.units.get(serial).serial, version)
     history = store.calibrations.history(serial)
     in_force = bool(history) and history[0].act == "certify" and history[0].version == version
+    calibration = read_calibration(row.document)
     last = next((certification_response(act) for act in history if act.version == version), None)
     beside = {
         "parent": row.parent, "recording": row.recording, "recordings": list(row.recordings),
         "created_at": row.created_at, "hash": row.hash,
+        "left_out": list(calibration.document["left_out"]), "remembers": remembered_by(calibration),
         "in_force": in_force, "due": last.due if last is not None and in_force else None, "certification": last,
     }  # fmt: skip
     kind = ImprovedVersionResponse if "improved_from" in row.answer else VersionResponse

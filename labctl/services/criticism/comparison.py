@@ -6,7 +6,7 @@ Nothing is fitted here: points, lines, what remains and the error per turn all c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -20,28 +20,32 @@ from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows
 from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.answers import ComparisonJson
+from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.model_lines import lines_over
+from labctl.services.criticism.residuals import own_numbers
 from labctl.services.criticism.verification.of_version import applied_errors
-from labctl.services.recordings.loading import newest_row, points_of
+from labctl.services.recordings.loading import chosen_rows
 from labctl.services.schemas.comparison import ComparisonColumns, ComparisonResponse
 from labctl.store import Store
 
 
 def compare_version(
-    store: Store, serial: str, version: int, recording: int | None, *, other_unit: bool = False
-) -> ComparisonResponse:
-    """Return a version's model beside a recording; `other_unit` allows a recording of another unit.
+    store: Store, serial: str, version: int, recording: int | None, *, recordings: Sequence[int] = (),
+    other_unit: bool = False,
+) -> ComparisonResponse:  # fmt: skip
+    """Return a version's model beside a recording, or several; `other_unit` allows a recording of another unit.
 
     Raises NotFound, BadInput, NotEnoughData, NotConverged.
     """
     row = store.calibrations.get(store.units.get(serial).serial, version)
-    measured = newest_row(store, serial, recording, other_unit=other_unit)
+    measured = Measurements(store, chosen_rows(store, serial, recording, recordings, other_unit=other_unit))
     calibration = read_calibration(row.document)
-    points = points_of(store, measured)
+    points = measured.points
     data, (errors, _) = fit_data_of(points), applied_errors(calibration, points)
+    does = "does" if len(measured.rows) == 1 else "do"
     if lacking := data.channels.missing(calibration.fitted.model.needs):
         raise BadInput(
-            f"{serial} version {version} needs {', '.join(lacking)}, which recording {measured.id} does not have; "
+            f"{serial} version {version} needs {', '.join(lacking)}, which {measured.named} {does} not have; "
             "name another recording"
         )
     held = {
@@ -50,11 +54,11 @@ def compare_version(
     }
     over_rate, over_temperature = lines_over(calibration.fitted, data, held, up_rate_dps(data.info))
     return ComparisonResponse(
-        serial=serial, version=version, recording=measured.id, fitted_to=row.recording,
-        source=_source(calibration, row.recording, measured.id),
+        serial=serial, version=version, recording=measured.row.id, recordings=list(measured.recordings),
+        fitted_to=row.recording, source=_source(calibration, row.recordings, measured),
         held=held, left_out=list(calibration.document["left_out"]),
         least_turn_rate_dps=LEAST_RATE_DPS, at_rest_dps=AT_REST_DPS,
-        columns=_columns(data, errors), over_rate=over_rate, over_temperature=over_temperature,
+        columns=_columns(data, errors, measured.row.id), over_rate=over_rate, over_temperature=over_temperature,
     )  # fmt: skip
 
 
@@ -67,17 +71,23 @@ def comparison_json(store: Store, serial: str, version: int, recording: int) -> 
         return None
 
 
-def _source(calibration: Calibration, fitted_to: int | None, recording: int) -> str:
-    own = "which it was fitted to" if fitted_to == recording else "which it was not fitted to"
-    return f"version {calibration.version} without refitting, on recording {recording}, {own}"
+def _source(calibration: Calibration, fitted_to: Sequence[int], measured: Measurements) -> str:
+    own = "which it was fitted to" if set(fitted_to) >= set(measured.recordings) else "which it was not fitted to"
+    if 0 < len(set(fitted_to) & set(measured.recordings)) < len(measured.recordings):
+        own = f"of which it was fitted to {', '.join(map(str, sorted(set(fitted_to) & set(measured.recordings))))}"
+    return f"version {calibration.version} without refitting, on {measured.named}, {own}"
 
 
-def _columns(data: FitData, errors: Mapping[str, Array]) -> ComparisonColumns:
-    """Return the rows of all output axes; `errors` are axis -> (m,) corrected minus true rate, deg/s."""
+def _columns(data: FitData, errors: Mapping[str, Array], recording: int) -> ComparisonColumns:
+    """Return the rows of all output axes; `errors` are axis -> (m,) corrected minus true rate, deg/s.
+
+    `recording` is the number of a single recording.
+    """
     position = np.asarray(data.channels["position"]).astype(np.str_)
     rate = data.channels.table_rate_dps()
     level = rate_levels(rate)
-    parts = [_axis(data, axis, errors[axis], position, level_centres(rate, level), level) for axis in errors]
+    numbers = own_numbers(data.channels, recording)
+    parts = [numbers | _axis(data, axis, errors[axis], position, level_centres(rate, level), level) for axis in errors]
     columns = {name: [value for part in parts for value in part[name]] for name in ComparisonColumns.model_fields}
     return ComparisonColumns.model_validate(columns, extra="forbid")
 
@@ -95,7 +105,6 @@ def _axis(
         for error in (measured, residual)
     )
     return {
-        "dataset": np.asarray(channels["dataset"], dtype=np.int64).tolist(),
         "axis": [axis] * len(data),
         "position": position.tolist(),
         "table_rate_dps": rate.tolist(),

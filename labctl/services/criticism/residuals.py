@@ -65,15 +65,24 @@ def _shared(sets: Channels, dataset: np.ndarray, points: Recording, recording: i
         known = dict(
             zip(np.asarray(points.columns["dataset"]).tolist(), np.asarray(points.columns["n"]).tolist(), strict=True)
         )
-    of = np.rint(np.asarray(sets[RECORDING], dtype=np.float64)).astype(int).tolist() if RECORDING in sets else []
-    own = np.rint(np.asarray(sets[OWN_DATASET], dtype=np.float64)).astype(int) if of else dataset
+    single = {"recording": [recording] * len(dataset), "dataset": dataset.tolist()}
     return {
-        "recording": of or [recording] * len(dataset),
-        "dataset": own.tolist(),
+        **(own_numbers(sets, recording) if RECORDING in sets else single),
         "position": [str(there) for there in sets["position"]],
         "run": np.rint(sets["run"]).astype(int).tolist() if "run" in sets else [1] * len(dataset),
         "n": [known.get(number) for number in dataset.tolist()],
     }
+
+
+def own_numbers(sets: Channels, recording: int) -> dict[str, list[int]]:
+    """Return `recording` and `dataset` of each row: of several recordings as one, or of the single one `recording`."""
+
+    def numbers(name: str) -> list[int]:
+        return [int(number) for number in np.rint(np.asarray(sets[name], dtype=np.float64))]
+
+    if RECORDING in sets:
+        return {"recording": numbers(RECORDING), "dataset": numbers(OWN_DATASET)}
+    return {"recording": [recording] * len(sets), "dataset": numbers("dataset")}
 
 
 def _axis(

@@ -15,14 +15,25 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.trend_line import LEAST_POINTS, TrendLine, trend_line
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, verify
+from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, expected_dps, verify
 from labctl.services.criticism.versions import version_of
-from labctl.services.schemas.units import AppliedVersion, AxisPoint, Drift, Leaving, TrendPoint, TrendResponse
+from labctl.services.schemas.units import (
+    AppliedVersion,
+    AxisPoint,
+    Drift,
+    DriftLine,
+    Leaving,
+    TrendPoint,
+    TrendResponse,
+)
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 YEAR = timedelta(days=365.25)
 #: Data sets at less different rates than this show no scale factor.
 LEAST_RATES = 2
+#: Points of a drawn line; it goes on to this many times the span of the recordings, beyond the time at which the limit
+#: is reached by this factor, and no farther than this many spans.
+DRAWN, BEYOND, REACHED, FARTHEST = 61, 1.5, 1.1, 4.0
 
 
 def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps: float | None = None) -> TrendResponse:
@@ -47,7 +58,8 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
     lines = list(_lines(points))
     limit = limit_dps if limit_dps is not None else _stated(reference)
     leaves = list(_leaving(lines, points, limit)) if limit else []
-    drifts = [_drift(axis, what, unit, line) for axis, what, unit, line in lines]
+    drawn = _drawn(points, leaves)
+    drifts = [_drift(axis, what, unit, line, points, drawn) for axis, what, unit, line in lines]
     return TrendResponse(
         serial=serial, version=reference.version, limit_dps=limit, points=points, drifts=drifts, leaves=leaves,
         text=[*_text(drifts, len(points)), *_leaving_text(leaves, limit)],
@@ -59,9 +71,7 @@ def _start(row: RecordingRow) -> datetime:
 
 
 def _stated(row: CalibrationRecord) -> float | None:
-    error = row.answer["error"]
-    known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"]) if figure]
-    return LARGEST_RATIO * max(known) if known else None
+    return LARGEST_RATIO * expected if (expected := expected_dps(row)) else None
 
 
 def _point(
@@ -132,7 +142,30 @@ def _lines(points: Sequence[TrendPoint]) -> Iterator[tuple[str, str, str, TrendL
             yield axis, what, unit, line
 
 
-def _drift(axis: str, what: str, unit: str, line: TrendLine) -> Drift:
+def _drawn(points: Sequence[TrendPoint], leaves: Sequence[Leaving]) -> Array:
+    """Return the years since the first recording at which a line is drawn: half as far again, or to the limit."""
+    if not points:
+        return np.zeros(0)
+    last = (points[-1].at - points[0].at) / YEAR
+    reached = [(leaf.expected - points[0].at) / YEAR for leaf in leaves if leaf.expected is not None]
+    until = min(max([BEYOND * last, *(REACHED * years for years in reached)]), FARTHEST * last)
+    return np.linspace(0.0, until, DRAWN)
+
+
+def _course(line: TrendLine, points: Sequence[TrendPoint], years: Array) -> DriftLine:
+    value, half = line.at(years)
+    known = line.freedom > 0
+    return DriftLine(
+        at=[points[0].at + each * YEAR for each in years.tolist()],
+        value=value.tolist(),
+        low=(value - half).tolist() if known else [None] * len(years),
+        high=(value + half).tolist() if known else [None] * len(years),
+    )
+
+
+def _drift(
+    axis: str, what: str, unit: str, line: TrendLine, points: Sequence[TrendPoint], years: Array
+) -> Drift:  # fmt: skip
     known = line.freedom > 0
     half = line.factor * line.u_slope
     return Drift(
@@ -140,6 +173,7 @@ def _drift(axis: str, what: str, unit: str, line: TrendLine) -> Drift:
         per_year=line.slope, u=line.u_slope if known else None,
         low=line.slope - half if known else None, high=line.slope + half if known else None,
         repeatability=line.repeatability, significant=known and abs(line.slope) > half,
+        line=_course(line, points, years),
     )  # fmt: skip
 
 
@@ -154,7 +188,8 @@ def _leaving(
     for axis, what, _, line in lines:
         if what == "bias":
             expected, earliest, latest = map(at, line.leaves(limit, last))
-            yield Leaving(axis=axis, expected=expected, earliest=earliest, latest=latest)
+            outside = abs(float(line.at(np.array([last]))[0][0])) > limit
+            yield Leaving(axis=axis, outside=outside, expected=expected, earliest=earliest, latest=latest)
 
 
 def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
@@ -171,6 +206,9 @@ def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
 
 def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[str]:
     for each in leaves:
+        if each.outside:
+            yield f"Axis {each.axis}: the bias is outside {limit:.3g} deg/s at the newest recording already."
+            continue
         when: Mapping[str, str] = {
             name: f"{value:%Y-%m-%d}" if value else "not within 50 years"
             for name, value in (("expected", each.expected), ("earliest", each.earliest), ("latest", each.latest))

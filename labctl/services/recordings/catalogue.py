@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording import Recording
+from labctl.recording import Recording, RecordingInfo
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.schemas.recordings import (
     ChannelColumns,
@@ -38,7 +38,7 @@ def _line(row: RecordingRow, simulated_time: bool) -> RecordingResponse:
     return RecordingResponse(
         id=row.id, serial=row.serial, kind=row.kind, campaign=row.campaign, datasets=row.datasets,
         readings=row.readings, created_at=row.created_at, notes=str(row.info.get("notes") or ""),
-        simulated_time=simulated_time,
+        motion=RecordingInfo.model_validate(row.info).motion, simulated_time=simulated_time,
     )  # fmt: skip
 
 

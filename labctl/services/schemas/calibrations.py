@@ -210,6 +210,17 @@ class CalibrationRow(ResponseModel):
     heldout_rms_dps: float | None = None
 
 
+class Follower(ResponseModel):
+    """An element that lags behind the temperature, or that is dragged along by it, and the error that it makes."""
+
+    kind: Literal["lag", "play"]
+    parameter: float = Field(description="Time constant of a lag, s; width of a play, K.")
+    unit: Literal["s", "K"]
+    size: dict[str, float] = Field(
+        description="axis -> deg/s for each K that the lag is behind, or at an edge of the play."
+    )
+
+
 class VersionFacts(ResponseModel):
     """When a version was made, from what, and whether it is in force."""
 
@@ -220,6 +231,12 @@ class VersionFacts(ResponseModel):
     )
     certification: CertificationResponse | None = Field(
         description="The newest act on this version; null: there was none."
+    )
+    left_out: list[LeftOut] = Field(
+        default_factory=list, description="Effects of the fit that are not exported, each with its RMS, deg/s."
+    )
+    remembers: list[Follower] = Field(
+        default_factory=list, description="What follows the temperature from sample to sample in use: the state."
     )
 
 

@@ -8,6 +8,7 @@ from pydantic import Field, JsonValue
 
 from instruments.bench_config import SERIAL
 from labctl.json_types.noise import AllanJson
+from labctl.recording.info import Motion
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
@@ -70,6 +71,7 @@ class RecordingResponse(ResponseModel):
     readings: int
     created_at: datetime
     notes: str = ""
+    motion: Motion = Field(default="rates", description="What moved the unit: a table, nothing, turns, poses.")
     simulated_time: bool = Field(default=False, description="`created_at` is of a simulated bench's clock.")
 
 

@@ -72,12 +72,24 @@ class Drift(ResponseModel):
     high: float | None
     repeatability: float | None = Field(description="Standard deviation from recording to recording.")
     significant: bool = Field(description="Whether 0 is outside the interval.")
+    line: DriftLine = Field(description="The line, for a picture.")
+
+
+class DriftLine(ResponseModel):
+    """A straight line over time with its 95 % interval, from the first recording on and into the time after the last;
+    lists of equal length."""
+
+    at: list[datetime]
+    value: list[float] = Field(description="In the unit of the figure: deg/s, or a share.")
+    low: list[float | None] = Field(description="95 %, by Student's t, from; null: it takes three recordings.")
+    high: list[float | None]
 
 
 class Leaving(ResponseModel):
     """When the bias of an axis leaves the limit; null: not within 50 years, or not known."""
 
     axis: str
+    outside: bool = Field(description="Whether the line is outside the limit at the newest recording already.")
     expected: datetime | None
     earliest: datetime | None
     latest: datetime | None
@@ -96,3 +108,4 @@ class TrendResponse(ResponseModel):
 
 
 TrendPoint.model_rebuild()
+Drift.model_rebuild()

@@ -29,11 +29,14 @@ export type Certification = Schema<"CertificationResponse">;
 export type Comparison = Schema<"ComparisonResponse">;
 export type ComparisonColumns = Schema<"ComparisonColumns">;
 export type DataSets = Schema<"DataSetsResponse">;
+export type Drift = Schema<"Drift">;
 export type Imported = Schema<"ImportResponse">;
+export type Joint = NonNullable<Schema<"CriticismResponse">["joint"]>;
 export type Ladder = Schema<"LadderResponse">;
 export type LadderRow = Schema<"LadderRow">;
 export type ModelLines = Schema<"ModelLines">;
 export type LogPreview = Schema<"LogPreview">;
+export type Motion = Schema<"MotionResponse">;
 export type Output = Schema<"OutputResponse">;
 export type Plan = Schema<"PlannedResponse">;
 export type Prompt = Schema<"PromptResponse">;
@@ -41,9 +44,13 @@ export type Turn = Schema<"TurnResponse">;
 export type Recipe = Schema<"RecipeResponse">;
 export type RecordingRow = Schema<"RecordingResponse">;
 export type ResidualColumns = Schema<"ResidualColumns">;
+export type RestColumns = Schema<"RestColumns">;
 export type Scheduled = Schema<"ScheduledResponse">;
 export type StartEvent = Schema<"StartEventResponse">;
 export type Trace = Schema<"TraceResponse">;
+export type Trend = Schema<"TrendResponse">;
+export type TrendPoint = Schema<"TrendPoint">;
+export type TurnColumns = Schema<"TurnColumns">;
 export type Uncertainty = Schema<"UncertaintyResponse">;
 export type Unit = Schema<"UnitResponse">;
 export type Validity = Schema<"Validity">;
@@ -77,6 +84,7 @@ export type Outputs = Record<string, { unit?: string }>;
 /* What is open in the OpenAPI document, because it is open in a recording: its conditions, and its columns by name */
 
 export interface RecordingInfo {
+  motion?: RecordingRow["motion"];
   axes: string[];
   output?: Outputs;
   model?: string | null;

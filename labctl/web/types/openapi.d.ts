@@ -1094,6 +1094,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recordings/{recording}/motion": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A recording by what moved the unit
+         * @description Bias by temperature at rest, the integral of each turn, the course of a profile, or gravity about each move.
+         */
+        get: operations["recording_motion_api_recordings__recording__motion_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/calibrations/{version}/motion": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A version without refitting, on a recording by what moved the unit
+         * @description The same, with what the version leaves; nothing is refitted.
+         */
+        get: operations["version_motion_api_units__serial__calibrations__version__motion_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/keys": {
         parameters: {
             query?: never;
@@ -1485,6 +1525,23 @@ export interface components {
             scale_factor: number | null;
             /** U Scale Factor */
             u_scale_factor: number | null;
+        };
+        /**
+         * AxisResponse
+         * @description Delay and bandwidth of one axis, as a version has them; null: not part of its model, or not known.
+         */
+        AxisResponse: {
+            /** Delay S */
+            delay_s: number | null;
+            /** U Delay S */
+            u_delay_s: number | null;
+            /**
+             * Bandwidth Hz
+             * @description At half of the power: 1/(2 pi time constant).
+             */
+            bandwidth_hz: number | null;
+            /** U Bandwidth Hz */
+            u_bandwidth_hz: number | null;
         };
         /**
          * AxisUncertainty
@@ -1922,8 +1979,6 @@ export interface components {
             wish: ("pause" | "abort") | null;
             /** @description The question that waits for a person. */
             prompt: components["schemas"]["PromptResponse"] | null;
-            /** @description Of a campaign that runs here: the turn by hand, now. */
-            turn: components["schemas"]["TurnResponse"] | null;
             /**
              * Links
              * @description Instruments that answer late or not at all.
@@ -2230,7 +2285,15 @@ export interface components {
          * @description One row per data set (or piece of a long one) and output axis, as lists of equal length.
          */
         ComparisonColumns: {
-            /** Dataset */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
+            recording: number[];
+            /**
+             * Dataset
+             * @description Number of the data set in its recording.
+             */
             dataset: number[];
             /**
              * Axis
@@ -2299,6 +2362,11 @@ export interface components {
             /** Recording */
             recording: number;
             /**
+             * Recordings
+             * @description All recordings; `recording` is the newest.
+             */
+            recordings: number[];
+            /**
              * Fitted To
              * @description The recording that the version was fitted to.
              */
@@ -2357,12 +2425,6 @@ export interface components {
              * @default true
              */
             confirmed?: boolean;
-            /**
-             * Again
-             * @description Of a turn by hand: it did not go well and is to be asked again.
-             * @default false
-             */
-            again?: boolean;
             /**
              * Reason
              * @default
@@ -2517,6 +2579,10 @@ export interface components {
             timed?: boolean;
             /** Dataset */
             dataset?: number[];
+            /** Recording */
+            recording?: number[];
+            /** Own Dataset */
+            own_dataset?: number[];
             /** Position */
             position?: string[];
             /** Run */
@@ -2655,6 +2721,29 @@ export interface components {
              * @description Whether 0 is outside the interval.
              */
             significant: boolean;
+            /** @description The line, for a picture. */
+            line: components["schemas"]["DriftLine"];
+        };
+        /**
+         * DriftLine
+         * @description A straight line over time with its 95 % interval, from the first recording on and into the time after the last;
+         *     lists of equal length.
+         */
+        DriftLine: {
+            /** At */
+            at: string[];
+            /**
+             * Value
+             * @description In the unit of the figure: deg/s, or a share.
+             */
+            value: number[];
+            /**
+             * Low
+             * @description 95 %, by Student's t, from; null: it takes three recordings.
+             */
+            low: (number | null)[];
+            /** High */
+            high: (number | null)[];
         };
         /**
          * DriverResponse
@@ -2954,6 +3043,34 @@ export interface components {
              * @description SHA-256 of the calibration file.
              */
             hash: string;
+        };
+        /**
+         * Follower
+         * @description An element that lags behind the temperature, or that is dragged along by it, and the error that it makes.
+         */
+        Follower: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "lag" | "play";
+            /**
+             * Parameter
+             * @description Time constant of a lag, s; width of a play, K.
+             */
+            parameter: number;
+            /**
+             * Unit
+             * @enum {string}
+             */
+            unit: "s" | "K";
+            /**
+             * Size
+             * @description axis -> deg/s for each K that the lag is behind, or at an edge of the play.
+             */
+            size: {
+                [key: string]: number;
+            };
         };
         /**
          * FrequencySpectrum
@@ -3260,7 +3377,7 @@ export interface components {
             };
             /**
              * Left Out
-             * @description Effects of the fit that are not exported with the calibration.
+             * @description Effects of the fit that are not exported, each with its RMS, deg/s.
              */
             left_out: components["schemas"]["LeftOut"][];
             /** Version */
@@ -3286,6 +3403,11 @@ export interface components {
             due: string | null;
             /** @description The newest act on this version; null: there was none. */
             certification: components["schemas"]["CertificationResponse"] | null;
+            /**
+             * Remembers
+             * @description What follows the temperature from sample to sample in use: the state.
+             */
+            remembers: components["schemas"]["Follower"][];
         };
         /**
          * JointJson
@@ -3419,6 +3541,11 @@ export interface components {
         Leaving: {
             /** Axis */
             axis: string;
+            /**
+             * Outside
+             * @description Whether the line is outside the limit at the newest recording already.
+             */
+            outside: boolean;
             /** Expected */
             expected: string | null;
             /** Earliest */
@@ -3667,6 +3794,57 @@ export interface components {
             temperature: components["schemas"]["TemperatureBasisJson"] | null;
             /** @description What the terms are centred on. */
             reference: components["schemas"]["ReferenceJson"] | null;
+        };
+        /**
+         * MotionResponse
+         * @description A recording by what moved the unit; of `rest`, `turns`, `profile` and `poses` one is there.
+         */
+        MotionResponse: {
+            /** Serial */
+            serial: string;
+            /** Recording */
+            recording: number;
+            /**
+             * Version
+             * @description Version that is applied without refitting; null: the outputs as they are.
+             */
+            version: number | null;
+            /**
+             * Motion
+             * @enum {string}
+             */
+            motion: "rates" | "rest" | "turns" | "profile" | "poses";
+            /**
+             * Source
+             * @description What the numbers are of, in words.
+             */
+            source: string;
+            /**
+             * Rows
+             * @description Rows of each axis that are here.
+             */
+            rows: number;
+            /**
+             * Of
+             * @description Rows that the recording has; more than `rows`: evenly picked.
+             */
+            of: number;
+            rest: components["schemas"]["RestColumns"] | null;
+            turns: components["schemas"]["TurnColumns"] | null;
+            profile: components["schemas"]["ProfileColumns"] | null;
+            poses: components["schemas"]["PoseColumns"] | null;
+            /**
+             * Responses
+             * @description Of a profile, by axis.
+             */
+            responses: {
+                [key: string]: components["schemas"]["AxisResponse"];
+            };
+            /**
+             * Left Out
+             * @description What could not be used, and why.
+             */
+            left_out: string[];
         };
         /**
          * MoveLeftOutJson
@@ -3919,6 +4097,31 @@ export interface components {
             timeline: components["schemas"]["TimelineColumns"];
         };
         /**
+         * PoseColumns
+         * @description Turns by hand between rests: one row per move, as lists of equal length.
+         */
+        PoseColumns: {
+            /** From S */
+            from_s: number[];
+            /** Until S */
+            until_s: number[];
+            /**
+             * Accelerometer Deg
+             * @description Angle between gravity before and after, by the accelerometer.
+             */
+            accelerometer_deg: number[];
+            /**
+             * Gyro Deg
+             * @description The same by the gyro's rates, integrated.
+             */
+            gyro_deg: number[];
+            /**
+             * Residual Deg
+             * @description Angle between gravity after the move by the gyro and by the accelerometer.
+             */
+            residual_deg: number[];
+        };
+        /**
          * PosesJson
          * @description All of it.
          */
@@ -4031,6 +4234,38 @@ export interface components {
             z: number | null;
         };
         /**
+         * ProfileColumns
+         * @description A rate that changes: one row per window of readings and output axis, as lists of equal length.
+         */
+        ProfileColumns: {
+            /**
+             * Axis
+             * @description The output axis.
+             */
+            axis: string[];
+            /** Dataset */
+            dataset: number[];
+            /** T S */
+            t_s: number[];
+            /**
+             * True Dps
+             * @description Rate of the table along the axis.
+             */
+            true_dps: number[];
+            /** Output Dps */
+            output_dps: number[];
+            /**
+             * Residual Dps
+             * @description Corrected minus true rate, as a consumer has it; null: without a version.
+             */
+            residual_dps: (number | null)[];
+            /**
+             * Followed Dps
+             * @description Corrected rate minus the true rate through the version's delay and bandwidth; null: it has none.
+             */
+            followed_dps: (number | null)[];
+        };
+        /**
          * PromptResponse
          * @description A question to a person; an answer names its id.
          */
@@ -4043,16 +4278,6 @@ export interface components {
             text: string;
             /** Position */
             position: string | null;
-            /**
-             * Turn Deg
-             * @description Of a turn by hand: its angle, positive counter-clockwise seen from above.
-             */
-            turn_deg: number | null;
-            /**
-             * Within S
-             * @description How long the answer is waited for, by the campaign's clock; null: no limit.
-             */
-            within_s: number | null;
         };
         /**
          * PulseResponse
@@ -4114,12 +4339,6 @@ export interface components {
              * @default
              */
             remark: string;
-            /**
-             * By Hand
-             * @description A person turns the units; no table and no chamber is driven.
-             * @default false
-             */
-            by_hand: boolean;
         };
         /**
          * RecordingAlone
@@ -4186,6 +4405,13 @@ export interface components {
              * @default
              */
             notes: string;
+            /**
+             * Motion
+             * @description What moved the unit: a table, nothing, turns, poses.
+             * @default rates
+             * @enum {string}
+             */
+            motion: "rates" | "rest" | "turns" | "profile" | "poses";
             /**
              * Simulated Time
              * @description `created_at` is of a simulated bench's clock.
@@ -4409,6 +4635,54 @@ export interface components {
             columns: components["schemas"]["ResidualColumns"];
         };
         /**
+         * RestColumns
+         * @description At rest: one row per data set, or piece of a long one, and output axis, as lists of equal length.
+         */
+        RestColumns: {
+            /**
+             * Axis
+             * @description The output axis.
+             */
+            axis: string[];
+            /** Dataset */
+            dataset: number[];
+            /**
+             * T S
+             * @description Since the recording began; null: not known.
+             */
+            t_s: (number | null)[];
+            /**
+             * Temperature C
+             * @description null: there was no thermometer.
+             */
+            temperature_c: (number | null)[];
+            /**
+             * Leg
+             * @description heating or cooling; empty where the temperature does not move.
+             */
+            leg: string[];
+            /**
+             * Bias Dps
+             * @description Output minus the Earth's rate, which is 0 where the latitude is not known.
+             */
+            bias_dps: number[];
+            /**
+             * U Dps
+             * @description Standard uncertainty of the mean by white noise; null: not known.
+             */
+            u_dps: (number | null)[];
+            /**
+             * Modelled Dps
+             * @description What the version subtracts there, with what it remembers; null: without a version.
+             */
+            modelled_dps: (number | null)[];
+            /**
+             * Residual Dps
+             * @description What it leaves; null: without a version.
+             */
+            residual_dps: (number | null)[];
+        };
+        /**
          * RestsJson
          * @description The rests that were found, and by which threshold.
          */
@@ -4504,11 +4778,6 @@ export interface components {
              * @description Of data sets; null: the table is at rest.
              */
             rate_dps: (number | null)[];
-            /**
-             * Turn Deg
-             * @description Of turns by hand, positive counter-clockwise seen from above; null: no turn.
-             */
-            turn_deg: (number | null)[];
             /**
              * Position
              * @description In which the units are; null: as they were found.
@@ -4957,11 +5226,6 @@ export interface components {
              */
             rate_dps: (number | null)[];
             /**
-             * Turn Deg
-             * @description Of turns by hand, positive counter-clockwise seen from above; null: no turn.
-             */
-            turn_deg: (number | null)[];
-            /**
              * Position
              * @description In which the units are; null: as they were found.
              */
@@ -5064,44 +5328,47 @@ export interface components {
             text: string[];
         };
         /**
-         * TurnResponse
-         * @description The turn by hand that is under way.
+         * TurnColumns
+         * @description Turns by known angles: one row per turn and output axis, as lists of equal length.
          */
-        TurnResponse: {
+        TurnColumns: {
             /**
-             * Position
-             * @description The body axis that points up, about which the units are turned.
+             * Axis
+             * @description The output axis.
              */
-            position: string;
+            axis: string[];
+            /** Dataset */
+            dataset: number[];
+            /**
+             * About
+             * @description Body axis that pointed up, with its sign.
+             */
+            about: string[];
             /**
              * Asked Deg
-             * @description Positive counter-clockwise seen from above.
+             * @description Angle that the output axis turned by.
              */
-            asked_deg: number;
+            asked_deg: number[];
             /**
-             * Phase
-             * @description What the units are to do now.
-             * @enum {string}
+             * Output Deg
+             * @description Integral of the output as it is.
              */
-            phase: "rest" | "turn";
+            output_deg: number[];
             /**
-             * Attempt
-             * @description From 1; a turn that was refused is asked again.
+             * Corrected Deg
+             * @description Integral of the corrected rate; null: without a version.
              */
-            attempt: number;
+            corrected_deg: (number | null)[];
             /**
-             * Came Deg
-             * @description Unit -> what has come out so far, by its nominal scale factor.
+             * Residual Deg
+             * @description Corrected minus asked.
              */
-            came_deg: {
-                [key: string]: number;
-            };
+            residual_deg: (number | null)[];
             /**
-             * Refused
-             * @description Why the attempt before was refused; empty for the first.
-             * @default
+             * U Deg
+             * @description Standard uncertainty of an integral minus the angle: angle, time stamps and noise; null: unknown.
              */
-            refused: string;
+            u_deg: (number | null)[];
         };
         /**
          * UncertaintyGrid
@@ -5356,6 +5623,16 @@ export interface components {
             due: string | null;
             /** @description The newest act on this version; null: there was none. */
             certification: components["schemas"]["CertificationResponse"] | null;
+            /**
+             * Left Out
+             * @description Effects of the fit that are not exported, each with its RMS, deg/s.
+             */
+            left_out: components["schemas"]["LeftOut"][];
+            /**
+             * Remembers
+             * @description What follows the temperature from sample to sample in use: the state.
+             */
+            remembers: components["schemas"]["Follower"][];
             /** Parent */
             parent: number | null;
         };
@@ -6116,6 +6393,8 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
+                /** @description Several recordings of the unit as one; instead of `recording`. */
+                recordings?: number[] | null;
                 /** @description Accept a recording of another unit. */
                 other_unit?: boolean;
             };
@@ -7219,6 +7498,74 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["SamplesResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    recording_motion_api_recordings__recording__motion_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                recording: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotionResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    version_motion_api_units__serial__calibrations__version__motion_get: {
+        parameters: {
+            query?: {
+                /** @description Recording; default: the unit's newest. */
+                recording?: number | null;
+                /** @description Accept a recording of another unit. */
+                other_unit?: boolean;
+            };
+            header?: never;
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotionResponse"];
                 };
             };
             /** @description Validation Error */

@@ -1,6 +1,6 @@
 /** Types that several modules of the pages share: elements, figures, and what the router gives a page. */
 
-import type { DataSets, Outputs } from "./api.js";
+import type { DataSets, Outputs, RecordingRow } from "./api.js";
 
 /** What may stand in an element; null, undefined and false are left out. */
 export type Child = Node | string | number | false | null | undefined | readonly Child[];
@@ -27,6 +27,7 @@ type Names =
   | "minlength"
   | "multiple"
   | "name"
+  | "open"
   | "placeholder"
   | "required"
   | "role"
@@ -140,6 +141,7 @@ export interface Plotly {
 export interface RecordingState {
   id: number;
   kind: string;
+  motion: RecordingRow["motion"];
   sets: DataSets;
   output: Outputs;
   channel: string;

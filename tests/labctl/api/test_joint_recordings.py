@@ -43,6 +43,26 @@ def test_several_recordings_in_bodies_and_queries(unit: TestClient) -> None:
     assert unit.get(f"{UNIT}/calibrations/1/assessment").json()["verdict_recording"] == 2
 
 
+def test_a_version_is_compared_with_every_data_set_of_several_recordings(unit: TestClient) -> None:
+    unit.post(f"{UNIT}/calibrations", json={"recordings": [1, 2], "effects": EFFECTS})
+    path = f"{UNIT}/calibrations/1/comparison"
+    both = unit.get(path, params={"recordings": [1, 2]}).json()
+    assert (both["recording"], both["recordings"]) == (2, [1, 2])
+    assert both["source"] == "version 1 without refitting, on recordings 1 and 2, which it was fitted to"
+    columns = both["columns"]
+    assert columns["recording"] == [1] * 45 + [2] * 45
+    assert columns["dataset"] == 2 * list(range(1, 46))
+    for number in (1, 2):
+        alone = unit.get(path, params={"recording": number}).json()["columns"]
+        rows = [k for k, of in enumerate(columns["recording"]) if of == number]
+        assert alone["recording"] == [number] * 45
+        for name in ("measured_error_dps", "modelled_error_dps", "residual_dps"):
+            assert [columns[name][k] for k in rows] == pytest.approx(alone[name], abs=1e-12)
+    sets = unit.get(f"{UNIT}/calibrations/1/criticism", params={"recordings": [1, 2]}).json()["views"]["sets"]
+    assert (sets["recording"], sets["own_dataset"]) == (columns["recording"], columns["dataset"])
+    assert sets["dataset"] == list(range(1, 91))
+
+
 def test_one_recording_and_other_recordings_are_refused_together(unit: TestClient) -> None:
     refused = unit.post(f"{UNIT}/calibrations", json={"recording": 1, "recordings": [1, 2], "effects": EFFECTS})
     assert refused.status_code == 400

@@ -12,6 +12,7 @@ from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
 from labctl.fitting.criticism.diagnostics.thinning import drawn_rows
 from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.data.channels import OWN_DATASET, RECORDING
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 from labctl.json_types.views import ChannelLine, DataSetColumns, MeanLine, PreviousRateLine, TimeLine
@@ -41,7 +42,7 @@ def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> DataSetColumn
     if "previous_rate_dps" in data.nodes:
         names.add("previous_rate_dps")
     name, along = time_axis(first)
-    return {
+    found: DataSetColumns = {
         "of": len(first),
         "timed": first.timed,
         "dataset": data.dataset[rows].tolist(),
@@ -52,6 +53,14 @@ def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> DataSetColumn
         "residual_dps": {view.axis: plain_list(view.residual_dps[rows]) for view in axes},
         "over_floor": {view.axis: plain_list(view.over_floor[rows]) for view in axes},
     }
+    if RECORDING in data.nodes:
+        found["recording"] = _numbers(first.channel(RECORDING)[rows])
+        found["own_dataset"] = _numbers(first.channel(OWN_DATASET)[rows])
+    return found
+
+
+def _numbers(values: Array) -> list[int]:
+    return [int(number) for number in np.rint(values)]
 
 
 def time_axis(view: AxisView) -> tuple[str, Array]:

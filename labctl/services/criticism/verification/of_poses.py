@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from labctl.calibration import Calibration
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
-from labctl.fitting.poses.direction_errors import move_errors
+from labctl.fitting.poses.direction_errors import Correct, move_errors
 from labctl.fitting.poses.readings import AXES, PoseReadings, readings_of
 from labctl.recording import Recording
 
@@ -24,6 +24,13 @@ def errors_in_poses(
 
     Raises BadInput where version and recording do not fit, NotEnoughData for too few rests.
     """
+    errors = move_errors(recording, correction_of(calibration, recording))
+    axes = {str(axis): errors.by_axis_dps[:, i] for i, axis in enumerate(AXES)}
+    return errors.rate_dps.ravel(), axes, errors.outside
+
+
+def correction_of(calibration: Calibration, recording: Recording) -> Correct:
+    """Return how a version corrects the readings of a recording in poses. Raises BadInput as `errors_in_poses`."""
     if set(calibration.axes) != set(AXES):
         raise BadInput(
             f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}; a turn "
@@ -40,9 +47,7 @@ def errors_in_poses(
         found = compensator.compensate(raw, _temperature(calibration, readings), channels)
         return found.rate_dps[:, columns], found.outside
 
-    errors = move_errors(recording, correct)
-    axes = {str(axis): errors.by_axis_dps[:, i] for i, axis in enumerate(AXES)}
-    return errors.rate_dps.ravel(), axes, errors.outside
+    return correct
 
 
 def _temperature(calibration: Calibration, readings: PoseReadings) -> Array:

@@ -50,7 +50,7 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
     else:
         errors, outside = applied_errors(calibration, measured.points)
         pooled = np.concatenate(list(errors.values()))
-    rms, expected = _rms(pooled), _expected_dps(row)
+    rms, expected = _rms(pooled), expected_dps(row)
     return VerificationResponse(
         serial=row.serial,
         version=row.version,
@@ -103,7 +103,7 @@ def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[n
     return {**needed, **{name: np.asarray(values, dtype=np.float64) for name, values in kept.items()}}
 
 
-def _expected_dps(row: CalibrationRecord) -> float | None:
+def expected_dps(row: CalibrationRecord) -> float | None:
     """Return the error that a version promises for a data set: held-out, else of its own data; None where unknown.
 
     A version of poses promises what its exported part leaves: without the sensitivity to specific force.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from labctl.recording import write_recording
 from tests.helpers.joint_recordings import EFFECTS, recording_of_day
 from tests.helpers.lab import Lab
+from tests.helpers.service import open_client
 
 YEAR_DAYS = 365.25
 DRIFT_DPS_PER_YEAR = 0.02
@@ -26,8 +29,14 @@ def lab_over_years(folder: Path, years: int) -> Lab:
     return lab
 
 
-def test_the_drift_of_a_unit_is_found_with_its_uncertainty_and_when_it_leaves_its_limit(tmp_path: Path) -> None:
-    lab = lab_over_years(tmp_path, 5)
+@pytest.fixture(scope="module")
+def five_years(tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    """Return a lab over five years; nothing is added to it."""
+    return lab_over_years(tmp_path_factory.mktemp("five-years"), 5)
+
+
+def test_the_drift_of_a_unit_is_found_with_its_uncertainty_and_when_it_leaves_its_limit(five_years: Lab) -> None:
+    lab = five_years
     found = lab.json("trend", "J-1", "--limit-dps", "0.15")
     assert (found["version"], found["limit_dps"]) == (1, 0.15)
     first, *later = found["points"]
@@ -49,6 +58,41 @@ def test_the_drift_of_a_unit_is_found_with_its_uncertainty_and_when_it_leaves_it
     said = lab.run("trend", "J-1").stdout
     assert "Axis z, bias: drifts by 0.02 deg/s/year (95 %:" in said
     assert "Axis z, scale_factor: no drift beyond repeatability" in said
+
+
+def test_the_line_and_its_interval_go_on_beyond_the_limit(five_years: Lab) -> None:
+    lab = five_years
+    with open_client(lab.database) as client:
+        answer = client.get("/api/units/J-1/trend", params={"version": 1, "limit_dps": 0.15})
+        assert answer.status_code == 200
+        found = answer.json()
+    assert found == lab.json("trend", "J-1", "--limit-dps", "0.15")
+    bias = next(each for each in found["drifts"] if (each["axis"], each["what"]) == ("z", "bias"))
+    at = [datetime.fromisoformat(each) for each in bias["line"]["at"]]
+    years = np.array([(each - at[0]).total_seconds() / 86400 / YEAR_DAYS for each in at])
+    value, low, high = (np.array(bias["line"][name]) for name in ("value", "low", "high"))
+    assert np.diff(value) / np.diff(years) == pytest.approx(bias["per_year"])
+    assert ((low < value) & (value < high)).all()
+    # the line goes through the points, weighted alike, at their mean
+    points = [point["axes"]["z"]["bias_dps"] for point in found["points"]]
+    assert np.interp(2.0, years, value) == pytest.approx(np.mean(points), abs=2e-4)
+    (leaves,) = found["leaves"]
+    assert not leaves["outside"]
+    assert np.interp(0.15, value, years) == pytest.approx(
+        (datetime.fromisoformat(leaves["expected"]) - at[0]).days / YEAR_DAYS, abs=0.02
+    )
+    assert at[-1] > datetime.fromisoformat(leaves["expected"])
+
+
+def test_a_bias_that_is_outside_its_limit_is_said_to_be_outside_already(five_years: Lab, tmp_path: Path) -> None:
+    lab = Lab(shutil.copytree(five_years.folder, tmp_path / "lab"))
+    found = lab.json("trend", "J-1", "--limit-dps", "0.03")
+    assert [each["outside"] for each in found["leaves"]] == [True]
+    assert "Axis z: the bias is outside 0.03 deg/s at the newest recording already." in found["text"]
+    joint = lab.json("fit", "J-1", "--recording", "1,2,3", "--effects", ",".join(EFFECTS))
+    expected = lab.json("verify", "J-1", "--version", str(joint["version"]), "--recording", "1")["expected_dps"]
+    limit = lab.json("trend", "J-1", "--version", str(joint["version"]))["limit_dps"]
+    assert limit == pytest.approx(2 * expected)  # what `verify` accepts of a version of several recordings
 
 
 def test_two_recordings_have_a_drift_without_an_uncertainty_and_say_so(tmp_path: Path) -> None:

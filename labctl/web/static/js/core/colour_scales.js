@@ -35,6 +35,13 @@ export const DIVERGING = [
   [1, "#b3242f"],
 ];
 
+/**
+ * A colour of the theme, `#rrggbb`, that lets through what is below it; Plotly knows no color-mix.
+ * @param {string} hex
+ * @param {number} share how much of it stays
+ */
+export const faded = (hex, share) => `rgba(${channels(hex).join(",")},${share})`;
+
 /** @param {string} hex */
 const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 

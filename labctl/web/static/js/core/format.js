@@ -100,6 +100,9 @@ export const clock = (text) => (text ? new Date(text).toLocaleTimeString("en-GB"
  */
 export const idText = (id) => String(id).replaceAll("_", " ");
 
+/** @param {string} text */
+export const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
 /**
  * A unit as text: (deg/s)^-1 -> (deg/s)⁻¹. A plain number has none.
  * @param {string | null | undefined} unit

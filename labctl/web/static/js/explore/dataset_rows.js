@@ -12,7 +12,9 @@ import { count, plainNumber } from "../core/format.js";
 const columnsOf = (criticism) => /** @type {Required<NonNullable<Viewed["views"]["sets"]>>} */ (criticism.views.sets);
 
 /**
- * Return {n, dataset, position, channels: {name: []}, residual, score} of one axis; lists of equal length.
+ * Return {n, dataset, recording, own, position, channels: {name: []}, residual, score} of one axis; lists of equal length.
+ * Of several recordings `dataset` counts through all of them, `recording` and `own` say which it is; of one long data
+ * set (`pieces`) it counts its pieces.
  * @param {Viewed} criticism
  * @param {string} axis
  */
@@ -20,12 +22,31 @@ export function datasetRows(criticism, axis) {
   const sets = columnsOf(criticism);
   return {
     n: sets.dataset.length,
-    dataset: sets.dataset,
+    dataset: isOneInPieces(sets) ? sets.dataset.map((_, k) => k + 1) : sets.dataset,
+    recording: sets.recording ?? null,
+    pieces: isOneInPieces(sets),
+    own: sets.own_dataset ?? sets.dataset,
     position: sets.position,
     channels: sets.channels,
     residual: sets.residual_dps[axis],
     score: sets.over_floor[axis],
   };
+}
+
+/**
+ * Whether all rows are pieces of one data set, as of a unit at rest through a loop of the temperature.
+ * @param {{ dataset: readonly number[], recording?: readonly number[] }} sets
+ */
+const isOneInPieces = ({ dataset, recording }) => !recording && dataset.length > 1 && new Set(dataset).size === 1;
+
+/**
+ * A data set in words: of several recordings also which, of one long data set which piece.
+ * @param {{ recording: readonly number[] | null, own: readonly number[], dataset: readonly number[], pieces: boolean }} rows
+ * @param {number} k
+ */
+export function setText({ recording, own, dataset, pieces }, k) {
+  if (recording) return `recording ${recording[k]}, data set ${own[k]}`;
+  return pieces ? `data set ${own[k]}, piece ${dataset[k]}` : `data set ${own[k]}`;
 }
 
 /** @param {Viewed} criticism */
@@ -43,12 +64,32 @@ export function shownText(criticism) {
 /**
  * The values of an axis in the order of the criticism's data sets.
  * @param {{ criticism: Viewed, axis: string }} state
- * @param {Pick<Preview["residuals"], "dataset" | "axis" | "residual_dps">} columns
+ * @param {Pick<Preview["residuals"], "dataset" | "axis" | "residual_dps"> & Partial<Pick<Preview["residuals"], "recording">>} columns
  * @param {"residual_dps"} name
  */
 export function inDatasetOrder(state, columns, name) {
-  const values = new Map(columns.dataset.map((set, k) => [`${set} ${columns.axis[k]}`, columns[name][k]]));
-  return datasetRows(state.criticism, state.axis).dataset.map((set) => values.get(`${set} ${state.axis}`) ?? null);
+  const rows = datasetRows(state.criticism, state.axis);
+  const of = rows.recording ? columns.recording : undefined; // a single recording needs no number
+  /** @type {Map<string, number[]>} */
+  const values = new Map(); // a long data set is in several pieces, in the same order in both
+  columns.dataset.forEach((set, k) => {
+    if (columns.axis[k] !== state.axis) return;
+    const key = `${of?.[k] ?? ""} ${set}`;
+    const found = values.get(key);
+    if (found) found.push(columns[name][k]);
+    else values.set(key, [columns[name][k]]);
+  });
+  const isThinned = shownText(state.criticism) !== null;
+  /** @type {Map<string, number>} */
+  const taken = new Map();
+  return rows.own.map((set, k) => {
+    const key = `${rows.recording?.[k] ?? ""} ${set}`;
+    const found = values.get(key) ?? [];
+    if (found.length < 2) return found[0] ?? null;
+    const place = taken.get(key) ?? 0;
+    taken.set(key, place + 1);
+    return isThinned ? null : (found[place] ?? null); // of pieces that are thinned nothing says which is which
+  });
 }
 
 /**

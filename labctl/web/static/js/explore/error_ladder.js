@@ -3,20 +3,31 @@
 import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
-import { number, idText } from "../core/format.js";
+import { capitalised, isNumber, number, idText } from "../core/format.js";
 import { cardWithHeader, loadInto, modelName, table } from "../core/components.js";
-import { colourLimit, mapsOf } from "./residual_cells.js";
+import { asked, recordingsText } from "./chosen_recordings.js";
+import { heldOutName } from "./first_models.js";
+import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap } from "./residual_map.js";
 
-/** @import { Ladder } from "../../../types/api.js" */
+/** @import { Ladder, RecordingRow } from "../../../types/api.js" */
 /** @import { ExploreState } from "./state.js" */
 
 /** The raw error is hidden at first where it is more than this factor above the fitted errors and would flatten their lines. */
 const RAW_ERROR_RATIO = 10;
+/** Over less than this factor every digit of the scale is named. */
+const DECADE = 5;
 
-/** @param {Ladder} ladder */
-export function ladderFigure(ladder) {
+/**
+ * @param {Ladder} ladder
+ * @param {RecordingRow["motion"]} [motion] what moved the unit
+ */
+export function ladderFigure(ladder, motion) {
   const steps = ladder.steps;
+  const fittedTo = recordingsText({ recording: ladder.recording ?? 0, recordings: ladder.recordings ?? [] });
+  const left = heldOutName(motion).replace("at left-out ", "");
+  const sizes = steps.flatMap((step) => [step.rms_dps, step.heldout_rms_dps, ladder.noise_floor_dps]).filter(isNumber);
+  const isNarrow = Math.max(...sizes) < DECADE * Math.min(...sizes.filter((size) => size > 0));
   const x = steps.map((step) => `v${step.version}`);
   const dwarfs =
     Math.max(...steps.map((step) => step.raw_rms_dps ?? 0)) >
@@ -45,10 +56,12 @@ export function ladderFigure(ladder) {
         visible: dwarfs ? "legendonly" : true,
       },
       line("rms_dps", "after the fit", { color: colour("accent"), width: 2.5 }, "circle"),
-      line("heldout_rms_dps", "at left-out temperatures", { color: colour("warn"), width: 2.5 }, "square"),
+      ...(steps.some((step) => step.heldout_rms_dps !== null)
+        ? [line("heldout_rms_dps", heldOutName(motion), { color: colour("warn"), width: 2.5 }, "square")]
+        : []),
     ],
     layout: {
-      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: "D2", tickformat: "~g" },
+      yaxis: { type: "log", title: { text: "RMS error, deg/s" }, dtick: isNarrow ? "D1" : "D2", tickformat: "~g" },
       xaxis: { type: "category" },
       shapes: ladder.noise_floor_dps
         ? [
@@ -81,7 +94,7 @@ export function ladderFigure(ladder) {
   });
   return figure(
     "Error ladder",
-    `The versions fitted to recording ${ladder.recording}: each one's RMS error on that data and on temperatures left out of its fit, down to the noise floor. An error that falls on the fitted data only is overfitting.`,
+    `The versions fitted to ${fittedTo}: each one's RMS error on that data and on ${left} left out of its fit, down to the noise floor. An error that falls on the fitted data only is overfitting.`,
     draw,
     { height: "19rem" },
   );
@@ -97,8 +110,8 @@ export function errorLadder(state, signal) {
   loadInto(place, "RMS error by version", async () => {
     const ladder = await get("/api/units/{serial}/ladder", { path: { serial }, signal });
     const here = ladder.steps.find((step) => step.version === state.version);
-    const parts = [ladderFigure(ladder), versionTable(ladder, state)];
-    if (here?.parent) parts.push(await faded(here.parent));
+    const parts = [ladderFigure(ladder, state.motion), versionTable(ladder, state)];
+    if (here?.parent && hasMap(state)) parts.push(await faded(here.parent));
     return h("div", { class: "stack" }, parts);
   });
 
@@ -106,7 +119,7 @@ export function errorLadder(state, signal) {
   async function faded(parent) {
     const before = await get("/api/units/{serial}/calibrations/{version}/criticism", {
       path: { serial, version: parent },
-      query: { recording: state.recording },
+      query: asked(state),
       signal,
     });
     const pair = () => [mapsOf(before, state.axis), mapsOf(state.criticism, state.axis)];
@@ -167,9 +180,17 @@ function versionTable(ladder, state) {
           ),
       },
       { title: "Effects", cell: (step) => step.effects.map(idText).join(", ") },
-      { title: "Recording", number: true, cell: (step) => `${step.recording ?? "–"}` },
+      {
+        title: "Recording",
+        number: true,
+        cell: (step) => (step.recordings?.length ? step.recordings : [step.recording ?? "–"]).join(", "),
+      },
       { title: "RMS, deg/s", number: true, cell: (step) => number(step.rms_dps) },
-      { title: "Left-out temperatures, deg/s", number: true, cell: (step) => number(step.heldout_rms_dps) },
+      {
+        title: `${capitalised(heldOutName(state.motion).replace("at ", ""))}, deg/s`,
+        number: true,
+        cell: (step) => number(step.heldout_rms_dps),
+      },
       ladder.others.length
         ? {
             title: `Without refitting, on recording ${ladder.recording}, deg/s`,

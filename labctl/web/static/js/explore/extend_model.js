@@ -2,11 +2,14 @@
 
 import { post } from "../core/http/api.js";
 import { setChildren, h } from "../core/elements.js";
-import { number, idText } from "../core/format.js";
+import { capitalised, number, idText } from "../core/format.js";
 import { button, fitWarnings, cardWithHeader, notice, table, toast } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
 import { navigate } from "../core/router.js";
+import { changedQuery } from "../core/routes.js";
 import { postFit } from "./accept_warnings.js";
+import { asked, inAddress } from "./chosen_recordings.js";
+import { heldOutName } from "./first_models.js";
 import { plausibility, relativeChange, residualFigure } from "./preview_result.js";
 
 /** @import { Effect, Preview } from "../../../types/api.js" */
@@ -14,11 +17,14 @@ import { plausibility, relativeChange, residualFigure } from "./preview_result.j
 
 /** @typedef {{ add: Set<string>, remove: Set<string>, formula: string }} Changed */
 
-/** @type {["raw_rms_dps" | "rms_dps" | "heldout_rms_dps" | "noise_floor_dps", string][]} */
-const ERRORS = [
+/**
+ * @param {ExploreState} state
+ * @returns {["raw_rms_dps" | "rms_dps" | "heldout_rms_dps" | "noise_floor_dps", string][]}
+ */
+const errorsOf = ({ motion }) => [
   ["raw_rms_dps", "Without correction"],
   ["rms_dps", "Left after the fit"],
-  ["heldout_rms_dps", "At left-out temperatures"],
+  ["heldout_rms_dps", capitalised(heldOutName(motion))],
   ["noise_floor_dps", "Noise floor"],
 ];
 
@@ -88,7 +94,7 @@ export function extendModel(state, effects) {
     add: [...change.add],
     remove: [...change.remove],
     formula: change.formula ? [change.formula] : [],
-    recording: state.recording,
+    ...asked(state),
   });
   const isEmpty = () => !change.add.size && !change.remove.size && !change.formula;
   const stale = () =>
@@ -127,7 +133,7 @@ export function extendModel(state, effects) {
                 : null,
           },
         ],
-        ERRORS,
+        errorsOf(state),
         { label: "Errors before and after" },
       ),
       fitWarnings(found),
@@ -157,7 +163,7 @@ export function extendModel(state, effects) {
     if (!made) return;
     toast("good", `Version ${made.version} of ${state.serial} is made.`);
     await navigate(
-      `/explore?unit=${encodeURIComponent(state.serial)}&version=${made.version}&recording=${state.recording}&axis=${state.axis}#watch`,
+      `/explore?${changedQuery("", { unit: state.serial, version: made.version, ...inAddress(state), axis: state.axis })}#watch`,
     );
   }
 

@@ -3,7 +3,7 @@
 import { h } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { number, idText } from "../core/format.js";
-import { inDatasetOrder, shownText } from "./dataset_rows.js";
+import { channelTitle, inDatasetOrder, scaled, setText, shownText } from "./dataset_rows.js";
 import { selectedRows } from "./residual_map.js";
 
 /** @import { Preview } from "../../../types/api.js" */
@@ -24,6 +24,13 @@ export function relativeChange(before, after) {
 }
 
 /**
+ * What the residual is drawn over: the table's rate, or at one rate the temperature, or the time.
+ * @param {Record<string, readonly (number | null)[]>} channels
+ */
+export const channelOf = (channels) =>
+  ["table_rate_dps", "temperature_c", "t_s"].find((name) => new Set(channels[name] ?? []).size > 1) ?? "table_rate_dps";
+
+/**
  * @param {ExploreState} state
  * @param {Preview} found
  * @param {number | null} floor
@@ -31,7 +38,8 @@ export function relativeChange(before, after) {
 export function residualFigure(state, found, floor) {
   const draw = () => {
     const rows = selectedRows(state);
-    const x = rows.channels.table_rate_dps;
+    const channel = channelOf(rows.channels);
+    const x = scaled(channel, rows.channels[channel]);
     const after = inDatasetOrder(state, found.residuals, "residual_dps");
     /**
      * @param {readonly (number | null)[]} y
@@ -46,7 +54,8 @@ export function residualFigure(state, found, floor) {
       y,
       marker,
       customdata: rows.dataset,
-      hovertemplate: `data set %{customdata}<br>%{x:.5g} deg/s: %{y:.3g} deg/s<extra>${name}</extra>`,
+      text: rows.dataset.map((_, k) => setText(rows, k)),
+      hovertemplate: `%{text}<br>%{x:.5g}: %{y:.3g} deg/s<extra>${name}</extra>`,
     });
     /** @param {number} y */
     const line = (y) => ({
@@ -65,7 +74,7 @@ export function residualFigure(state, found, floor) {
       ],
       layout: {
         title: shownText(state.criticism) ? { text: shownText(state.criticism), font: { size: 11 } } : undefined,
-        xaxis: { title: { text: "table rate, deg/s" } },
+        xaxis: { title: { text: channelTitle(channel) } },
         yaxis: { title: { text: "residual, deg/s" } },
         shapes: floor ? [line(2 * floor), line(-2 * floor)] : [],
       },

@@ -2,7 +2,7 @@
 
 import { plainNumber } from "../core/format.js";
 
-/** @import { Criticism, ResidualMap } from "../../../types/api.js" */
+/** @import { Criticism, RecordingRow, ResidualMap } from "../../../types/api.js" */
 
 /** @typedef {ReturnType<typeof mapCells>["cells"][number]} Cell */
 
@@ -14,6 +14,13 @@ const LIMITS = [3, 10];
  * @param {string} axis
  */
 export const mapsOf = (criticism, axis) => criticism.maps.filter((map) => map.axis === axis);
+
+/**
+ * Whether a map over rate and temperature shows something: not at one rate, nor where each window has a rate of its own.
+ * @param {{ criticism: Pick<Criticism, "maps">, axis: string, motion: RecordingRow["motion"] }} state
+ */
+export const hasMap = ({ criticism, axis, motion }) =>
+  motion !== "profile" && new Set(mapsOf(criticism, axis).flatMap((map) => map.rate_level_dps)).size > 1;
 
 /**
  * End of the colour scale: the largest residual over floor of several lists of maps, clipped to LIMITS.

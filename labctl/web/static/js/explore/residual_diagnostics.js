@@ -6,9 +6,11 @@ import { number } from "../core/format.js";
 import { cardWithHeader, table } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
-import { cellsText, colourLimit, mapsOf } from "./residual_cells.js";
+import { recordingMarks } from "../core/recording_marks.js";
+import { recordingsText } from "./chosen_recordings.js";
+import { cellsText, colourLimit, hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap, selectedRows, datasetsUnder } from "./residual_map.js";
-import { channelName, channelTitle, scaled, shownText } from "./dataset_rows.js";
+import { channelName, channelTitle, scaled, setText, shownText } from "./dataset_rows.js";
 
 /** @import { Figure, PlotEvent, PlotTrace } from "../../../types/pages.js" */
 /** @import { ExploreState } from "./state.js" */
@@ -20,18 +22,20 @@ const MAX_LISTED = 12;
 /** @param {ExploreState} state */
 export function residualDiagnostics(state) {
   const rows = () => selectedRows(state);
-  const picture = residualMap(
-    "Residual over floor",
-    `Every measured cell: the mean residual of its data sets over the noise floor. ${cellsText(state.criticism)} Faded cells are within two noise floors of zero: a single one is not significant. Drag over cells to select them, press one to select it.`,
-    () => ({
-      maps: mapsOf(state.criticism, state.axis),
-      limit: colourLimit(mapsOf(state.criticism, state.axis)),
-      pick: state.pick,
-    }),
-  );
-  bindSelection(picture, datasetsUnder, state);
+  const picture = !hasMap(state)
+    ? null
+    : residualMap(
+        "Residual over floor",
+        `Every measured cell: the mean residual of its data sets over the noise floor. ${cellsText(state.criticism)} Faded cells are within two noise floors of zero: a single one is not significant. Drag over cells to select them, press one to select it.`,
+        () => ({
+          maps: mapsOf(state.criticism, state.axis),
+          limit: colourLimit(mapsOf(state.criticism, state.axis)),
+          pick: state.pick,
+        }),
+      );
+  if (picture) bindSelection(picture, datasetsUnder, state);
 
-  const channels = Object.keys(rows().channels);
+  const channels = Object.entries(rows().channels).flatMap(([name, values]) => (varies(values) ? [name] : []));
   const shown = (query().channels?.split(",") ?? DEFAULT_CHANNELS).filter((name) => channels.includes(name));
   shown.push(...channels.filter((name) => !shown.includes(name)).slice(0, Math.max(3 - shown.length, 0)));
   const against = shown.map((name, k) => {
@@ -55,7 +59,7 @@ export function residualDiagnostics(state) {
   state.onchange((what) => {
     if (what !== "overlay") {
       listed();
-      picture.redraw();
+      picture?.redraw();
     }
   });
   return cardWithHeader(
@@ -64,13 +68,28 @@ export function residualDiagnostics(state) {
     h(
       "p",
       { class: "muted small" },
-      `Judged: the model of version ${state.version} refitted to recording ${state.recording}, so that the residual is what the model cannot describe. The version without refitting is under Compare.`,
+      `Judged: the model of version ${state.version} refitted to ${recordingsText(state)}, so that the residual is what the model cannot describe. The version without refitting is under Compare.${piecesText(state)}`,
     ),
     picture,
     h("div", { class: "columns", style: "--column-min: 19rem" }, against),
     list,
   );
 }
+
+/**
+ * What a dot is, where it is no data set.
+ * @param {ExploreState} state
+ */
+function piecesText(state) {
+  const { pieces, n } = selectedRows(state);
+  return pieces ? ` Each dot is the mean of one of ${n} pieces of the recording's one data set.` : "";
+}
+
+/**
+ * Whether a channel shows anything: at rest the rate is the same everywhere.
+ * @param {readonly (number | null)[]} values
+ */
+const varies = (values) => new Set(values).size > 1;
 
 /**
  * Connect the selection of a figure to the state once it is drawn.
@@ -95,6 +114,7 @@ function residualScatter(state, channel) {
   const draw = () => {
     const rows = selectedRows(state);
     const x = scaled(channel(), rows.channels[channel()]);
+    const marks = recordingMarks(rows.recording, axisColour(state.axis));
     const picked = state.pick.size ? rows.dataset.flatMap((set, k) => (state.pick.has(set) ? [k] : [])) : null;
     /** @type {PlotTrace[]} */
     const data = [
@@ -106,10 +126,11 @@ function residualScatter(state, channel) {
         y: rows.residual,
         customdata: rows.dataset,
         selectedpoints: picked,
-        marker: { size: 6, color: axisColour(state.axis), opacity: 0.75 },
+        marker: { size: 6, color: axisColour(state.axis), opacity: 0.75, ...marks.marker },
+        showlegend: false,
         selected: { marker: { opacity: 1, size: 8 } },
         unselected: { marker: { opacity: 0.15 } },
-        text: rows.dataset.map((set, k) => `data set ${set}: ${number(rows.score[k], 2)} floors`),
+        text: rows.dataset.map((_, k) => `${setText(rows, k)}: ${number(rows.score[k], 2)} floors`),
         hovertemplate: "%{text}<br>%{x:.5g}: %{y:.3g} deg/s<extra></extra>",
       },
     ];
@@ -125,6 +146,7 @@ function residualScatter(state, channel) {
         hovertemplate: "%{y:.3g} deg/s<extra></extra>",
       });
     }
+    data.push(...marks.legend);
     const shown = shownText(state.criticism);
     const annotations = shown
       ? [
@@ -148,8 +170,8 @@ function residualScatter(state, channel) {
         dragmode: "select",
         xaxis: { title: { text: channelTitle(channel()) } },
         yaxis: { title: { text: "residual, deg/s" } },
-        showlegend: Boolean(state.overlay),
-        margin: { l: 62, r: 8, t: state.overlay ? 34 : shown ? 20 : 8, b: 44 },
+        showlegend: Boolean(state.overlay) || marks.legend.length > 0,
+        margin: { l: 62, r: 8, t: state.overlay || marks.legend.length ? 34 : shown ? 20 : 8, b: 44 },
       },
     };
   };
@@ -185,7 +207,11 @@ function pickedDatasets(state) {
         {
           title: "Data set",
           cell: (k) =>
-            h("a", { href: `/recordings/${state.recording}?dataset=${rows.dataset[k]}` }, `${rows.dataset[k]}`),
+            h(
+              "a",
+              { href: `/recordings/${rows.recording?.[k] ?? state.recording}?dataset=${rows.own[k]}` },
+              rows.recording ? setText(rows, k) : `${rows.own[k]}`,
+            ),
         },
         { title: "Table rate, deg/s", number: true, cell: (k) => number(rows.channels.table_rate_dps[k], 4) },
         { title: "Temperature, deg C", number: true, cell: (k) => number(rows.channels.temperature_c[k], 4) },

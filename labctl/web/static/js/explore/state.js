@@ -3,7 +3,7 @@
 import { updateQuery } from "../core/router.js";
 import { toRanges, fromRanges } from "./dataset_rows.js";
 
-/** @import { Criticism, Version } from "../../../types/api.js" */
+/** @import { Criticism, RecordingRow, Version } from "../../../types/api.js" */
 
 /** @typedef {"axis" | "pick" | "overlay"} Change */
 /** @typedef {{ effect: string, name: string, values: (number | null)[] }} Overlay */
@@ -12,7 +12,9 @@ import { toRanges, fromRanges } from "./dataset_rows.js";
  * @property {string} serial
  * @property {number} version
  * @property {number[]} versions
- * @property {number} recording
+ * @property {number} recording the newest of `recordings`
+ * @property {number[]} recordings
+ * @property {RecordingRow["motion"]} motion what moved the unit
  * @property {Criticism} criticism
  * @property {Version} calibration
  * @property {string} axis
@@ -26,6 +28,8 @@ export class ExploreState {
     this.version = given.version;
     this.versions = given.versions;
     this.recording = given.recording;
+    this.recordings = given.recordings;
+    this.motion = given.motion;
     this.criticism = given.criticism;
     this.calibration = given.calibration;
     this.axis = given.axis;

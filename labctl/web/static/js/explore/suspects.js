@@ -1,9 +1,11 @@
 // The verdict in words, and the suspected effects with their evidence.
 
 import { setChildren, h } from "../core/elements.js";
-import { withUncertainty, number, percent, idText } from "../core/format.js";
+import { capitalised, withUncertainty, number, percent, idText } from "../core/format.js";
 import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
+import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
+import { heldOutName } from "./first_models.js";
 
 /** @import { Criticism, Suspect } from "../../../types/api.js" */
 /** @import { Child } from "../../../types/pages.js" */
@@ -24,7 +26,8 @@ const FULL_NATS = 1e5;
 export function verdictCard(state) {
   const { criticism } = state;
   const [title, kind] = VERDICTS[criticism.verdict];
-  const [first, ...others] = criticism.text;
+  const of = new Set(criticism.joint?.text); // stands in the card of the recordings together
+  const [first, ...others] = criticism.text.filter((line) => !of.has(line));
   const { error, noise } = criticism;
   const ratio = (error.rms_dps ?? NaN) / (error.noise_floor_dps ?? NaN);
   return h(
@@ -34,7 +37,7 @@ export function verdictCard(state) {
       "div",
       { class: "row" },
       chip(title, kind),
-      h("span", { class: "muted small" }, `version ${state.version} compared with recording ${state.recording}`),
+      h("span", { class: "muted small" }, `version ${state.version} compared with ${recordingsText(state)}`),
     ),
     fitWarnings({ warnings: state.calibration.warnings?.filter((each) => each.what === "worse") }),
     h("p", { class: "verdict-statement" }, first),
@@ -46,12 +49,16 @@ export function verdictCard(state) {
         "deg/s",
         Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null,
       ],
-      ["At left-out temperatures", number(error.heldout_rms_dps), "deg/s"],
+      error.heldout_rms_dps === null
+        ? null
+        : [capitalised(heldOutName(state.motion)), number(error.heldout_rms_dps), "deg/s"],
       ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s"],
       noise.vs_datasheet
         ? ["Drift", number(noise.drift_dps), "deg/s", `${number(noise.vs_datasheet, 2)} times the data sheet's`]
         : ["Drift", number(noise.drift_dps), "deg/s"],
-      ["Lack of fit", number(criticism.lack_of_fit.statistic), null, chanceText(criticism.lack_of_fit.p_value)],
+      criticism.lack_of_fit.statistic === null
+        ? null
+        : ["Lack of fit", number(criticism.lack_of_fit.statistic), null, chanceText(criticism.lack_of_fit.p_value)],
     ]),
   );
 }
@@ -123,7 +130,7 @@ export function suspectList(state, { onadd, explain }) {
           evidenceItem(
             "Error with it, deg/s",
             h("span", { class: "number" }, number(s.rms_after_dps)),
-            h("span", { class: "muted small" }, `${number(s.heldout_rms_after_dps)} at left-out temperatures`),
+            h("span", { class: "muted small" }, `${number(s.heldout_rms_after_dps)} ${heldOutName(state.motion)}`),
           ),
           evidenceItem(
             `Coefficient, k = 2${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,

@@ -5,6 +5,7 @@ import { h } from "../core/elements.js";
 import { count, day, number, plainNumber } from "../core/format.js";
 import { button, card, factList, pageHeader, notice } from "../core/components.js";
 import { updateQuery } from "../core/router.js";
+import { motionCard, MOTION_NAMES, MOTION_TITLES } from "../motions/card.js";
 import { allan } from "../recordings/allan.js";
 import { channelUnit } from "../recordings/channels.js";
 import { meanPlots } from "../recordings/mean_plots.js";
@@ -39,6 +40,7 @@ export async function page({ params, query, signal }) {
     id: about.id,
     kind: about.kind,
     sets,
+    motion: info.motion ?? "rates",
     output: info.output ?? {},
     channel: query.channel ?? `gyro_${info.axes[0]}`,
     from: numberIn(query.from),
@@ -65,9 +67,11 @@ export async function page({ params, query, signal }) {
   const readings = datasetReadings(state, signal);
   /** @type {Part[]} */
   const parts = [readings, datasetTable(state, query)];
-  if (!timed && sets.number.length) parts.unshift(meanPlots(state));
+  if (!timed && sets.number.length && (info.motion ?? "rates") === "rates") parts.unshift(meanPlots(state));
   if (timed) parts.unshift(shownTrace(state, signal));
-  if (about.kind === "samples") parts.push(allan(state, signal));
+  const motion = info.motion ?? "rates";
+  if (motion !== "rates") element.append(motionCard(about.id, motion, info.axes, signal));
+  if (about.kind === "samples" && info.motion !== "poses") parts.push(allan(state, signal));
   element.append(...parts);
   return element;
 }
@@ -134,11 +138,15 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
     return there.length ? [Math.min(...there), Math.max(...there)] : null;
   };
   const warm = span(sets.channels.temperature_c?.mean);
-  const rates = span(sets.table_rate_dps);
+  const motion = info.motion ?? "rates";
+  const rates = motion === "rates" ? span(sets.table_rate_dps) : null;
+  const turns = motion === "turns" ? sets.table_rate_dps.filter((rate) => rate !== 0).length : null;
   const units = [...new Set(info.axes.map((axis) => channelUnit(`gyro_${axis}`, info.output)))];
   const element = card(
     "Conditions",
     factList([
+      motion === "rates" ? null : ["Motion", MOTION_NAMES[motion], null, MOTION_TITLES[motion]],
+      turns === null ? null : ["Turns", count(turns), "", `${count(datasets - turns)} rests`],
       ["Axes", info.axes.join(", "), "", `output in ${units.join(", ")}`],
       datasets ? ["Data sets", count(datasets)] : null,
       kind === "samples"
@@ -152,10 +160,24 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
             info.max_rate_dps ? `unit's limit ${plainNumber(info.max_rate_dps)} deg/s` : null,
           ]
         : null,
-      warm ? ["Gyro temperature", `${number(warm[0])} to ${number(warm[1])}`, "deg C"] : null,
+      warm && motion !== "rest"
+        ? [
+            "Gyro temperature",
+            warm[0] === warm[1] ? number(warm[0]) : `${number(warm[0])} to ${number(warm[1])}`,
+            "deg C",
+            datasets > 1 ? "means of the data sets" : "mean",
+          ]
+        : null,
       info.latitude_deg === null
         ? null
-        : ["Latitude", plainNumber(info.latitude_deg), "deg", "the Earth's rate is subtracted"],
+        : [
+            "Latitude",
+            plainNumber(info.latitude_deg),
+            "deg",
+            motion === "poses"
+              ? "the vertical part of the Earth's rate is subtracted from rests"
+              : "the Earth's rate is subtracted",
+          ],
     ]),
   );
   if (info.notes) element.append(h("p", { class: "muted" }, info.notes));

@@ -2,27 +2,28 @@
 
 import { download, get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { day, instant, number } from "../core/format.js";
+import { instant, number } from "../core/format.js";
 import {
   button,
   card,
   chip,
   emptyState,
-  factList,
   pageHeader,
   cardWithHeader,
   loadInto,
   modelName,
-  notice,
   table,
 } from "../core/components.js";
 import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
-import { askCertification, askRevocation, certificationTable, overridden, verdictChip } from "../unit/certification.js";
+import { askCertification, askRevocation, certificationTable } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
+import { inForce } from "../unit/in_force.js";
+import { trendCard } from "../trend/card.js";
 import { uncertaintyInUse } from "../unit/uncertainty.js";
+import { versionFacts } from "../unit/version_facts.js";
 
-/** @import { CalibrationRow, Certification, Unit } from "../../../types/api.js" */
+/** @import { CalibrationRow, Unit } from "../../../types/api.js" */
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
@@ -46,7 +47,12 @@ export async function page({ params, signal }) {
     ),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
     rows.length
-      ? [versions(unit, rows, explore), ladder(unit.serial, signal), versionCards(unit.serial, rows, signal)]
+      ? [
+          versions(unit, rows, explore),
+          ladder(unit.serial, signal),
+          unit.recordings.length > 1 ? trendCard(unit.serial, rows, signal) : null,
+          ...versionCards(unit.serial, rows, signal),
+        ]
       : emptyState(
           h("p", {}, "No calibration yet."),
           h("p", {}, h("a", { class: "button primary", href: explore }, "Fit a model")),
@@ -65,63 +71,6 @@ export async function page({ params, signal }) {
       card(
         "Certifications",
         history.length ? certificationTable(history) : h("p", { class: "muted" }, "Nothing has been certified yet."),
-      ),
-    ),
-  );
-}
-
-/**
- * @param {Unit} unit
- * @param {readonly CalibrationRow[]} rows
- * @param {Certification | undefined} force
- */
-function inForce(unit, rows, force) {
-  if (!unit.certified_version) {
-    return notice(
-      "warn",
-      h(
-        "p",
-        {},
-        h("strong", {}, "No calibration is in force. "),
-        "Robots that ask for this unit's calibration get none until a version is certified.",
-      ),
-    );
-  }
-  const path = { serial: unit.serial };
-  const row = rows.find((each) => each.version === unit.certified_version);
-  const left = force?.due ? Math.ceil((Date.parse(force.due) - Date.now()) / 86_400_000) : null;
-  return h(
-    "div",
-    { class: "stack" },
-    factList([
-      ["In force", `version ${unit.certified_version}`, null, row ? modelName(row.model) : null],
-      ["Certified by", force?.by ?? "–", null, force ? instant(force.at) : null],
-      [
-        "Due",
-        force?.due ? day(force.due) : "no date",
-        null,
-        left === null ? null : left < 0 ? `${-left} days ago` : `in ${left} days`,
-      ],
-      !force || force.override === null
-        ? null
-        : [
-            "Verdict when certified",
-            verdictChip(force),
-            null,
-            force.verdict_recording ? `recording ${force.verdict_recording}` : null,
-          ],
-      ["RMS error", number(row?.rms_dps), "deg/s"],
-      ["At left-out temperatures", number(row?.heldout_rms_dps), "deg/s"],
-    ]),
-    force?.override ? overridden(force) : null,
-    left !== null && left < 0 ? notice("bad", "This calibration is overdue.") : null,
-    h(
-      "div",
-      { class: "row" },
-      unit.formats.map(({ id, title, suffix }) =>
-        button(`Download ${title}`, () =>
-          download("/api/units/{serial}/calibration", `${unit.serial}.${suffix}`, { path, query: { format: id } }),
-        ),
       ),
     ),
   );
@@ -266,7 +215,13 @@ function versionCards(serial, rows, signal) {
     const asked = Promise.all([read(one), other ? read(other) : null]);
     loadInto(place, "Reading the coefficients", async () => {
       const [first, second] = await asked;
-      return h("div", { class: "stack" }, second ? comparison(first, second) : null, coefficients(first, second));
+      return h(
+        "div",
+        { class: "stack" },
+        second ? comparison(first, second) : null,
+        coefficients(first, second),
+        versionFacts(first),
+      );
     });
     asked.then(
       ([first]) => {

@@ -3,6 +3,7 @@
 import { get } from "../core/http/api.js";
 import { Problem } from "../core/http/errors.js";
 import { setChildren, h, whenNearViewport } from "../core/elements.js";
+import { faded } from "../core/colour_scales.js";
 import { axisColour, figure } from "../core/figure.js";
 import { duration, number, withUnit } from "../core/format.js";
 import { cardWithHeader, loadInto, notice, table } from "../core/components.js";
@@ -70,7 +71,7 @@ export function allan(state, signal) {
 function allanFigure(found) {
   const axes = Object.entries(found.axes);
   const [first, last] = [found.datasets[0], found.datasets.at(-1)];
-  const where = `Data set${first === last ? ` ${first}` : `s ${first} to ${last}`}, ${duration(found.duration_s)} at ${withUnit(found.temperature_c, "deg C")}.`;
+  const where = `Data set${first === last ? ` ${first}` : `s ${first} to ${last}`}, ${duration(found.duration_s)}${found.temperature_c === null ? "" : ` at ${withUnit(found.temperature_c, "deg C")}`}.`;
   const draw = () => ({
     data: axes.flatMap(([axis, noise]) => [
       {
@@ -79,7 +80,7 @@ function allanFigure(found) {
         x: [...noise.tau_s, ...[...noise.tau_s].reverse()],
         y: [...noise.high_dps, ...[...noise.low_dps].reverse()],
         fill: "toself",
-        fillcolor: `color-mix(in srgb, ${axisColour(axis)} 18%, transparent)`,
+        fillcolor: faded(axisColour(axis), 0.18),
         line: { width: 0 },
         hoverinfo: "skip",
         showlegend: false,

@@ -6,6 +6,7 @@ import { chip, cardWithHeader, table } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { updateQuery } from "../core/router.js";
 import { channelName, channelUnit } from "./channels.js";
+import { POSITIONED, RATE_TITLES } from "./motion_texts.js";
 
 /** @import { Query, RecordingState } from "../../../types/pages.js" */
 
@@ -87,7 +88,15 @@ export function datasetTable(state, asked) {
     at = null;
     show();
   };
-  return Object.assign(cardWithHeader(`${count(sets.number.length)} data sets`, filter, place, leaf), { redraw });
+  return Object.assign(
+    cardWithHeader(
+      `${count(sets.number.length)} data ${sets.number.length === 1 ? "set" : "sets"}`,
+      filter,
+      place,
+      leaf,
+    ),
+    { redraw },
+  );
 }
 
 /**
@@ -128,12 +137,20 @@ function pageTable(state, rows) {
         title: "State",
         cell: (k) => h("span", { title: sets.reason[k] }, chip(sets.state[k], CHIP_KINDS[sets.state[k]] ?? "warn")),
       },
-      { title: "Up", cell: (k) => sets.position[k] },
-      { title: "Table rate, deg/s", number: true, cell: (k) => plainNumber(sets.table_rate_dps[k], 6) },
+      POSITIONED.has(state.motion) ? { title: "Up", cell: (k) => sets.position[k] } : null,
+      RATE_TITLES[state.motion]
+        ? {
+            title: `${RATE_TITLES[state.motion]}, deg/s`,
+            number: true,
+            cell: (k) => plainNumber(sets.table_rate_dps[k], 6),
+          }
+        : null,
       warm
         ? { title: "Set point, deg C", number: true, cell: (k) => plainNumber(sets.chamber_setpoint_c[k] ?? NaN) }
         : null,
-      { title: "Gyro, deg C", number: true, cell: (k) => of("temperature_c", k, 4) },
+      sets.channels.temperature_c
+        ? { title: "Gyro, deg C", number: true, cell: (k) => of("temperature_c", k, 4) }
+        : null,
       ...gyros.map((name) => ({
         title: `${channelName(name).replace("gyro output", "Output")}, ${channelUnit(name, output)}`,
         number: true,

@@ -7,6 +7,7 @@ import { count, number, plainNumber } from "../core/format.js";
 import { factList, cardWithHeader, loadInto, table } from "../core/components.js";
 import { option, selectField } from "../core/fields.js";
 import { channelName, channelTitle, channelUnit } from "./channels.js";
+import { RATE_TITLES } from "./motion_texts.js";
 
 /** @import { Samples } from "../../../types/api.js" */
 /** @import { Fact, RecordingState } from "../../../types/pages.js" */
@@ -71,14 +72,17 @@ function summary(state, k) {
       const scatter = std[k] === null ? null : `scatter ${number(std[k], 3)} ${unit}`;
       return [channelName(name).replace("gyro output", "Output"), number(mean[k], 6), unit, scatter];
     });
+  const rateTitle = RATE_TITLES[state.motion];
   const [from, until] = [sets.t_from_s[k], sets.t_until_s[k]];
   return factList([
-    [
-      "Table rate",
-      plainNumber(sets.table_rate_dps[k], 7),
-      "deg/s",
-      `${sets.position[k]} up, mounting ${sets.mounting[k]}, session ${sets.run[k]}`,
-    ],
+    rateTitle
+      ? [
+          rateTitle,
+          plainNumber(sets.table_rate_dps[k], 7),
+          "deg/s",
+          `${sets.position[k]} up, mounting ${sets.mounting[k]}, session ${sets.run[k]}`,
+        ]
+      : ["Session", `${sets.run[k]}`, "", `mounting ${sets.mounting[k]}`],
     sets.channels.temperature_c
       ? [
           "Gyro temperature",

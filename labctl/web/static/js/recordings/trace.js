@@ -5,6 +5,7 @@ import { isAbort, messageOf } from "../core/http/errors.js";
 import { timeUnit } from "../core/time_unit.js";
 import { continuousPieces, envelopeOutline, meanLine } from "./trace_pieces.js";
 import { setChildren, h } from "../core/elements.js";
+import { faded } from "../core/colour_scales.js";
 import { colour, figure } from "../core/figure.js";
 import { count, duration, isNumber, number } from "../core/format.js";
 import { busyIndicator, cardWithHeader, notice } from "../core/components.js";
@@ -73,7 +74,7 @@ export function trace(state, signal) {
           mode: "lines",
           name: "minimum to maximum",
           fill: "toself",
-          fillcolor: `color-mix(in srgb, ${line} 28%, transparent)`,
+          fillcolor: faded(line, 0.28),
           line: { width: 0 },
           hoverinfo: "skip",
           ...envelopeOutline(t, answer, pieces),

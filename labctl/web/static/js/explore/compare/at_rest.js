@@ -2,6 +2,7 @@
 
 import { h } from "../../core/elements.js";
 import { axisColour, colour, figure } from "../../core/figure.js";
+import { recordingMarks } from "../../core/recording_marks.js";
 import { linesOf, ownRows, pickRows, positionsOf } from "./rows.js";
 
 /** @import { Comparison } from "../../../../types/api.js" */
@@ -20,6 +21,7 @@ export function atRest(comparison, state) {
   if (!here.length) return h("p", { class: "muted" }, "No data set of this recording is at rest.");
   const rest = pickRows(own, here);
   const lines = linesOf(comparison.over_temperature, state.axis, positionsOf(rest));
+  const marks = recordingMarks(rest.recording, axisColour(state.axis));
   const floor = state.criticism.error.noise_floor_dps;
   /** @returns {Picture} */
   const draw = () => ({
@@ -49,9 +51,11 @@ export function atRest(comparison, state) {
         y: rest.measured_error_dps,
         customdata: rest.dataset,
         error_y: floor ? { type: "constant", value: 2 * floor, thickness: 1, width: 0 } : undefined,
-        marker: { color: axisColour(state.axis), size: 7 },
-        hovertemplate: "data set %{customdata}<br>%{x:.4g} deg C: %{y:.4g} deg/s<extra></extra>",
+        text: rest.recording.map((recording) => (marks.legend.length ? `recording ${recording}, ` : "")),
+        marker: { color: axisColour(state.axis), size: 7, ...marks.marker },
+        hovertemplate: "%{text}data set %{customdata}<br>%{x:.4g} deg C: %{y:.4g} deg/s<extra></extra>",
       },
+      ...marks.legend,
     ],
     layout: {
       xaxis: { title: { text: "gyro temperature, deg C" } },

@@ -6,13 +6,19 @@ import { cardWithHeader, loadInto } from "../../core/components.js";
 import { toggleGroup } from "../../core/fields.js";
 import { query, updateQuery } from "../../core/router.js";
 import { allPanels, overRate, overTemperature } from "./model_lines.js";
+import { asked } from "../chosen_recordings.js";
 import { atRest } from "./at_rest.js";
+import { motionComparison } from "./motion_comparison.js";
 import { surfaces } from "./surfaces.js";
 import { fullTurn } from "./full_turn.js";
 
 /** @import { Comparison } from "../../../../types/api.js" */
 /** @import { ExploreState } from "../state.js" */
 
+/** At rest nothing hangs on the rate. */
+const AT_REST = new Set(["warm", "rest"]);
+/** Views in which the data sets of several recordings have marks of their own. */
+const SEVERAL = new Set(["lines", "warm", "panels", "rest"]);
 /** @type {[id: string, text: string, draw: (comparison: Comparison, state: ExploreState) => HTMLElement][]} */
 const VIEWS = [
   ["lines", "Error over rate", overRate],
@@ -30,14 +36,18 @@ const VIEWS = [
 export function errorComparison(state, signal) {
   const place = h("div", { style: "min-height: 28rem" });
   const source = h("p", { class: "muted small" });
-  let view = VIEWS.find(([id]) => id === query().view) ?? VIEWS[0];
+  if (state.motion !== "rates" && state.recordings.length < 2) return motionComparison(state, signal);
+  const views = VIEWS.filter(
+    ([id]) => (state.motion !== "rest" || AT_REST.has(id)) && (state.recordings.length < 2 || SEVERAL.has(id)),
+  );
+  let view = views.find(([id]) => id === query().view) ?? views[0];
   /** @type {Comparison | null} */
   let comparison = null;
   const shown = () =>
     loadInto(place, "Reading the data sets", async () => {
       comparison ??= await get("/api/units/{serial}/calibrations/{version}/comparison", {
         path: { serial: state.serial, version: state.version },
-        query: { recording: state.recording },
+        query: asked(state),
         signal,
       });
       source.textContent = sourceText(comparison);
@@ -47,9 +57,9 @@ export function errorComparison(state, signal) {
   state.onchange((what) => what === "axis" && shown());
   return cardWithHeader(
     "Compare",
-    toggleGroup("What to compare", VIEWS, view[0], (value) => {
-      view = VIEWS.find(([id]) => id === value) ?? VIEWS[0];
-      updateQuery({ view: view === VIEWS[0] ? null : value });
+    toggleGroup("What to compare", views, view[0], (value) => {
+      view = views.find(([id]) => id === value) ?? views[0];
+      updateQuery({ view: view === views[0] ? null : value });
       shown();
     }),
     source,

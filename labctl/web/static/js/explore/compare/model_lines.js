@@ -1,8 +1,9 @@
 // Measured errors as dots and the model as lines: over rate, over temperature, and for every output and turning axis.
 
 import { rateColours, temperatureColours } from "../../core/colour_scales.js";
-import { figure } from "../../core/figure.js";
+import { colour, figure } from "../../core/figure.js";
 import { plainNumber } from "../../core/format.js";
+import { recordingMarks } from "../../core/recording_marks.js";
 import { alongRate, linesOf, ownRows, positionsOf, rowsWhere, signOf } from "./rows.js";
 
 /** @import { Comparison, ModelLines } from "../../../../types/api.js" */
@@ -20,20 +21,27 @@ const isNarrow = () => window.innerWidth < 760;
  * @param {readonly number[]} colours
  * @param {string} unit
  * @param {object} [more]
- * @returns {PlotTrace}
+ * @returns {PlotTrace[]}
  */
-const dots = (rows, x, colours, unit, more) => ({
-  type: "scatter",
-  mode: "markers",
-  name: "measured",
-  x,
-  y: rows.measured_error_dps,
-  customdata: rows.dataset,
-  marker: { size: 5, color: colours, coloraxis: "coloraxis" },
-  showlegend: false,
-  hovertemplate: `data set %{customdata}<br>%{x:.5g} ${unit}: %{y:.4g} deg/s<extra></extra>`,
-  ...more,
-});
+const dots = (rows, x, colours, unit, more) => {
+  const marks = recordingMarks(rows.recording, colour("text-muted"));
+  return [
+    {
+      type: "scatter",
+      mode: "markers",
+      name: "measured",
+      x,
+      y: rows.measured_error_dps,
+      customdata: rows.dataset,
+      text: rows.recording.map((recording) => (marks.legend.length ? `recording ${recording}, ` : "")),
+      marker: { size: marks.legend.length ? 6 : 5, color: colours, coloraxis: "coloraxis", ...marks.marker },
+      showlegend: false,
+      hovertemplate: `%{text}data set %{customdata}<br>%{x:.5g} ${unit}: %{y:.4g} deg/s<extra></extra>`,
+      ...more,
+    },
+    ...marks.legend,
+  ];
+};
 /**
  * @param {readonly number[]} x
  * @param {readonly number[]} y
@@ -53,6 +61,9 @@ const line = (x, y, name, shade, more) => ({
   showlegend: false,
   ...more,
 });
+
+/** @param {PlotTrace} trace */
+const markerOf = ({ marker }) => /** @type {object} */ (marker);
 
 /** @param {readonly ModelLines[]} lines */
 const ofAll = (lines) =>
@@ -76,7 +87,7 @@ export function overRate(comparison, state) {
             line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} deg C`, colours.of(level)),
           ),
         ),
-        dots(rows, rows.rate, rows.temperature_c, "deg/s"),
+        ...dots(rows, rows.rate, rows.temperature_c, "deg/s"),
       ],
       layout: {
         coloraxis: colours.axis,
@@ -114,7 +125,7 @@ export function overTemperature(comparison, state) {
             ),
           ),
         ),
-        dots(rows, rows.temperature_c, rows.rate, "deg C"),
+        ...dots(rows, rows.temperature_c, rows.rate, "deg C"),
       ],
       layout: {
         coloraxis: colours.axis,
@@ -172,17 +183,18 @@ export function allPanels(comparison) {
         font: { size: 12 },
       });
       const lines = linesOf(comparison.over_rate, axis, [position]);
+      const [measured, ...legend] = dots(rows, rows.rate, rows.temperature_c, "deg/s", {
+        ...place,
+        name: `${axis} about ${position}`,
+      });
       return [
         ...lines.flatMap((each) =>
           each.level.map((level, k) =>
             line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} deg C`, colours.of(level), place),
           ),
         ),
-        dots(rows, rows.rate, rows.temperature_c, "deg/s", {
-          ...place,
-          name: `${axis} about ${position}`,
-          marker: { size: 4, color: rows.temperature_c, coloraxis: "coloraxis" },
-        }),
+        { ...measured, marker: { ...markerOf(measured), size: 4 } },
+        ...(panel ? [] : legend),
       ];
     });
     return { data, layout };

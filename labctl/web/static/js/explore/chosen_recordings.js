@@ -1,0 +1,37 @@
+// Which recordings are compared: one, or several as one; in the address, in a query and in words.
+
+/** @typedef {{ recording: number, recordings: readonly number[] }} Chosen `recording` is the newest of them */
+
+/**
+ * Numbers of an address like `7,8,9` that are known, rising.
+ * @param {string | undefined} text
+ * @param {readonly number[]} known
+ */
+export const numbersIn = (text, known) =>
+  [...new Set((text ?? "").split(",").map(Number))].filter((each) => known.includes(each)).sort((a, b) => a - b);
+
+/**
+ * For a query or a body: `recording`, or `recordings` where there are several.
+ * @param {Chosen} chosen
+ * @returns {{ recording: number } | { recordings: number[] }}
+ */
+export const asked = ({ recording, recordings }) =>
+  recordings.length > 1 ? { recordings: [...recordings] } : { recording };
+
+/**
+ * For the address of the page.
+ * @param {Chosen} chosen
+ */
+export const inAddress = ({ recording, recordings }) =>
+  recordings.length > 1
+    ? { recordings: recordings.join(","), recording: null }
+    : { recording: String(recording), recordings: null };
+
+/**
+ * "recording 7", "recordings 7, 8 and 9".
+ * @param {Chosen} chosen
+ */
+export function recordingsText({ recording, recordings }) {
+  if (recordings.length < 2) return `recording ${recording}`;
+  return `recordings ${recordings.slice(0, -1).join(", ")} and ${recordings.at(-1)}`;
+}

@@ -1,0 +1,60 @@
+// A version on a recording in poses: no rate is known, so nothing is criticised; gravity says what it leaves.
+
+import { get } from "../core/http/api.js";
+import { h, setChildren } from "../core/elements.js";
+import { number } from "../core/format.js";
+import { cardWithHeader, chip, factList, loadInto } from "../core/components.js";
+import { ladderFigure } from "./error_ladder.js";
+import { motionComparison } from "./compare/motion_comparison.js";
+
+/** @import { Version } from "../../../types/api.js" */
+
+/**
+ * @param {string} serial
+ * @param {Version} calibration
+ * @param {number} recording
+ * @param {AbortSignal} signal
+ */
+export function posesView(serial, calibration, recording, signal) {
+  const path = { serial, version: calibration.version };
+  const verified = h("section", { class: "card stack verdict", "aria-label": "Verdict" });
+  loadInto(verified, "Applying the version", async () => {
+    const found = await get("/api/units/{serial}/calibrations/{version}/verification", {
+      path,
+      query: { recording },
+      signal,
+    });
+    verified.classList.add(found.ok ? "good" : "bad");
+    return [
+      h(
+        "div",
+        { class: "row" },
+        chip(found.ok ? "As expected" : "Worse than expected", found.ok ? "good" : "bad"),
+        h("span", { class: "muted small" }, `version ${path.version} applied to recording ${recording}`),
+      ),
+      h(
+        "p",
+        {},
+        "Of a recording in poses no rate is known, only where gravity was before and after each turn: a version is verified by it, and no missing effect can be named.",
+      ),
+      factList([
+        ["Error of a turn, RMS", number(found.rms_dps), "deg/s", "what gravity is off by, over how long the turn took"],
+        ["Largest", number(found.max_dps), "deg/s"],
+        found.expected_dps === null ? null : ["Expected of this version", number(found.expected_dps), "deg/s"],
+        ["Turns", `${found.datasets}`],
+      ]),
+    ];
+  });
+  const ladder = h("div", {});
+  loadInto(ladder, "RMS error by version", async () =>
+    ladderFigure(await get("/api/units/{serial}/ladder", { path: { serial }, signal }), "poses"),
+  );
+  const element = h("div", { class: "page" });
+  setChildren(
+    element,
+    verified,
+    motionComparison({ serial, version: path.version, recording, axis: "x", onchange: () => {}, calibration }, signal),
+    cardWithHeader("Error of the versions", null, ladder),
+  );
+  return element;
+}

@@ -1,0 +1,164 @@
+// A version compared with recordings: verdict, comparison, diagnostics, suspects, change, ladder; shown when computed.
+
+import { get, getFollowed, post } from "../core/http/api.js";
+import { isAbort } from "../core/http/errors.js";
+import { setChildren, h } from "../core/elements.js";
+import { busyIndicator, errorPage } from "../core/components.js";
+import { option, toggleGroup } from "../core/fields.js";
+import { navigate } from "../core/router.js";
+import { jointCard } from "../joint/card.js";
+import { asked as askedFor } from "./chosen_recordings.js";
+import { errorComparison } from "./compare/error_comparison.js";
+import { axisNames, inDatasetOrder } from "./dataset_rows.js";
+import { errorLadder } from "./error_ladder.js";
+import { extendModel } from "./extend_model.js";
+import { residualDiagnostics } from "./residual_diagnostics.js";
+import { selectedRows } from "./residual_map.js";
+import { ExploreState } from "./state.js";
+import { suspectList, verdictCard } from "./suspects.js";
+
+/** @import { Criticism, Effect, RecordingRow, Unit, Version } from "../../../types/api.js" */
+/** @import { Query } from "../../../types/pages.js" */
+/** @import { Chosen } from "./chosen_recordings.js" */
+
+/** Sections of the page in order: anchor, name. */
+const SECTIONS = [
+  ["compare", "Compare"],
+  ["fails", "Fails"],
+  ["learn", "Learn"],
+  ["add", "Add"],
+  ["watch", "Watch"],
+];
+
+/**
+ * @typedef {object} Given
+ * @property {Unit} unit
+ * @property {Version} calibration
+ * @property {number[]} versions
+ * @property {Chosen} chosen
+ * @property {RecordingRow["motion"]} motion
+ * @property {Query} query
+ * @property {AbortSignal} signal
+ */
+
+/** @param {Given} given */
+export function versionView(given) {
+  const { unit, calibration, chosen, signal } = given;
+  const stage = h("p", { class: "muted", "aria-live": "polite" });
+  const place = h(
+    "div",
+    { class: "page" },
+    h(
+      "div",
+      { class: "card" },
+      busyIndicator("Comparing the model with every reading; the first time takes some seconds."),
+      stage,
+    ),
+  );
+  const path = { serial: unit.serial, version: calibration.version };
+  const asking = Promise.all([
+    getFollowed("/api/units/{serial}/calibrations/{version}/criticism/events", {
+      path,
+      query: askedFor(chosen),
+      signal,
+      onstage: (name) => setChildren(stage, `${name} …`),
+    }),
+    get("/api/effects", { signal }),
+  ]);
+  asking
+    .then(([criticism, catalogue]) => {
+      setChildren(place, sections(given, criticism, catalogue.effects));
+      if (location.hash) document.getElementById(location.hash.slice(1))?.scrollIntoView();
+    })
+    .catch(
+      (error) =>
+        !isAbort(error) &&
+        setChildren(
+          place,
+          errorPage(error, () => navigate(location.pathname + location.search)),
+        ),
+    );
+  return place;
+}
+
+/**
+ * @param {Given} given
+ * @param {Criticism} criticism
+ * @param {readonly Effect[]} effects
+ */
+function sections({ unit, calibration, versions, chosen, motion, query, signal }, criticism, effects) {
+  const axes = axisNames(criticism);
+  const state = new ExploreState({
+    serial: unit.serial,
+    version: calibration.version,
+    versions,
+    ...chosen,
+    recordings: [...chosen.recordings],
+    motion,
+    criticism,
+    calibration,
+    axis: axes.find((axis) => axis === query.axis) ?? axes[0] ?? Object.keys(calibration.axes)[0],
+    pick: query.pick,
+  });
+  const joint = criticism.joint ? jointCard(criticism.joint) : null;
+  if (!axes.length) {
+    const alone = chosen.recordings.length < 2 && motion !== "rates";
+    return [verdictCard(state), joint, alone ? errorComparison(state, signal) : null, errorLadder(state, signal)];
+  }
+  const adding = extendModel(state, effects);
+  const parts = [
+    errorComparison(state, signal),
+    residualDiagnostics(state),
+    suspectList(state, { onadd: adding.put, explain: (effect) => explained(state, effect, signal) }),
+    adding.element,
+    errorLadder(state, signal),
+  ];
+  parts.forEach((part, k) => {
+    part.id = SECTIONS[k][0];
+  });
+  return [verdictCard(state), joint, pageNavigation(state, axes), ...parts];
+}
+
+/**
+ * What an effect would explain of the residual, data set by data set.
+ * @param {ExploreState} state
+ * @param {string} effect
+ * @param {AbortSignal} signal
+ */
+async function explained(state, effect, signal) {
+  const found = await post("/api/units/{serial}/calibrations/{version}/preview", {
+    path: { serial: state.serial, version: state.version },
+    body: { add: [effect], ...askedFor(state) },
+    signal,
+  });
+  const after = inDatasetOrder(state, found.residuals, "residual_dps");
+  return selectedRows(state).residual.map((before, k) => {
+    const left = after[k];
+    return left === null || before === null ? null : before - left;
+  });
+}
+
+/**
+ * Sticky bar: the axis that all figures show, and links to the sections.
+ * @param {ExploreState} state
+ * @param {readonly string[]} axes
+ */
+function pageNavigation(state, axes) {
+  return h(
+    "div",
+    { class: "page-nav" },
+    axes.length > 1
+      ? toggleGroup(
+          "Axis of the gyro",
+          axes.map((axis) => option(axis, `axis ${axis}`)),
+          state.axis,
+          (axis) => state.selectAxis(axis),
+        )
+      : null,
+    h(
+      "nav",
+      { class: "row tight", "aria-label": "On this page" },
+      SECTIONS.map(([id, name]) => h("a", { class: "button quiet tiny", href: `#${id}` }, name)),
+    ),
+  );
+}

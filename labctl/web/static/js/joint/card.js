@@ -1,0 +1,108 @@
+// What several recordings say together: repeatability, agreement, each predicted by the others.
+
+import { h } from "../core/elements.js";
+import { idText, number, sizeText } from "../core/format.js";
+import { cardWithHeader, chip, notice, table } from "../core/components.js";
+import { shiftFigures } from "./shifts.js";
+
+/** @import { Joint } from "../../../types/api.js" */
+/** @typedef {Joint["repeatability"][string][number]} Repeatability */
+
+/** @param {number | null} p */
+const chance = (p) => (p === null ? "–" : p < 1e-6 ? "below 10⁻⁶" : number(p, 2));
+
+/** @param {Joint} joint */
+export function jointCard(joint) {
+  return cardWithHeader(`Recordings ${joint.recordings.join(", ")} together`, null, ...jointParts(joint));
+}
+
+/** @param {Joint} joint */
+export function jointParts(joint) {
+  return [
+    joint.text.map((line) => h("p", {}, line)),
+    repeatability(joint),
+    shiftFigures(joint),
+    agreement(joint),
+    heldOut(joint),
+  ];
+}
+
+/** @param {Joint} joint */
+function repeatability(joint) {
+  const rows = Object.entries(joint.repeatability).flatMap(([axis, each]) => each.map((one) => ({ axis, ...one })));
+  if (!rows.length) return null;
+  return [
+    h("h3", {}, "Repeatability"),
+    table(
+      [
+        { title: "Axis", cell: (row) => row.axis },
+        { title: "What", prose: true, cell: (row) => row.term },
+        { title: "Standard deviation", number: true, cell: (row) => sizeText(row.value, row.unit) },
+        { title: "u", number: true, cell: (row) => sizeText(row.u, row.unit) },
+        {
+          title: "95 %",
+          number: true,
+          cell: (row) => `${sizeText(row.low, row.unit)} to ${sizeText(row.high, row.unit)}`,
+        },
+        { title: "Chance of noise alone", number: true, cell: (row) => chance(row.p_value) },
+        { title: "", cell: (row) => (row.seen ? chip("seen", "warn") : chip("not seen", "good")) },
+      ],
+      rows,
+      { label: "Repeatability" },
+    ),
+  ];
+}
+
+/** @param {Joint} joint */
+function agreement(joint) {
+  if (joint.not_compared) return notice("", `The recordings were not compared: ${joint.not_compared}`);
+  return [
+    h("h3", {}, "Agreement of the recordings, each fitted alone"),
+    table(
+      [
+        { title: "Effect", cell: (row) => idText(row.effect) },
+        {
+          title: "Agreement",
+          cell: (row) =>
+            row.agree
+              ? chip(row.shift && row.p_value_beside_shifts === null ? "agree beside a shift" : "agree", "good")
+              : chip("differ", "bad"),
+        },
+        { title: "chi²", number: true, cell: (row) => number(row.chi2) },
+        { title: "Degrees of freedom", number: true, cell: (row) => `${row.freedom}` },
+        { title: "p-value", number: true, cell: (row) => chance(row.p_value) },
+        { title: "p-value beside shifts", number: true, cell: (row) => chance(row.p_value_beside_shifts) },
+        { title: "A common difference is reported as", prose: true, cell: (row) => row.shift ?? "–" },
+      ],
+      joint.agreement,
+      { label: "Agreement" },
+    ),
+  ];
+}
+
+/** @param {Joint} joint */
+function heldOut(joint) {
+  return [
+    h("h3", {}, "Each recording by a fit to the others"),
+    h(
+      "p",
+      { class: "muted small" },
+      "What a later day has to expect: the shift of its own power-on and day is part of it.",
+    ),
+    table(
+      [
+        {
+          title: "Recording",
+          cell: (row) => h("a", { href: `/recordings/${row.recording}` }, `Recording ${row.recording}`),
+        },
+        { title: "RMS error, deg/s", number: true, cell: (row) => number(row.rms_dps) },
+        { title: "", prose: true, cell: (row) => row.why },
+      ],
+      joint.held_out,
+      { label: "Held-out recordings" },
+    ),
+    joint.heldout_rms_dps === null
+      ? null
+      : h("p", {}, `All of them together: ${number(joint.heldout_rms_dps)} deg/s RMS.`),
+  ];
+}

@@ -1,0 +1,105 @@
+// Turns by hand between rests: gravity before and after each, by the accelerometer and by the gyro.
+
+import { h } from "../core/elements.js";
+import { axisColour, colour, figure } from "../core/figure.js";
+import { number } from "../core/format.js";
+import { notice, table } from "../core/components.js";
+
+/** @import { Motion } from "../../../types/api.js" */
+/** @import { Picture } from "../../../types/pages.js" */
+
+/** @param {Motion} found */
+export function poseFigures(found) {
+  if (!found.poses) return null;
+  const { poses } = found;
+  const turn = poses.from_s.map((from, k) => `${number(from, 4)} to ${number(poses.until_s[k], 4)} s`);
+  const most = Math.max(...poses.accelerometer_deg, ...poses.gyro_deg, 1);
+  /** @returns {Picture} */
+  const angles = () => ({
+    data: [
+      {
+        type: "scatter",
+        mode: "lines",
+        name: "equal",
+        x: [0, most],
+        y: [0, most],
+        line: { color: colour("border-strong"), dash: "dash", width: 1 },
+        hoverinfo: "skip",
+      },
+      {
+        type: "scatter",
+        mode: "markers",
+        name: "moves",
+        x: poses.accelerometer_deg,
+        y: poses.gyro_deg,
+        text: turn,
+        marker: { size: 8, color: axisColour("x") },
+        hovertemplate: "%{text}<br>accelerometer %{x:.4g} deg, gyro %{y:.4g} deg<extra></extra>",
+      },
+    ],
+    layout: {
+      showlegend: false,
+      xaxis: { title: { text: "by the accelerometer, deg" } },
+      yaxis: { title: { text: "by the gyro, deg" } },
+    },
+  });
+  /** @returns {Picture} */
+  const residuals = () => ({
+    data: [
+      {
+        type: "bar",
+        name: "residual",
+        x: poses.from_s.map((from, k) => (from + poses.until_s[k]) / 2),
+        y: poses.residual_deg,
+        text: turn,
+        textposition: "none",
+        marker: { color: axisColour("x") },
+        hovertemplate: "%{text}<br>%{y:.3g} deg<extra></extra>",
+      },
+    ],
+    layout: {
+      showlegend: false,
+      xaxis: { title: { text: "middle of the move, s" } },
+      yaxis: { title: { text: "gravity off by, deg" } },
+    },
+  });
+  const of = found.version === null ? "the outputs as they are, with their bias" : `version ${found.version}`;
+  return h(
+    "div",
+    { class: "stack" },
+    found.left_out.length
+      ? notice("", `${found.rows} of ${found.of} moves are here. Not: ${found.left_out.join("; ")}.`)
+      : h("p", { class: "muted small" }, `All ${found.of} moves between rests.`),
+    h(
+      "div",
+      { class: "columns" },
+      figure(
+        "Angle of each move",
+        `By how much gravity's direction moved in the body from one rest to the next; the gyro's by ${of}. Dashed: both equal.`,
+        angles,
+        { height: "19rem" },
+      ),
+      figure(
+        "Residual of each move",
+        "Angle between gravity after a move where the gyro puts it and where the accelerometer shows it.",
+        residuals,
+        { height: "19rem" },
+      ),
+    ),
+    table(
+      [
+        { title: "Move, s", cell: (k) => h("span", { class: "nowrap" }, turn[k]) },
+        { title: "Accelerometer, deg", number: true, cell: (k) => number(poses.accelerometer_deg[k], 5) },
+        { title: "Gyro, deg", number: true, cell: (k) => number(poses.gyro_deg[k], 5) },
+        {
+          title: "Difference, deg",
+          number: true,
+          cell: (k) => number(poses.gyro_deg[k] - poses.accelerometer_deg[k], 2),
+        },
+        { title: "Gravity off by, deg", number: true, cell: (k) => number(poses.residual_deg[k], 2) },
+      ],
+      poses.from_s.map((_, k) => k),
+      { dense: true, label: "Moves" },
+    ),
+  );
+}

@@ -1,0 +1,147 @@
+// A unit over its recordings in time: as found, as left, drift per year, and when the bias leaves its limit.
+
+import { get } from "../core/http/api.js";
+import { h, setChildren } from "../core/elements.js";
+import { day, number, sizeText, withUncertainty } from "../core/format.js";
+import { cardWithHeader, chip, loadInto, table } from "../core/components.js";
+import { labelledField, option, selectField } from "../core/fields.js";
+import { query, updateQuery } from "../core/router.js";
+import { driftFigure, errorFigure } from "./figures.js";
+
+/** @import { CalibrationRow, Drift, Trend } from "../../../types/api.js" */
+
+const K = 2;
+/** @type {Record<string, string>} */
+const NAMES = { bias: "bias", scale_factor: "scale factor", error: "RMS error" };
+
+/**
+ * @param {string} serial
+ * @param {readonly CalibrationRow[]} rows
+ * @param {AbortSignal} signal
+ */
+export function trendCard(serial, rows, signal) {
+  const place = h("div", { class: "stack", style: "min-height: 20rem" });
+  const versions = rows.map((row) => row.version).sort((a, b) => a - b);
+  let version = versions.find((each) => each === Number(query().trend)) ?? versions[0];
+  let limit = Number(query().limit) > 0 ? Number(query().limit) : null;
+  const show = () => {
+    updateQuery({ trend: version === versions[0] ? null : version, limit });
+    const asked = { version, limit_dps: limit };
+    loadInto(place, "Applying the version to every recording", async () => {
+      const found = await get("/api/units/{serial}/trend", { path: { serial }, query: asked, signal });
+      if (asked.version === version && asked.limit_dps === limit) field.placeholder = number(found.limit_dps);
+      return shown(found);
+    });
+  };
+  /** @type {HTMLInputElement} */
+  const field = h("input", {
+    type: "number",
+    min: 0,
+    step: "any",
+    value: limit,
+    style: "width: 9rem",
+    onchange: () => {
+      limit = Number(field.value) > 0 ? Number(field.value) : null;
+      show();
+    },
+  });
+  show();
+  const choose = h("div", { class: "row", style: "align-items: end" });
+  setChildren(
+    choose,
+    selectField(
+      "Version",
+      versions.map((each) => option(each, `version ${each}`)),
+      version,
+      (value) => {
+        version = Number(value);
+        show();
+      },
+    ),
+    labelledField("Limit of the bias, deg/s", field),
+  );
+  return cardWithHeader("Over the years", choose, place);
+}
+
+/** @param {Trend} trend */
+function shown(trend) {
+  const turned = trend.drifts.some((drift) => drift.what === "scale_factor");
+  return [
+    trend.text.map((line) => h("p", {}, line)),
+    trend.drifts.length
+      ? h(
+          "div",
+          { class: "columns", style: "--column-min: 19rem" },
+          driftFigure(trend, "bias"),
+          turned ? driftFigure(trend, "scale_factor") : null,
+          errorFigure(trend),
+        )
+      : null,
+    drifts(trend),
+    pointTable(trend),
+  ];
+}
+
+/** @param {Trend} trend */
+function drifts(trend) {
+  if (!trend.drifts.length) return null;
+  const leaves = new Map(trend.leaves.map((each) => [each.axis, each]));
+  /** @param {Drift} row */
+  const when = (row) => {
+    const each = leaves.get(row.axis);
+    if (row.what !== "bias" || !each) return "–";
+    if (each.outside) return chip("outside already", "bad");
+    if (!each.expected) return "not within 50 years";
+    const between = `${day(each.earliest)} to ${each.latest ? day(each.latest) : "not within 50 years"}`;
+    return [day(each.expected), each.earliest ? h("div", { class: "muted small" }, `95 %: ${between}`) : null];
+  };
+  return table(
+    [
+      { title: "Axis", cell: (row) => row.axis },
+      { title: "What", cell: (row) => NAMES[row.what] ?? row.what },
+      {
+        title: "Drift per year, k = 2",
+        number: true,
+        cell: (row) => withUncertainty(row.per_year, row.u === null ? null : K * row.u, row.unit.replace("/year", "")),
+      },
+      {
+        title: "95 %, Student's t",
+        number: true,
+        cell: (row) => {
+          const unit = row.unit.replace("/year", "");
+          return row.low === null ? "–" : `${sizeText(row.low, unit)} to ${sizeText(row.high, unit)}`;
+        },
+      },
+      {
+        title: "Repeatability",
+        number: true,
+        cell: (row) => sizeText(row.repeatability, row.unit.replace("/year", "")),
+      },
+      { title: "", cell: (row) => (row.u === null ? "" : row.significant ? chip("drifts", "warn") : chip("no drift")) },
+      { title: "Leaves the limit", cell: when },
+    ],
+    trend.drifts,
+    { label: "Drift" },
+  );
+}
+
+/** @param {Trend} trend */
+function pointTable(trend) {
+  /** @param {{ version: number, rms_dps: number } | null} applied */
+  const text = (applied) => (applied ? `${number(applied.rms_dps)} (version ${applied.version})` : "–");
+  return table(
+    [
+      {
+        title: "Recording",
+        cell: (row) => h("a", { href: `/recordings/${row.recording}` }, `Recording ${row.recording}`),
+      },
+      { title: "Made", cell: (row) => day(row.at) },
+      { title: "As found, deg/s RMS", number: true, cell: (row) => text(row.as_found) },
+      { title: "As left, deg/s RMS", number: true, cell: (row) => text(row.as_left) },
+      { title: `Version ${trend.version}, deg/s RMS`, number: true, cell: (row) => number(row.rms_dps) },
+      trend.points.some((row) => row.why) ? { title: "", prose: true, cell: (row) => row.why } : null,
+    ],
+    trend.points,
+    { label: "Recordings in time" },
+  );
+}

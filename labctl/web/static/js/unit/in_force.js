@@ -1,0 +1,66 @@
+// The version in force: by whom, until when, its errors, and the files to download.
+
+import { download } from "../core/http/api.js";
+import { h } from "../core/elements.js";
+import { day, instant, number } from "../core/format.js";
+import { button, factList, modelName, notice } from "../core/components.js";
+import { overridden, verdictChip } from "./certification.js";
+
+/** @import { CalibrationRow, Certification, Unit } from "../../../types/api.js" */
+
+/**
+ * @param {Unit} unit
+ * @param {readonly CalibrationRow[]} rows
+ * @param {Certification | undefined} force
+ */
+export function inForce(unit, rows, force) {
+  if (!unit.certified_version) {
+    return notice(
+      "warn",
+      h(
+        "p",
+        {},
+        h("strong", {}, "No calibration is in force. "),
+        "Robots that ask for this unit's calibration get none until a version is certified.",
+      ),
+    );
+  }
+  const path = { serial: unit.serial };
+  const row = rows.find((each) => each.version === unit.certified_version);
+  const left = force?.due ? Math.ceil((Date.parse(force.due) - Date.now()) / 86_400_000) : null;
+  return h(
+    "div",
+    { class: "stack" },
+    factList([
+      ["In force", `version ${unit.certified_version}`, null, row ? modelName(row.model) : null],
+      ["Certified by", force?.by ?? "–", null, force ? instant(force.at) : null],
+      [
+        "Due",
+        force?.due ? day(force.due) : "no date",
+        null,
+        left === null ? null : left < 0 ? `${-left} days ago` : `in ${left} days`,
+      ],
+      !force || force.override === null
+        ? null
+        : [
+            "Verdict when certified",
+            verdictChip(force),
+            null,
+            force.verdict_recording ? `recording ${force.verdict_recording}` : null,
+          ],
+      ["RMS error", number(row?.rms_dps), "deg/s"],
+      ["At left-out temperatures", number(row?.heldout_rms_dps), "deg/s"],
+    ]),
+    force?.override ? overridden(force) : null,
+    left !== null && left < 0 ? notice("bad", "This calibration is overdue.") : null,
+    h(
+      "div",
+      { class: "row" },
+      unit.formats.map(({ id, title, suffix }) =>
+        button(`Download ${title}`, () =>
+          download("/api/units/{serial}/calibration", `${unit.serial}.${suffix}`, { path, query: { format: id } }),
+        ),
+      ),
+    ),
+  );
+}
