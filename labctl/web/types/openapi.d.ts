@@ -1979,6 +1979,8 @@ export interface components {
             wish: ("pause" | "abort") | null;
             /** @description The question that waits for a person. */
             prompt: components["schemas"]["PromptResponse"] | null;
+            /** @description Of a campaign that runs here: the turn by hand, now. */
+            turn: components["schemas"]["TurnResponse"] | null;
             /**
              * Links
              * @description Instruments that answer late or not at all.
@@ -2425,6 +2427,12 @@ export interface components {
              * @default true
              */
             confirmed?: boolean;
+            /**
+             * Again
+             * @description Of a turn by hand: it did not go well and is to be asked again.
+             * @default false
+             */
+            again?: boolean;
             /**
              * Reason
              * @default
@@ -4278,6 +4286,16 @@ export interface components {
             text: string;
             /** Position */
             position: string | null;
+            /**
+             * Turn Deg
+             * @description Of a turn by hand: its angle, positive counter-clockwise seen from above.
+             */
+            turn_deg: number | null;
+            /**
+             * Within S
+             * @description How long the answer is waited for, by the campaign's clock; null: no limit.
+             */
+            within_s: number | null;
         };
         /**
          * PulseResponse
@@ -4339,6 +4357,12 @@ export interface components {
              * @default
              */
             remark: string;
+            /**
+             * By Hand
+             * @description A person turns the units; no table and no chamber is driven.
+             * @default false
+             */
+            by_hand: boolean;
         };
         /**
          * RecordingAlone
@@ -4778,6 +4802,11 @@ export interface components {
              * @description Of data sets; null: the table is at rest.
              */
             rate_dps: (number | null)[];
+            /**
+             * Turn Deg
+             * @description Of turns by hand, positive counter-clockwise seen from above; null: no turn.
+             */
+            turn_deg: (number | null)[];
             /**
              * Position
              * @description In which the units are; null: as they were found.
@@ -5226,6 +5255,11 @@ export interface components {
              */
             rate_dps: (number | null)[];
             /**
+             * Turn Deg
+             * @description Of turns by hand, positive counter-clockwise seen from above; null: no turn.
+             */
+            turn_deg: (number | null)[];
+            /**
              * Position
              * @description In which the units are; null: as they were found.
              */
@@ -5369,6 +5403,46 @@ export interface components {
              * @description Standard uncertainty of an integral minus the angle: angle, time stamps and noise; null: unknown.
              */
             u_deg: (number | null)[];
+        };
+        /**
+         * TurnResponse
+         * @description The turn by hand that is under way.
+         */
+        TurnResponse: {
+            /**
+             * Position
+             * @description The body axis that points up, about which the units are turned.
+             */
+            position: string;
+            /**
+             * Asked Deg
+             * @description Positive counter-clockwise seen from above.
+             */
+            asked_deg: number;
+            /**
+             * Phase
+             * @description What the units are to do now.
+             * @enum {string}
+             */
+            phase: "rest" | "turn";
+            /**
+             * Attempt
+             * @description From 1; a turn that was refused is asked again.
+             */
+            attempt: number;
+            /**
+             * Came Deg
+             * @description Unit -> what has come out so far, by its nominal scale factor.
+             */
+            came_deg: {
+                [key: string]: number;
+            };
+            /**
+             * Refused
+             * @description Why the attempt before was refused; empty for the first.
+             * @default
+             */
+            refused: string;
         };
         /**
          * UncertaintyGrid
