@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from procedures.contracts.errors import StepFailed
 from procedures.contracts.journal import Event
@@ -41,11 +41,12 @@ def turn(context: ExecutionContext, step: Turn) -> dict[str, float]:
     )
 
 
+@dataclass(frozen=True)
 class _Found:
-    """What became of one attempt: why it was refused, empty for a good one, and what came out of each unit."""
+    """Result of one attempt."""
 
-    def __init__(self, refused: str, figures: dict[str, float]) -> None:
-        self.refused, self.figures = refused, figures
+    refused: str  #: why; empty for a good one
+    figures: dict[str, float]  #: what came out of each unit
 
 
 def _attempt(context: ExecutionContext, step: Turn, rules: TurnRules, shown: TurnProgress) -> _Found:
