@@ -9,7 +9,7 @@ from typing import Any
 
 WAIT_S = 60.0  #: for the next event
 QUIET_S = 0.2  #: without an event: time to check
-LOOK_S = 0.002  #: between two looks at what reports nothing
+LOOK_S = 0.002  #: between two checks of what reports nothing
 
 
 def wait_until(

@@ -20,9 +20,7 @@ def differences(found: Configuration, settings: Stim300Settings) -> list[str]:
     if found.unit not in RATE_UNITS:
         said.append(f"gyro output unit {UNIT_NAMES[found.unit]} in deg, needed ANGULAR RATE or AVERAGE ANGULAR RATE")
     rate_hz = settings.sample_rate_hz or DEFAULT_RATE_HZ
-    if found.sample_rate_hz is None:
-        said.append(f"sample rate external trigger, bench file {rate_hz:g} Hz")
-    elif found.sample_rate_hz != rate_hz:
+    if found.sample_rate_hz not in {None, rate_hz}:  # by an external trigger it is what the stream shows
         said.append(f"sample rate {found.sample_rate_hz} Hz, bench file {rate_hz:g} Hz")
     if options.datagram not in found.datagrams:
         said.append(f"datagram 0x{found.datagrams[0]:02X}, bench file 0x{options.datagram:02X}")

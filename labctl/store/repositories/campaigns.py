@@ -89,23 +89,9 @@ class Campaigns:
             for unit in new.units:
                 info = RecordingInfo.model_validate(unit.info)
                 new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
-            what: dict[str, object] = {
-                "recipe": new.recipe_name,
-                "bench": new.bench_name,
-                "units": [str(unit.info["serial"]) for unit in new.units],
-                "schedule_hash": new.schedule_hash,
-            }
-            if drivers := new.bench.get("drivers"):
-                what["drivers"] = drivers
-            if reported := new.bench.get("reported"):
-                what["reported"] = reported
-            simulation = new.bench.get("simulation")
-            if isinstance(simulation, Mapping) and (hidden := simulation.get("hidden")):
-                what["hidden"] = hidden
             if new.bench_clear:
-                what["bench_clear"] = new.bench_clear
                 _confirmed(connection, number, new.bench_clear, at)
-            append(connection, at, "campaign start", f"campaign {number}", what)
+            append(connection, at, "campaign start", f"campaign {number}", _audited(new))
         return number
 
     @staticmethod
@@ -213,6 +199,24 @@ class Campaigns:
                 .values(state=state, reason=reason, ended_at=at)
             )
             append(connection, at, "campaign state", f"campaign {campaign}", {"state": state, "reason": reason})
+
+
+def _audited(new: NewCampaign) -> dict[str, object]:
+    """Return what the audit trail keeps of the start of a campaign."""
+    simulation = new.bench.get("simulation")
+    optional = {
+        "drivers": new.bench.get("drivers"),
+        "reported": new.bench.get("reported"),
+        "hidden": simulation.get("hidden") if isinstance(simulation, Mapping) else None,
+        "bench_clear": new.bench_clear,
+    }
+    return {
+        "recipe": new.recipe_name,
+        "bench": new.bench_name,
+        "units": [str(unit.info["serial"]) for unit in new.units],
+        "schedule_hash": new.schedule_hash,
+        **{name: value for name, value in optional.items() if value},
+    }
 
 
 def _confirmed(connection: sa.Connection, campaign: int, text: str, at: datetime) -> None:

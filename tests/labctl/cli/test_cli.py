@@ -187,7 +187,7 @@ def _newer(lab: Lab) -> list[str]:
 def _bad_option(lab: Lab) -> list[str]:
     bench = lab.folder / "bench.toml"
     text = (Path(EXAMPLES).parent / "instruments" / "benches" / "triaxial-sim.toml").read_text()
-    bench.write_text(text.replace("sample_rate_hz = 125", "sample_rate_hz = 125\noptions = { datagram = 0x99 }"))
+    bench.write_text(text.replace("sample_rate_hz = 125", "sample_rate_hz = 125\noptions = { datagram = 0x55 }"))
     return ["campaign", "plan", "short", "--bench", str(bench)]
 
 

@@ -14,11 +14,11 @@ from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.services.schemas.comparison import ProfileColumns, RestColumns, TurnColumns
 
-#: Rows of one axis that a picture of a profile takes.
+#: _Rows of one axis that a picture of a profile takes.
 MOST_ROWS = 6000
 #: axis -> (m,) corrected minus true rate, deg/s; None without a version.
 Errors = Mapping[str, Array] | None
-Rows = dict[str, list[Any]]
+_Rows = dict[str, list[Any]]
 LEGS = {1: "heating", -1: "cooling", 0: ""}
 
 
@@ -29,7 +29,7 @@ def rest_columns(data: FitData, errors: Errors) -> RestColumns:
     run = np.asarray(channels["run"], dtype=np.int64) if "run" in channels else np.ones(m, dtype=np.int64)
     legs = np.sign(legs_of(data.temperature_c, run)) if known and t_s is not None else np.zeros(m, dtype=np.int64)
 
-    def of(axis: str) -> Rows:
+    def of(axis: str) -> _Rows:
         bias, left = data.outputs[axis] - data.true_rate_dps(axis), _left(errors, axis)
         return {
             "axis": [axis] * m,
@@ -52,7 +52,7 @@ def turn_columns(data: FitData, errors: Errors) -> TurnColumns:
     m, duration_s = len(rows), data.channels.durations_s()[rows]
     about = np.asarray(data.channels["position"]).astype(np.str_)[rows].tolist()
 
-    def of(axis: str) -> Rows:
+    def of(axis: str) -> _Rows:
         left, true = _left(errors, axis), data.true_rate_dps(axis)[rows]
         left = None if left is None else left[rows]
         u_dps = None if data.white_var is None else np.sqrt(data.white_var[axis][rows])
@@ -75,7 +75,7 @@ def profile_columns(data: FitData, errors: Errors, responses: Mapping[str, Respo
     rows = picked(len(data))
     m = len(rows)
 
-    def of(axis: str) -> Rows:
+    def of(axis: str) -> _Rows:
         left, true, followed = _left(errors, axis), data.true_rate_dps(axis), None
         if left is not None and axis in responses:
             followed = (true + left - data.through(responses[axis]).true_rate_dps(axis))[rows]
@@ -92,7 +92,7 @@ def profile_columns(data: FitData, errors: Errors, responses: Mapping[str, Respo
     return ProfileColumns(**_joined(data, errors, of))
 
 
-def _joined(data: FitData, errors: Errors, of: Callable[[str], Rows]) -> Rows:
+def _joined(data: FitData, errors: Errors, of: Callable[[str], _Rows]) -> _Rows:
     """Return the columns of all axes one below the other."""
     parts = [of(axis) for axis in data.info.axes if errors is None or axis in errors]
     return {name: [value for part in parts for value in part[name]] for name in parts[0]} if parts else {}
