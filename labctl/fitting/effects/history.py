@@ -24,7 +24,7 @@ class BiasDrift(Effect):
     shows_at_rest = True
     needs = ("t_s",)
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.5)}
-    experiment = "the first temperature again at the end; a long record at rest"
+    experiment = "the first temperature repeated at the end; a long record at rest"
     draws = ("time", "repeats", "legs")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:

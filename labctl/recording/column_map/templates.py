@@ -56,4 +56,4 @@ def template(kind: str) -> str:
     for motion, (header, rows) in _TEMPLATES.items():
         if motion == kind:
             return "".join(",".join(row) + "\n" for row in (header, *rows))
-    raise BadInput(f"--template {kind[:40]}: there are {', '.join(KINDS)}")
+    raise BadInput(f"--template {kind[:40]}: choose one of {', '.join(KINDS)}")

@@ -104,7 +104,7 @@ def menu(recipe: Recipe) -> list[tuple[str, dict[str, object]]]:
         ("the temperatures up and down", {"temperature_order": "up_down"}),
         ("the rates in random order", {"rate_order": "random"}),
         ("random rates, temperatures up and down", {"rate_order": "random", "temperature_order": "up_down"}),
-        ("the first temperature again at the end", {"replicates": {"first_temperature_again": True}}),
+        ("the first temperature repeated at the end", {"replicates": {"first_temperature_again": True}}),
         ("more rates in the top third", {"rates_dps": _top(recipe.rates_dps), "temperatures_c": [middle]}),
     ]
 

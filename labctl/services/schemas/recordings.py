@@ -211,7 +211,7 @@ class LogPreview(ResponseModel):
     first_rows: list[list[str]]
     column_map: dict[str, JsonValue] = Field(description="The map: keys and values of a MAP.toml.")
     map_toml: str = Field(description="The same as TOML.")
-    guesses: list[str] = Field(description="What was taken from values, because no name says it.")
+    guesses: list[str] = Field(description="Assumptions made from the values, where no name states it.")
     problems: list[str] = Field(description="Everything that is wrong; empty: it can be imported.")
     unused: list[str] = Field(description="Columns of the file that nothing uses.")
     serial: str | None

@@ -3683,7 +3683,7 @@ export interface components {
             map_toml: string;
             /**
              * Guesses
-             * @description What was taken from values, because no name says it.
+             * @description Assumptions made from the values, where no name states it.
              */
             guesses: string[];
             /**

@@ -86,7 +86,7 @@ export function meanPlots(state) {
     warm
       ? figure(
           `Recording ${state.id} temperature`,
-          "In the order of the data sets. Press a point to select its data set.",
+          "In the order of the data sets. Click a point to select its data set.",
           drawWarm,
           { height: "19rem" },
         )
