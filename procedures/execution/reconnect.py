@@ -33,7 +33,7 @@ def reconnect(context: ExecutionContext, error: LinkError) -> None:
     device = error.device
     if device != context.bench.table_name:
         context.bench.stop_table()  # an earlier move may still run, and a controller refuses another one meanwhile
-    context.monitor.links.change(device, "degraded", f"{error}; it is tried again, {len(PAUSES_S)} times")
+    context.monitor.links.change(device, "degraded", f"{error}; trying again at most {len(PAUSES_S)} times")
     for attempt, pause_s in enumerate(PAUSES_S, start=1):
         pass_time(context, pause_s, pausing=False)
         violations = context.without_dropouts(context.monitor.poll(POLL_S))

@@ -44,8 +44,8 @@ def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, proble
     if unit is None:
         step = float(np.median(np.diff(column.values))) if rows > 1 and not column.is_text else float("nan")
         problems.add(
-            f"column {column.name!r} for t_s: no unit is given (usual step {step:g}); write its unit in [units] or "
-            f"[columns.t_s]: one of {names_of('s').rpartition(',')[0]}"
+            f"column {column.name!r} for t_s: no unit is given (its typical step is {step:g}); write its unit in "
+            f"[units] or [columns.t_s] of the column map: one of {names_of('s').rpartition(',')[0]}"
         )
         return None
     if unit.name == "date-time":

@@ -185,7 +185,9 @@ class CampaignResponse(ResponseModel):
     rate_dps: float | None = None
     outputs: list[OutputResponse] = Field(default_factory=list, description="Of a campaign that runs here, now.")
     last_error: str | None = None
-    wish: Literal["pause", "abort"] | None = Field(default=None, description="Requested, and not yet carried out.")
+    wish: Literal["pause", "abort"] | None = Field(
+        default=None, description="A pause or abort that was requested and is not carried out yet."
+    )
     prompt: PromptResponse | None = Field(default=None, description="The question that waits for a person.")
     turn: TurnResponse | None = Field(default=None, description="Of a campaign that runs here: the turn by hand, now.")
     links: dict[str, str] = Field(default_factory=dict, description="Instruments that answer late or not at all.")

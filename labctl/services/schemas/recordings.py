@@ -211,7 +211,9 @@ class LogPreview(ResponseModel):
     first_rows: list[list[str]]
     column_map: dict[str, JsonValue] = Field(description="The map: keys and values of a MAP.toml.")
     map_toml: str = Field(description="The same as TOML.")
-    guesses: list[str] = Field(description="Assumptions made from the values, where no name states it.")
+    guesses: list[str] = Field(
+        description="Assumptions inferred from the data, such as units that no column name states."
+    )
     problems: list[str] = Field(description="Everything that is wrong; empty: it can be imported.")
     unused: list[str] = Field(description="Columns of the file that nothing uses.")
     serial: str | None

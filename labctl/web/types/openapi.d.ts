@@ -1974,7 +1974,7 @@ export interface components {
             last_error: string | null;
             /**
              * Wish
-             * @description Requested, and not yet carried out.
+             * @description A pause or abort that was requested and is not carried out yet.
              */
             wish: ("pause" | "abort") | null;
             /** @description The question that waits for a person. */
@@ -3683,7 +3683,7 @@ export interface components {
             map_toml: string;
             /**
              * Guesses
-             * @description Assumptions made from the values, where no name states it.
+             * @description Assumptions inferred from the data, such as units that no column name states.
              */
             guesses: string[];
             /**

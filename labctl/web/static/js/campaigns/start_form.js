@@ -164,7 +164,7 @@ export function startForm(bench, order) {
       h(
         "p",
         { class: "muted" },
-        "A recording of this plan is simulated and imported at once; no bench moves, no campaign is stored.",
+        "Simulates a recording of this plan and imports it immediately. No bench moves, and no campaign is stored.",
       ),
       h(
         "div",
