@@ -96,7 +96,7 @@ def test_one_problem_is_one_line(lab: Lab, tmp_path: Path) -> None:
 
 def test_a_template_is_printed(lab: Lab) -> None:
     assert lab.run("import", "--template", "turns").stdout.startswith("data set,t (s),position,turn_deg,turn_u_deg,")
-    assert "there are rates, rest" in lab.run("import", "--template", "flight", status=2).stderr
+    assert "choose one of rates, rest" in lab.run("import", "--template", "flight", status=2).stderr
     assert "name the file or folder" in lab.run("import", status=2).stderr
 
 

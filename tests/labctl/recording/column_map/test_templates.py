@@ -29,5 +29,5 @@ def test_a_template_is_mapped_whole(tmp_path: Path, kind: str) -> None:
 
 
 def test_an_unknown_kind_is_refused() -> None:
-    with pytest.raises(BadInput, match="there are rates, rest, turns, profile, poses"):
+    with pytest.raises(BadInput, match="choose one of rates, rest, turns, profile, poses"):
         template("flight")

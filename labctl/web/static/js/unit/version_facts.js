@@ -64,7 +64,11 @@ function leftOut({ left_out: effects }) {
       effects,
       { label: "Not exported" },
     ),
-    h("p", { class: "muted small" }, "RMS over the data sets of the fit: what a consumer is left with for want of it."),
+    h(
+      "p",
+      { class: "muted small" },
+      "RMS over the data sets of the fit: the error that stays where they are not corrected.",
+    ),
   ];
 }
 
